@@ -1,0 +1,34 @@
+"""One hand on one hold: what can it carry?
+
+hold + hand parameters → settled finger (q, c) → tile loads as affine maps of tendon tension
+  → WrenchSpace { o + V y : A y ≤ b } and its views.
+"""
+
+from hand_models.errors import CruxError, EmptySetError, InvalidInputError
+from hand_models.fixed_wrist import tension_limits, wrench_space
+from hand_models.frames import Pose
+from hand_models.hand import FINGERS, Grasp, SettledHand, SpinyHand, spiny_hand
+from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
+from hand_models.spines import Surface
+from hand_models.wrench_space import WrenchSpace
+
+__all__ = [
+    "FINGERS",
+    "CruxError",
+    "Cylinder",
+    "Edge",
+    "EmptySetError",
+    "Grasp",
+    "Hold",
+    "InvalidInputError",
+    "Plane",
+    "Pose",
+    "SettledHand",
+    "Sphere",
+    "SpinyHand",
+    "Surface",
+    "WrenchSpace",
+    "spiny_hand",
+    "tension_limits",
+    "wrench_space",
+]

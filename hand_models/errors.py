@@ -1,0 +1,73 @@
+"""The project's exceptions: one base, and a class for each thing a caller can do about it."""
+
+from __future__ import annotations
+
+from typing import Self
+
+__all__ = [
+    "CruxError",
+    "EmptySetError",
+    "InvalidInputError",
+    "SolverError",
+    "UnsupportedError",
+]
+
+
+class CruxError(Exception):
+    """Base of every exception that the project raises on purpose.
+
+    Parameters
+    ----------
+    message : str
+        One line that names the field, the value and what would be valid.
+    field : str, optional
+        Path of the field to blame, such as ``stance.hands[0].hold.diameter``.
+
+    Attributes
+    ----------
+    kind : str
+        Short machine-readable class of the error; travels as ``error.kind``.
+    """
+
+    kind = "error"
+
+    def __init__(self, message: str, *, field: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.field = field
+
+    def within(self, parent: str) -> Self:
+        """Return the error with ``parent`` put before its field's path."""
+        if self.field is None:
+            self.field = parent
+        else:
+            separator = "" if self.field.startswith("[") else "."
+            self.field = f"{parent}{separator}{self.field}"
+        return self
+
+    def __str__(self) -> str:
+        return f"{self.field}: {self.message}" if self.field else self.message
+
+
+class InvalidInputError(CruxError):
+    """A value that no model can work with (not finite, out of range, wrong shape, unknown name)."""
+
+    kind = "invalid"
+
+
+class UnsupportedError(InvalidInputError):
+    """A value that is meaningful, but that this version does not implement."""
+
+    kind = "unsupported"
+
+
+class EmptySetError(CruxError):
+    """A set of wrenches in which nothing is left: its rows contradict each other."""
+
+    kind = "empty_set"
+
+
+class SolverError(CruxError):
+    """A numerical method that gave no answer which passes its checks."""
+
+    kind = "solver"

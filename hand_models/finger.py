@@ -1,0 +1,312 @@
+"""One finger on a section of rock: how it settles, and what its tendon then loads.
+
+In the finger's frame F (x along the finger, z into the rock; coordinates (x, z) here) phalanx i
+points along u = (cos θ, sin θ) with its tile's normal n = (−sin θ, cos θ), and touches the rock at
+``p_i + c_i u + h n``. The tile drags the rock with the shear T along −u and presses it with N along
+n; the rock pushes back equally, so that joint i balances when (Eq. 4, written out)
+
+    Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + f M_i r_i − K_i q_i − p_i = 0,
+
+with d_ij from joint i to contact j and a × b = a_x b_z − a_z b_x. The shear follows the tendon
+alone (Eq. 5 with a tile that has caught the rock): ``T_i = M_i (τ_i f_close + g (f − f_close))``. Solving
+for N gives both loads as affine functions of the tension f (Eq. 14).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hand_models.errors import InvalidInputError
+from hand_models.frames import Array
+from hand_models.holds import Section
+from hand_models.parameters import ParameterTable
+
+__all__ = ["PHALANGES", "Contact", "FingerModel", "SettledFinger"]
+
+PHALANGES = ("proximal", "middle", "distal")
+
+
+@dataclass(frozen=True)
+class FingerModel:
+    """A finger's numbers, alike for the four of them. SI units.
+
+    Attributes
+    ----------
+    joint_spacing : float
+        From a joint to the next [m].
+    tile_height, tile_centre, tile_length : float
+        The tile's face above the joint's axis, its centre from the joint, its length [m].
+    pulley_radii, joint_stiffness, joint_preload : tuple of float
+        r [m], K_r [N·m/rad], p_r [N·m] of each joint.
+    joint_lower, joint_upper : tuple of float
+        Limits of each joint, relative to the phalanx before it [rad].
+    engagement : tuple of float
+        τ, shear over closing tension at the moment of closing.
+    base_engagement : float
+        The same for the tile on a rotating base.
+    shear_gain : float
+        g = c_p k_c / (k_c + K_p), shear per newton of further tension.
+    friction : float
+        μ of M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
+    """
+
+    joint_spacing: float
+    tile_height: float
+    tile_centre: float
+    tile_length: float
+    pulley_radii: tuple[float, ...]
+    joint_stiffness: tuple[float, ...]
+    joint_preload: tuple[float, ...]
+    joint_lower: tuple[float, ...]
+    joint_upper: tuple[float, ...]
+    engagement: tuple[float, ...]
+    base_engagement: float
+    shear_gain: float
+    friction: float
+
+    @classmethod
+    def from_table(cls, table: ParameterTable) -> FingerModel:
+        """Build the model from ``hand.toml``.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is missing or impossible.
+        """
+        contact = table.scalar("tile", "contact_stiffness")
+        spring = table.scalar("tile", "spring_stiffness")
+        model = cls(
+            joint_spacing=table.scalar("finger", "joint_spacing"),
+            tile_height=table.scalar("finger", "tile_height"),
+            tile_centre=table.scalar("finger", "tile_centre"),
+            tile_length=table.scalar("finger", "tile_length"),
+            pulley_radii=table.vector("finger", "pulley_radii"),
+            joint_stiffness=table.vector("finger", "joint_stiffness"),
+            joint_preload=table.vector("finger", "joint_preload"),
+            joint_lower=table.vector("finger", "joint_lower"),
+            joint_upper=table.vector("finger", "joint_upper"),
+            engagement=table.vector("tile", "engagement"),
+            base_engagement=table.scalar("tile", "base_engagement"),
+            shear_gain=table.scalar("tile", "pulley_ratio") * contact / (contact + spring),
+            friction=table.scalar("tendon", "friction"),
+        )
+        for name in (
+            "pulley_radii",
+            "joint_stiffness",
+            "joint_preload",
+            "joint_lower",
+            "joint_upper",
+            "engagement",
+        ):
+            if len(getattr(model, name)) != len(PHALANGES):
+                raise InvalidInputError(f"one number for each of {PHALANGES}", field=name)
+        if not 0.0 <= model.friction < 1.0:
+            raise InvalidInputError(
+                f"must be in [0, 1), got {model.friction:g}", field="tendon.friction"
+            )
+        if model.shear_gain <= 0.0:
+            raise InvalidInputError("stiffnesses must be above 0", field="tile.contact_stiffness")
+        return model
+
+    @property
+    def tile_range(self) -> tuple[float, float]:
+        """Where along a phalanx its tile's face begins and ends [m]."""
+        half = self.tile_length / 2.0
+        return self.tile_centre - half, self.tile_centre + half
+
+    def settle(self, section: Section | None, joint: tuple[float, float]) -> SettledFinger:
+        """Close the finger on a section of rock, phalanx by phalanx from the base.
+
+        Each phalanx turns until its tile's face is tangent to the rock; where the tangent point
+        would lie off the tile, the tile's nearest edge touches instead; on flat rock the tile's
+        centre does. A phalanx that finds no rock within its joint's range stops at the upper limit
+        and carries nothing.
+
+        Parameters
+        ----------
+        section : Section or None
+            Rock in the finger's plane, in the coordinates (x, z) of F; None if there is none.
+        joint : tuple of float
+            The proximal joint in the same coordinates [m].
+        """
+        contacts: list[Contact] = []
+        before = 0.0
+        for lower, upper in zip(self.joint_lower, self.joint_upper, strict=True):
+            contact = self._lay(section, joint, before + lower, before + upper)
+            contacts.append(contact)
+            before = contact.angle
+            joint = (
+                joint[0] + self.joint_spacing * math.cos(before),
+                joint[1] + self.joint_spacing * math.sin(before),
+            )
+        return SettledFinger(self, tuple(contacts))
+
+    def _lay(
+        self, section: Section | None, joint: tuple[float, float], low: float, high: float
+    ) -> Contact:
+        nearest, farthest = self.tile_range
+        open_air = Contact(high, joint, self.tile_centre, "none")
+        if section is None:
+            return open_air
+        tangency = section.tangent(joint, self.tile_height, low, high)
+        if tangency is not None and nearest <= tangency.distance <= farthest:
+            return Contact(tangency.angle, joint, tangency.distance, "face")
+        if tangency is not None:
+            along, kind = min(max(tangency.distance, nearest), farthest), "edge"
+        elif section.flat:
+            along, kind = self.tile_centre, "face"
+        else:
+            along, kind = nearest, "edge"
+        angle = section.touch(joint, along, self.tile_height, low, high)
+        return open_air if angle is None else Contact(angle, joint, along, kind)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One phalanx on the rock.
+
+    Attributes
+    ----------
+    angle : float
+        θ, of the phalanx from the finger's x toward z [rad].
+    joint : tuple of float
+        (x, z) of its joint [m].
+    along : float
+        c, of the contact from the joint along the phalanx [m].
+    kind : {'face', 'edge', 'none'}
+        Whether the tile's face touches, or one of its edges, or nothing.
+    """
+
+    angle: float
+    joint: tuple[float, float]
+    along: float
+    kind: str
+
+
+@dataclass(frozen=True)
+class SettledFinger:
+    """A finger that has closed on the rock.
+
+    Attributes
+    ----------
+    model : FingerModel
+    contacts : tuple of Contact
+        Proximal first.
+    """
+
+    model: FingerModel
+    contacts: tuple[Contact, ...]
+
+    @cached_property
+    def touching(self) -> tuple[bool, ...]:
+        """Whether each phalanx has rock under its tile."""
+        return tuple(contact.kind != "none" for contact in self.contacts)
+
+    @cached_property
+    def joint_angles(self) -> Array:
+        """q, each joint relative to the phalanx before it, shape (3,) [rad]."""
+        return np.diff([0.0, *(contact.angle for contact in self.contacts)])
+
+    @cached_property
+    def points(self) -> Array:
+        """Contacts in (x, z) of F, shape (3, 2) [m]."""
+        h = self.model.tile_height
+        return np.array(
+            [
+                (
+                    c.joint[0] + c.along * math.cos(c.angle) - h * math.sin(c.angle),
+                    c.joint[1] + c.along * math.sin(c.angle) + h * math.cos(c.angle),
+                )
+                for c in self.contacts
+            ]
+        )
+
+    @cached_property
+    def directions(self) -> Array:
+        """U of each phalanx in (x, z) of F, shape (3, 2)."""
+        return np.array([(math.cos(c.angle), math.sin(c.angle)) for c in self.contacts])
+
+    def losses(self, base_tile: bool) -> Array:
+        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
+
+        A tile on the base comes first on the tendon, so it shifts the others by one.
+        """
+        first = 1 if base_tile else 0
+        return np.asarray((1.0 - self.model.friction) ** np.arange(first, first + 3))
+
+    def shears(self, closing_tension: float, base_tile: bool = False) -> Array:
+        """Return each tile's shear as an affine function of tension.
+
+        Returns
+        -------
+        ndarray, shape (3, 2)
+            Columns: at zero tension [N], per newton of tension. Zero where nothing is touched.
+        """
+        model = self.model
+        local = np.where(self.touching, self.losses(base_tile), 0.0)
+        at_zero = (np.asarray(model.engagement) - model.shear_gain) * closing_tension
+        return np.column_stack([local * at_zero, local * model.shear_gain])
+
+    def normals(self, shears: Array, base_tile: bool = False) -> Array:
+        """Return each tile's normal load as an affine function of tension (Eqs. 4 and 14).
+
+        Where a phalanx touches nothing its joint stands at its limit: the phalanges on both sides
+        are one link, so that joint's equation and that tile's load both drop out (Section 5.7).
+
+        Parameters
+        ----------
+        shears : ndarray, shape (3, 2)
+            From `shears`.
+        base_tile : bool, optional
+            Whether a base tile comes first on the tendon.
+
+        Returns
+        -------
+        ndarray, shape (3, 2)
+            Columns as in `shears`.
+        """
+        normal_arms, rest = self._joint_balance(shears, base_tile)
+        for i, touches in enumerate(self.touching):
+            if not touches:
+                normal_arms[i] = 0.0
+                normal_arms[:, i] = 0.0
+                normal_arms[i, i] = 1.0
+                rest[i] = 0.0
+        return _upper_solve(normal_arms, rest)
+
+    def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:
+        """Return the torque of each joint's upper stop, affine in tension, shape (3, 2) [N·m].
+
+        It is zero at a joint that is free, and must not be negative at one that stands at its
+        limit: a stop pushes only.
+        """
+        normal_arms, rest = self._joint_balance(shears, base_tile)
+        return np.where(np.array(self.touching)[:, None], 0.0, rest - normal_arms @ normals)
+
+    def _joint_balance(self, shears: Array, base_tile: bool) -> tuple[Array, Array]:
+        """Return (A, b) with A N = b for the three joints; b has a column as each of `shears`."""
+        model = self.model
+        u = self.directions
+        joints = np.array([c.joint for c in self.contacts])
+        d = self.points[None, :, :] - joints[:, None, :]
+        later = np.triu(np.ones((3, 3)))
+        shear_arms = later * (d[..., 0] * u[:, 1] - d[..., 1] * u[:, 0])
+        normal_arms = later * (d[..., 0] * u[:, 0] + d[..., 1] * u[:, 1])
+        rest = shear_arms @ shears
+        rest[:, 0] -= np.asarray(model.joint_stiffness) * self.joint_angles
+        rest[:, 0] -= np.asarray(model.joint_preload)
+        rest[:, 1] += self.losses(base_tile) * np.asarray(model.pulley_radii)
+        return normal_arms, rest
+
+
+def _upper_solve(matrix: Array, rhs: Array) -> Array:
+    """Solve an upper-triangular system of three rows."""
+    x = np.empty_like(rhs)
+    x[2] = rhs[2] / matrix[2, 2]
+    x[1] = (rhs[1] - matrix[1, 2] * x[2]) / matrix[1, 1]
+    x[0] = (rhs[0] - matrix[0, 1] * x[1] - matrix[0, 2] * x[2]) / matrix[0, 0]
+    return x

@@ -1,0 +1,531 @@
+"""WrenchSpace: everything that one hand on one hold can exert, as one object with named rows.
+
+    { o + V y : L y + l0 ≤ u s,  H y ≤ h }      at utilisation u;   A y ≤ b at u = 1
+
+Its views (vertices, half-spaces, support function, …) are of the set at u = 1. The inequalities of
+a fixed-wrist hand couple no finger to another, so the set is a Minkowski sum of small polytopes,
+one for each block of coupled columns; the views use that, and need no double description.
+
+Directions and distances that mix forces and moments are taken in *scaled* wrenches, whose moments
+are divided by `MOMENT_ARM`, so that all six components are newtons.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from hand_models.errors import EmptySetError, InvalidInputError, SolverError
+from hand_models.frames import Array, Indices, finite_vector
+
+__all__ = ["MOMENT_ARM", "SCALE", "HalfSpaces", "Row", "WrenchSpace"]
+
+MOMENT_ARM: Final = 0.1
+"""Makes newton-metres commensurate with newtons: about the size of a hand [m]."""
+
+SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
+"""From a wrench to a scaled wrench [N]."""
+
+TOLERANCE: Final = 1e-9
+"""Relative tolerance of the geometry in this module."""
+
+
+class Row(NamedTuple):
+    """The name of an inequality.
+
+    Attributes
+    ----------
+    finger, phalanx : str or None
+        Whose it is; None where it is the palm's, or a whole finger's.
+    limit : str
+        What it limits.
+    kind : {'limit', 'hard'}
+    label : str
+        Unique in its set.
+    """
+
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    kind: Literal["limit", "hard"]
+    label: str
+
+
+class HalfSpaces(NamedTuple):
+    """``normals @ w ≤ offsets`` and, for a flat set, ``equation_normals @ w = equation_offsets``.
+
+    Normals have unit length as functions of the scaled wrench, so a violation is a distance [N].
+    """
+
+    normals: Array
+    offsets: Array
+    equation_normals: Array
+    equation_offsets: Array
+
+
+class _Summand(NamedTuple):
+    """Extreme points (n, 6) of one block's image in scaled wrenches; polygons are in order."""
+
+    points: Array
+    dimension: int
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchSpace:
+    """Wrenches on the rock, in H, that a hand can carry.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (6,)
+        o [N, N·m].
+    generators : ndarray, shape (6, m)
+        V, a column for each of `columns`.
+    columns : tuple of str, length m
+        Names of the entries of y.
+    rows : tuple of Row
+        Limit rows, then hard rows.
+    L, l0, s : ndarray, shapes (nl, m), (nl,), (nl,)
+        Limit rows: the load ``L y + l0`` against the capacity ``s`` > 0.
+    H, h : ndarray, shapes (nh, m), (nh,)
+        Hard rows ``H y ≤ h``, whatever the utilisation.
+    """
+
+    origin: Array
+    generators: Array
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    L: Array
+    l0: Array
+    s: Array
+    H: Array
+    h: Array
+
+    def __post_init__(self) -> None:
+        m = len(self.columns)
+        shapes = {
+            "origin": (6,),
+            "generators": (6, m),
+            "L": (len(self.s), m),
+            "l0": (len(self.s),),
+            "H": (len(self.h), m),
+        }
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise InvalidInputError(
+                    f"shape {shape} is needed, got {getattr(self, name).shape}", field=name
+                )
+        if len(self.rows) != len(self.s) + len(self.h):
+            raise InvalidInputError("one name for each row is needed", field="rows")
+        if not (self.s > 0.0).all():
+            raise InvalidInputError("every capacity must be above zero", field="s")
+
+    @property
+    def A(self) -> Array:
+        """All rows at u = 1, shape (nl + nh, m)."""
+        return np.vstack([self.L, self.H])
+
+    @property
+    def b(self) -> Array:
+        """Right-hand sides at u = 1, shape (nl + nh,)."""
+        return np.concatenate([self.s - self.l0, self.h])
+
+    def wrench(self, y: ArrayLike) -> Array:
+        """Return o + V y, shape (6,)."""
+        return np.asarray(self.origin + self.generators @ np.asarray(y, dtype=float))
+
+    def utilisations(self, y: ArrayLike) -> Array:
+        """Return load over capacity of each limit row, shape (nl,)."""
+        return np.asarray((self.L @ np.asarray(y, dtype=float) + self.l0) / self.s)
+
+    # Views at u = 1 -----------------------------------------------------------------------------
+
+    @cached_property
+    def _blocks(self) -> tuple[tuple[Indices, Array], ...]:
+        """Columns of each block and the vertices of its polytope, (indices, (n, d))."""
+        A, b = self.A, self.b
+        used = np.abs(A) > 0.0
+        idle = ~used.any(axis=1)
+        if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
+            raise self._empty()
+        m = len(self.columns)
+        if not m:
+            return ()
+        incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
+        _, labels = connected_components(incidence, directed=False)
+        blocks: list[tuple[Indices, Array]] = []
+        for label in range(labels.max() + 1):
+            columns: Indices = np.flatnonzero(labels == label)
+            mine = used[:, columns].any(axis=1)
+            vertices = _polytope_vertices(A[np.ix_(mine, columns)], b[mine])
+            if not len(vertices):
+                raise self._empty(columns)
+            blocks.append((columns, vertices))
+        return tuple(blocks)
+
+    def _empty(self, columns: Indices | None = None) -> EmptySetError:
+        names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
+        return EmptySetError(
+            f"no wrench is left at utilisation 1: the limits{names} contradict the hard rows"
+        )
+
+    @cached_property
+    def _summands(self) -> tuple[_Summand, ...]:
+        """The blocks' images that are more than a point, about `_base`."""
+        summands = []
+        for columns, vertices in self._blocks:
+            image = (vertices @ self.generators[:, columns].T) * SCALE
+            summands.append(_extreme_points(image))
+        return tuple(summands)
+
+    @cached_property
+    def _base(self) -> Array:
+        """A scaled wrench of the set."""
+        start = self.origin * SCALE
+        return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
+
+    @cached_property
+    def _basis(self) -> Array:
+        """Orthonormal basis, shape (r, 6), of the directions of the set's affine hull."""
+        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
+        if not edges:
+            return np.zeros((0, 6))
+        _, values, basis = np.linalg.svd(np.vstack(edges))
+        rank = int((values > 1e-10 * max(values[0], TOLERANCE)).sum())
+        return np.asarray(basis[:rank])
+
+    @property
+    def dimension(self) -> int:
+        """Of the set's affine hull, from 0 to 6."""
+        return len(self._basis)
+
+    @cached_property
+    def _facets(self) -> tuple[Array, Array]:
+        """Unit normals (k, r) and offsets (k,) in the basis, about `_base`."""
+        basis, r = self._basis, self.dimension
+        if r == 0:
+            return np.zeros((0, 0)), np.zeros(0)
+        parts = [
+            _Summand((s.points - s.points[0]) @ basis.T, s.dimension)
+            for s in self._summands
+            if s.dimension
+        ]
+        if all(part.dimension <= 2 for part in parts):
+            normals = _sum_normals(parts, r)
+            offsets = sum(
+                ((part.points @ normals.T).max(axis=0) for part in parts),
+                start=np.zeros(len(normals)),
+            )
+            return normals, np.asarray(offsets)
+        return _hull_facets(_sums(parts))
+
+    def half_spaces(self) -> HalfSpaces:
+        """Return the set at u = 1 as inequalities and, where it is flat, equations.
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        """
+        normals, offsets = self._facets
+        basis = self._basis
+        lifted = normals @ basis if len(basis) else np.zeros((0, 6))
+        _, _, full = np.linalg.svd(np.vstack([basis, np.zeros((1, 6))]))
+        flat = full[len(basis) :]
+        return HalfSpaces(
+            normals=lifted * SCALE,
+            offsets=offsets + lifted @ self._base,
+            equation_normals=flat * SCALE,
+            equation_offsets=flat @ self._base,
+        )
+
+    def vertices(self) -> Array:
+        """Return the extreme wrenches of the set at u = 1, shape (n, 6).
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        """
+        return np.asarray((self._vertices_in_basis @ self._basis + self._base) / SCALE)
+
+    @cached_property
+    def _vertices_in_basis(self) -> Array:
+        parts = [
+            _Summand((s.points - s.points[0]) @ self._basis.T, s.dimension)
+            for s in self._summands
+            if s.dimension
+        ]
+        return _sum_vertices(parts, *self._facets) if parts else np.zeros((1, 0))
+
+    def support(self, direction: ArrayLike) -> float:
+        """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        """
+        d = finite_vector(direction, 6, "direction")
+        slopes = self.generators.T @ d
+        reach = sum(float((v @ slopes[columns]).max()) for columns, v in self._blocks)
+        return float(d @ self.origin) + reach
+
+    def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
+        """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.
+
+        Parameters
+        ----------
+        wrench : array_like, shape (6,)
+            [N, N·m]
+        tolerance : float, optional
+            Distance in scaled wrenches [N].
+        """
+        w = finite_vector(wrench, 6, "wrench")
+        faces = self.half_spaces()
+        beyond = np.max(faces.normals @ w - faces.offsets, initial=-math.inf)
+        off = np.max(np.abs(faces.equation_normals @ w - faces.equation_offsets), initial=0.0)
+        return bool(max(beyond, off) <= tolerance)
+
+    def capability(self, direction: ArrayLike) -> tuple[float, float] | None:
+        """Return the least and the largest t for which t·d is in the set at u = 1.
+
+        None where the line through zero along d, of shape (6,), misses the set.
+
+        Raises
+        ------
+        SolverError
+            If the linear program fails.
+        """
+        d = finite_vector(direction, 6, "direction")
+        m = len(self.columns)
+        equations = np.hstack([self.generators, -d[:, None]]) * SCALE[:, None]
+        bounds = [(None, None)] * (m + 1)
+        rows = np.hstack([self.A, np.zeros((len(self.b), 1))])
+        ends = []
+        for sign in (1.0, -1.0):
+            cost = np.zeros(m + 1)
+            cost[-1] = sign
+            result = linprog(
+                cost,
+                A_ub=rows,
+                b_ub=self.b,
+                A_eq=equations,
+                b_eq=-self.origin * SCALE,
+                bounds=bounds,
+                method="highs",
+            )
+            if result.status == 2:
+                return None
+            if result.status != 0 or result.x is None:
+                raise SolverError(f"capability: {result.message}")
+            ends.append(float(result.x[-1]))
+        return ends[0], ends[1]
+
+    def volume(self) -> tuple[float, int]:
+        """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.
+
+        Measured in scaled wrenches, so its unit is N^r.
+        """
+        r = self.dimension
+        points = self._vertices_in_basis
+        if r == 0:
+            return 0.0, 0
+        if r == 1:
+            return float(np.ptp(points)), 1
+        return float(ConvexHull(points, qhull_options="Qt Q12").volume), r
+
+
+def _polytope_vertices(A: Array, b: Array) -> Array:
+    """Return the vertices (n, d) of { y : A y ≤ b }, bounded; none if it is empty."""
+    d = A.shape[1]
+    norms = np.linalg.norm(A, axis=1)
+    A, b = A / norms[:, None], b / norms
+    slack = TOLERANCE * (1.0 + float(np.abs(b).max()))
+    if d == 1:
+        upper = b[A[:, 0] > 0.0].min()
+        lower = -b[A[:, 0] < 0.0].min()
+        if lower > upper + slack:
+            return np.zeros((0, 1))
+        return np.array([[lower], [upper]]) if upper > lower + slack else np.array([[lower]])
+    if d == 2:
+        first, second = np.triu_indices(len(b), 1)
+        det = A[first, 0] * A[second, 1] - A[first, 1] * A[second, 0]
+        crossing = np.abs(det) > TOLERANCE
+        first, second, det = first[crossing], second[crossing], det[crossing]
+        points = np.column_stack(
+            [
+                (b[first] * A[second, 1] - b[second] * A[first, 1]) / det,
+                (A[first, 0] * b[second] - A[second, 0] * b[first]) / det,
+            ]
+        )
+        return _distinct(points[(points @ A.T <= b + slack).all(axis=1)], slack)
+    # the centre of the largest ball inside
+    cost = np.zeros(d + 1)
+    cost[-1] = -1.0
+    ball = linprog(
+        cost,
+        A_ub=np.column_stack([A, np.ones(len(b))]),
+        b_ub=b,
+        bounds=[(None, None)] * d + [(0.0, None)],
+        method="highs",
+    )
+    if ball.status == 2:
+        return np.zeros((0, d))
+    if ball.status != 0 or ball.x is None:
+        raise SolverError(f"a block of {d} columns is not bounded: {ball.message}")
+    if ball.x[-1] <= slack:
+        raise SolverError(f"a block of {d} columns has no interior")
+    cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
+    return _distinct(cut.intersections, slack)
+
+
+def _distinct(points: Array, slack: float) -> Array:
+    """Return the points that differ by more than ``slack`` in some coordinate."""
+    if len(points) < 2:
+        return points
+    close = (np.abs(points[:, None, :] - points[None, :, :]) <= 10.0 * slack).all(axis=2)
+    return points[~np.triu(close, 1).any(axis=0)]
+
+
+def _extreme_points(image: Array) -> _Summand:
+    """Return the extreme points of a few points (n, 6), in order around a polygon."""
+    centred = image - image.mean(axis=0)
+    _, values, basis = np.linalg.svd(centred, full_matrices=False)
+    size = 1.0 + float(np.abs(image).max())
+    rank = int((values > TOLERANCE * size).sum())
+    if rank == 0:
+        return _Summand(image[:1], 0)
+    flat = centred @ basis[:rank].T
+    if rank == 1:
+        return _Summand(image[[flat[:, 0].argmin(), flat[:, 0].argmax()]], 1)
+    hull = ConvexHull(flat)
+    return _Summand(image[hull.vertices], rank)
+
+
+def _sum_normals(parts: list[_Summand], r: int) -> Array:
+    """Return the unit facet normals (k, r) of a sum of segments and polygons.
+
+    A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
+    plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon.
+    """
+    if r == 1:
+        return np.array([[1.0], [-1.0]])
+    edges = [
+        np.diff(np.vstack([p.points, p.points[:1]]), axis=0)[: 1 if p.dimension == 1 else None]
+        for p in parts
+    ]
+    edges = [e / np.linalg.norm(e, axis=1)[:, None] for e in edges]
+    found = []
+    for use in _ways(parts, r - 1):
+        grids = np.meshgrid(
+            *(
+                np.arange(len(edges[k])) if u == 1 else np.zeros(1, dtype=int)
+                for k, u in enumerate(use)
+            ),
+            indexing="ij",
+        )
+        picks = [g.ravel() for g in grids]
+        spans = []
+        for k, u in enumerate(use):
+            if u >= 1:
+                spans.append(edges[k][picks[k]])
+            if u == 2:
+                spans.append(np.broadcast_to(edges[k][1], spans[-1].shape))
+        normals = _cross(np.stack(spans, axis=1))
+        lengths = np.linalg.norm(normals, axis=1)
+        independent = lengths > 1e-8
+        normals = normals[independent] / lengths[independent, None]
+        for side in (normals, -normals):
+            keep = np.ones(len(side), dtype=bool)
+            for k, u in enumerate(use):
+                if u == 1 and parts[k].dimension == 2:
+                    heights = side @ parts[k].points.T
+                    here = heights[np.arange(len(side)), picks[k][independent]]
+                    top = heights.max(axis=1)
+                    keep &= here >= top - 1e-9 * (1.0 + np.abs(top))
+            found.append(side[keep])
+    normals = np.vstack(found)
+    _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
+    return np.asarray(normals[np.sort(first)])
+
+
+def _ways(parts: list[_Summand], total: int) -> Iterator[tuple[int, ...]]:
+    """Yield how many edge directions to take of each part, ``total`` in all."""
+    for use in itertools.product(*(range(part.dimension + 1) for part in parts)):
+        if sum(use) == total:
+            yield use
+
+
+def _cross(spans: Array) -> Array:
+    """Return the vectors (n, r) orthogonal to stacks (n, r − 1, r), by Laplace expansion."""
+    count, rows, r = spans.shape
+    minors: dict[tuple[int, ...], Array] = {(j,): spans[:, 0, j] for j in range(r)}
+    for row in range(1, rows):
+        grown: dict[tuple[int, ...], Array] = {}
+        for columns in itertools.combinations(range(r), row + 1):
+            total = np.zeros(count)
+            for place, j in enumerate(columns):
+                rest = columns[:place] + columns[place + 1 :]
+                total += (-1.0) ** (row + place) * spans[:, row, j] * minors[rest]
+            grown[columns] = total
+        minors = grown
+    return np.column_stack(
+        [(-1.0) ** j * minors[tuple(i for i in range(r) if i != j)] for j in range(r)]
+    )
+
+
+def _sums(parts: list[_Summand]) -> Array:
+    """Return every sum of one point of each part, shape (n, r)."""
+    total = np.zeros((1, parts[0].points.shape[1]))
+    for part in parts:
+        total = (total[:, None, :] + part.points[None, :, :]).reshape(-1, total.shape[1])
+    return total
+
+
+def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array) -> Array:
+    """Return the vertices (n, r) of a sum, given its facets.
+
+    A sum of points is a vertex if the mean normal of the facets it lies on makes each of them the
+    only highest point of its part.
+    """
+    sums = _sums(parts)
+    choice = np.indices([len(part.points) for part in parts]).reshape(len(parts), -1)
+    size = 1.0 + float(np.abs(offsets).max())
+    chunk = max(1, 2_000_000 // max(1, len(normals)))
+    chosen = []
+    for start in range(0, len(sums), chunk):
+        piece = sums[start : start + chunk]
+        active = (piece @ normals.T >= offsets - 1e-8 * size).astype(float)
+        outward = active @ normals
+        keep = active.any(axis=1)
+        for k, part in enumerate(parts):
+            heights = outward @ part.points.T
+            index = np.arange(len(piece))
+            mine = choice[k, start : start + chunk]
+            here = heights[index, mine]
+            heights[index, mine] = -np.inf
+            others = heights.max(axis=1)
+            keep &= here > others + 1e-9 * size
+        chosen.append(piece[keep])
+    return np.vstack(chosen)
+
+
+def _hull_facets(points: Array) -> tuple[Array, Array]:
+    """Return unit normals and offsets of the hull of points (n, r)."""
+    if points.shape[1] == 1:
+        return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
+    equations = ConvexHull(points).equations
+    _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
+    equations = equations[np.sort(first)]
+    return equations[:, :-1], -equations[:, -1]

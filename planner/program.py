@@ -1,0 +1,357 @@
+"""The conic programs of a stance, in CVXPY: their definition, readable as the mathematics.
+
+Hand h has loads y_h with ``L_h y_h + l0_h ≤ u s_h`` (limits), ``H_h y_h ≤ h_h`` (hard rows) and the
+wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give the body wrench W:
+
+    Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W.                                              (balance)
+
+Four programs share these rows:
+
+=============  =============================================================================
+`Margin`       min u                              least utilisation; its duals are the prices
+`Effort`       min Σ (tension / maximum)²         the tie-break, at the least utilisation
+`LoadFactor`   max s with s W in place of W       at utilisation 1
+`Nearest`      min ‖S (W − Σ …)‖                  hard rows alone: is there any balance at all?
+=============  =============================================================================
+
+Everything is nondimensional: loads over `LOAD_UNIT`, body wrenches over `WRENCH_UNIT`, limit rows
+over their capacities. Data enter as whole-block parameters (disciplined parametrised programming),
+so a program depends on the shape of a stance only, is built once and solved with new data after.
+"""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+import cvxpy as cp
+import numpy as np
+
+from hand_models.frames import Array
+from hand_models.wrench_space import WrenchSpace
+
+__all__ = [
+    "LOAD_UNIT",
+    "SOLVER",
+    "WRENCH_UNIT",
+    "Effort",
+    "HandData",
+    "LoadFactor",
+    "Margin",
+    "Nearest",
+    "Outcome",
+    "Shape",
+    "StanceData",
+]
+
+SOLVER: Final = "CLARABEL"
+
+LOAD_UNIT: Final = 100.0
+"""Scale of a hand's loads y [N]."""
+
+WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
+"""Scale of a body wrench [N, N·m]."""
+
+SECONDARY: Final = 1e-4
+"""Weight in the tie-break of loads that are not tensions: enough to make them unique."""
+
+SETTINGS: Final[dict[str, Any]] = {
+    "equilibrate_enable": False,
+    "presolve_enable": False,
+    "chordal_decomposition_enable": False,
+    "max_threads": 1,
+    "tol_gap_abs": 1e-9,
+    "tol_gap_rel": 1e-9,
+    "tol_feas": 1e-9,
+}
+"""One physical scaling instead of equilibration; see the solver's documentation for the rest."""
+
+CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
+"""The solver's own defaults, for a second try."""
+
+SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+
+
+class HandData(NamedTuple):
+    """One hand's rows, nondimensional.
+
+    Attributes
+    ----------
+    G, g : ndarray, shapes (6, m), (6,)
+        Its part of the body wrench, G z + g.
+    L, l0 : ndarray, shapes (nl, m), (nl,)
+        Utilisations L z + l0.
+    H, h : ndarray, shapes (nh, m), (nh,)
+        Hard rows H z ≤ h.
+    effort : ndarray, shape (m,)
+        Weights of z in the tie-break.
+    """
+
+    G: Array
+    g: Array
+    L: Array
+    l0: Array
+    H: Array
+    h: Array
+    effort: Array
+
+    @classmethod
+    def of(cls, space: WrenchSpace, transport: Array, reach: Array) -> HandData:
+        """Scale a hand's set.
+
+        Parameters
+        ----------
+        space : WrenchSpace
+        transport : ndarray, shape (6, 6)
+            Ad(B←H).
+        reach : ndarray, shape (m,)
+            The maximum of each column's load [N], for the tie-break; tensions come first.
+        """
+        carried = -transport / WRENCH_UNIT[:, None]
+        weights = np.array(
+            [1.0 if name.endswith("/tension") else SECONDARY**0.5 for name in space.columns]
+        )
+        return cls(
+            G=carried @ space.generators * LOAD_UNIT,
+            g=carried @ space.origin,
+            L=space.L / space.s[:, None] * LOAD_UNIT,
+            l0=space.l0 / space.s,
+            H=space.H,
+            h=space.h / LOAD_UNIT,
+            effort=weights * LOAD_UNIT / reach,
+        )
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(m, nl, nh)."""
+        return self.G.shape[1], len(self.l0), len(self.h)
+
+
+@dataclass(frozen=True, eq=False)
+class StanceData:
+    """All hands of a stance, and the scaled body wrench (6,) they are to balance."""
+
+    hands: tuple[HandData, ...]
+    wrench: Array
+
+    @property
+    def shape(self) -> Shape:
+        """What a program is built for."""
+        return tuple(hand.shape for hand in self.hands)
+
+
+Shape = tuple[tuple[int, int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a program ended.
+
+    Attributes
+    ----------
+    solved : bool
+        Whether the solver says so; the plan is checked apart from it.
+    status : str
+        CVXPY's word.
+    iterations : int
+    value : float
+        Objective, NaN if not solved.
+    loads : tuple of ndarray
+        y of each hand [N]; empty if not solved.
+    limit_duals, hard_duals : tuple of ndarray
+        Multipliers of each hand's rows; empty if not solved.
+    balance_dual : ndarray or None
+        Multipliers of the balance, shape (6,).
+    """
+
+    solved: bool
+    status: str
+    iterations: int
+    value: float
+    loads: tuple[Array, ...] = ()
+    limit_duals: tuple[Array, ...] = ()
+    hard_duals: tuple[Array, ...] = ()
+    balance_dual: Array | None = None
+
+
+class _Program(ABC):
+    """A program for one shape of stance. Safe to call from several threads, one at a time."""
+
+    def __init__(self, shape: Shape) -> None:
+        self._lock = threading.Lock()
+        self.z = [cp.Variable(m) for m, _, _ in shape]
+        self.G = [cp.Parameter((6, m)) for m, _, _ in shape]
+        self.L = [cp.Parameter((nl, m)) for m, nl, _ in shape]
+        self.l0 = [cp.Parameter(nl) for _, nl, _ in shape]
+        self.H = [cp.Parameter((nh, m)) for m, _, nh in shape]
+        self.h = [cp.Parameter(nh) for _, _, nh in shape]
+        self.offset = cp.Parameter(6)
+        """W − Σ g, or −Σ g where W is scaled apart."""
+        self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
+        self.hard = [H @ z <= h for H, z, h in zip(self.H, self.z, self.h, strict=True)]
+        self.limits: list[cp.Constraint] = []
+        self.balance: cp.Constraint
+        self.problem = self.define()
+
+    @abstractmethod
+    def define(self) -> cp.Problem:
+        """Return the problem, with `limits` and `balance` set."""
+
+    def utilisations(self) -> list[cp.Expression]:
+        """Return each hand's limit rows as load over capacity."""
+        return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
+
+    def _load(self, data: StanceData) -> None:
+        for i, hand in enumerate(data.hands):
+            self.G[i].value = hand.G
+            self.L[i].value, self.l0[i].value = hand.L, hand.l0
+            self.H[i].value, self.h[i].value = hand.H, hand.h
+        self.offset.value = data.wrench - sum(hand.g for hand in data.hands)
+
+    def _run(self) -> Outcome:
+        """Solve; where the tuned settings fail, once more with the solver's own."""
+        outcome = Outcome(False, "error", 0, float("nan"))
+        for settings in (SETTINGS, CAREFUL):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                try:
+                    self.problem.solve(solver=SOLVER, enforce_dpp=True, **settings)
+                except cp.SolverError as error:
+                    outcome = Outcome(False, str(error), 0, float("nan"))
+                    continue
+            stats = self.problem.solver_stats
+            iterations = int(stats.num_iters or 0) if stats else 0
+            outcome = Outcome(False, self.problem.status, iterations, float("nan"))
+            if self.problem.status in SOLVED:
+                return Outcome(
+                    solved=True,
+                    status=self.problem.status,
+                    iterations=iterations,
+                    value=float(self.problem.value),
+                    loads=tuple(z.value * LOAD_UNIT for z in self.z),
+                    limit_duals=tuple(np.asarray(row.dual_value) for row in self.limits),
+                    hard_duals=tuple(np.asarray(row.dual_value) for row in self.hard),
+                    balance_dual=np.asarray(self.balance.dual_value),
+                )
+            if self.problem.status in (cp.INFEASIBLE, cp.UNBOUNDED):
+                break
+        return outcome
+
+
+class Margin(_Program):
+    """min u: the least utilisation."""
+
+    def define(self) -> cp.Problem:
+        self.u = cp.Variable()
+        self.limits = [row <= self.u for row in self.utilisations()]
+        self.balance = self.reaction == self.offset
+        return cp.Problem(cp.Minimize(self.u), [self.balance, *self.limits, *self.hard])
+
+    def solve(self, data: StanceData) -> Outcome:
+        """Return the plan of least utilisation; ``value`` is that utilisation."""
+        with self._lock:
+            self._load(data)
+            return self._run()
+
+
+class Effort(_Program):
+    """min Σ (tension / maximum)² under a cap on the utilisation."""
+
+    def define(self) -> cp.Problem:
+        self.cap = cp.Parameter()
+        self.effort = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.limits = [row <= self.cap for row in self.utilisations()]
+        self.balance = self.reaction == self.offset
+        effort = sum(
+            cp.sum_squares(cp.multiply(weight, z))
+            for weight, z in zip(self.effort, self.z, strict=True)
+        )
+        return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
+
+    def solve(self, data: StanceData, cap: float) -> Outcome:
+        """Return the plan of least effort among those with utilisation at most ``cap``."""
+        with self._lock:
+            self._load(data)
+            self.cap.value = cap
+            # weights relative to the largest: the minimiser does not change
+            largest = max(float(hand.effort.max(initial=0.0)) for hand in data.hands)
+            for parameter, hand in zip(self.effort, data.hands, strict=True):
+                parameter.value = hand.effort / largest
+            return self._run()
+
+
+class LoadFactor(_Program):
+    """max s: how many times the body wrench could be held at utilisation 1."""
+
+    def define(self) -> cp.Problem:
+        self.factor = cp.Variable(nonneg=True)
+        self.wrench = cp.Parameter(6)
+        self.limits = [row <= 1.0 for row in self.utilisations()]
+        self.balance = self.reaction == self.offset + self.wrench * self.factor
+        return cp.Problem(cp.Maximize(self.factor), [self.balance, *self.limits, *self.hard])
+
+    def solve(self, data: StanceData) -> Outcome:
+        """Return the largest load factor as ``value``."""
+        with self._lock:
+            self._load(StanceData(data.hands, np.zeros(6)))
+            self.wrench.value = data.wrench
+            return self._run()
+
+
+class Nearest(_Program):
+    """min ‖W − w‖ over all body wrenches w that any plan gives, at whatever utilisation."""
+
+    def define(self) -> cp.Problem:
+        self.shortfall = cp.Variable(6)
+        self.balance = self.reaction + self.shortfall == self.offset
+        return cp.Problem(cp.Minimize(cp.norm(self.shortfall)), [self.balance, *self.hard])
+
+    def solve(self, data: StanceData) -> Outcome:
+        """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""
+        with self._lock:
+            self._load(data)
+            return self._run()
+
+
+@lru_cache(maxsize=64)
+def _built(kind: type[_Program], shape: Shape) -> _Program:
+    return kind(shape)
+
+
+def margin(data: StanceData) -> Outcome:
+    """Solve `Margin`, built once for each shape."""
+    program = _built(Margin, data.shape)
+    assert isinstance(program, Margin)
+    return program.solve(data)
+
+
+def effort(data: StanceData, cap: float) -> Outcome:
+    """Solve `Effort`, built once for each shape."""
+    program = _built(Effort, data.shape)
+    assert isinstance(program, Effort)
+    return program.solve(data, cap)
+
+
+def load_factor(data: StanceData) -> Outcome:
+    """Solve `LoadFactor`, built once for each shape."""
+    program = _built(LoadFactor, data.shape)
+    assert isinstance(program, LoadFactor)
+    return program.solve(data)
+
+
+def nearest(data: StanceData) -> Outcome:
+    """Solve `Nearest`, built once for each shape."""
+    program = _built(Nearest, data.shape)
+    assert isinstance(program, Nearest)
+    return program.solve(data)
+
+
+def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the scaled body wrench of the hands' loads y [N], shape (6,)."""
+    parts = [hand.G @ (y / LOAD_UNIT) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
+    return np.asarray(sum(parts, start=np.zeros(6)))

@@ -1,0 +1,457 @@
+"""From a question to a verified plan: settle the hands, solve, read, check, explain."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.errors import InvalidInputError
+from hand_models.fixed_wrist import wrench_space
+from hand_models.frames import Array, wrench_transport
+from hand_models.hand import FINGERS, SettledHand
+from hand_models.wrench_space import Row, WrenchSpace
+from planner import program
+from planner.plan import (
+    Certificate,
+    FingerPlan,
+    HandPlan,
+    LimitName,
+    PalmPlan,
+    Plan,
+    Price,
+    SolverInfo,
+    Status,
+    TileLoad,
+    Times,
+)
+from planner.program import LOAD_UNIT, SOLVER, WRENCH_UNIT, HandData, Outcome, StanceData
+from planner.stance import HandOnHold, Question, Stance
+from planner.verify import problems
+
+__all__ = ["hand_space", "plan"]
+
+SLACK: Final = 1e-6
+"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+
+BALANCED: Final = 1e-7
+"""Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
+
+BINDING: Final = 1e-6
+"""Multipliers below this do not count as binding."""
+
+BLOCKING: Final = 1e-3
+"""Multipliers of hard rows below this do not count as blocking a direction of unit length."""
+
+UNLIMITED: Final = 1e4
+"""Box, in `LOAD_UNIT`, over which a certificate must hold: far beyond any strength."""
+
+
+def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
+    """Close one hand of a stance on its hold."""
+    return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+
+
+def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
+    """Return one hand of a stance on its hold, and what it can carry.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance has no such hand, or the hold cannot be where it is.
+    """
+    for i, hand in enumerate(stance.hands):
+        if hand.limb == limb:
+            try:
+                settled = settle(hand, stance)
+            except InvalidInputError as error:
+                raise error.within(f"stance.hands[{i}]") from None
+            return settled, wrench_space(settled)
+    limbs = ", ".join(hand.limb for hand in stance.hands)
+    raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")
+
+
+def plan(question: Question) -> Plan:
+    """Answer a question: the plan with the least utilisation, verified, or why there is none.
+
+    Parameters
+    ----------
+    question : Question
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InvalidInputError
+        If the question cannot be understood; its ``field`` is relative to the question.
+    """
+    start = time.perf_counter()
+    stance = question.stance
+    try:
+        wrench = question.needed_wrench()
+    except InvalidInputError as error:
+        raise error.within("load") from None
+    settled: list[SettledHand] = []
+    for i, hand in enumerate(stance.hands):
+        try:
+            settled.append(settle(hand, stance))
+        except InvalidInputError as error:
+            raise error.within(f"stance.hands[{i}]") from None
+    spaces = [wrench_space(hand, question.limits.tendon_tension) for hand in settled]
+    body = stance.body.inverse()
+    data = StanceData(
+        tuple(
+            HandData.of(space, wrench_transport(body @ hand.pose), _reach(space))
+            for space, hand in zip(spaces, stance.hands, strict=True)
+        ),
+        wrench / WRENCH_UNIT,
+    )
+    modelled = time.perf_counter()
+    answer = _Answer(question, settled, spaces, data, wrench)
+    answer.solve()
+    solved = time.perf_counter()
+    return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
+
+
+def _reach(space: WrenchSpace) -> Array:
+    """Return what each column's load is measured by in the tie-break [N].
+
+    Its own capacity where it has one (tendons, the palm); `LOAD_UNIT` for lateral reactions.
+    """
+    reach = np.full(len(space.columns), LOAD_UNIT)
+    for coefficients, row, capacity in zip(space.L, space.rows, space.s, strict=False):
+        if row.phalanx is None:
+            reach[np.flatnonzero(coefficients)[0]] = capacity
+    return reach
+
+
+class _Answer:
+    """One question on its way from data to plan."""
+
+    def __init__(
+        self,
+        question: Question,
+        settled: Sequence[SettledHand],
+        spaces: Sequence[WrenchSpace],
+        data: StanceData,
+        wrench: Array,
+    ) -> None:
+        self.question = question
+        self.settled = settled
+        self.spaces = spaces
+        self.data = data
+        self.wrench = wrench
+        self.outcome: Outcome
+        self.loads: tuple[Array, ...] = ()
+        self.certificate: Certificate | None = None
+        self.load_factor: float | None = None
+        self.unbounded = False
+
+    # Solving ------------------------------------------------------------------------------------
+
+    def solve(self) -> None:
+        """Find the loads, or the certificate that there are none."""
+        self.outcome = program.margin(self.data)
+        if not self.outcome.solved:
+            self._look_again()
+        if self.outcome.solved:
+            cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
+            tidy = program.effort(self.data, cap)
+            self.loads = tidy.loads if tidy.solved else self.outcome.loads
+            if self._problems(self.loads):
+                self.loads = self.outcome.loads
+        if "load_factor" in self.question.want:
+            self._find_load_factor()
+
+    def _look_again(self) -> None:
+        """Tell no balance at all from a solver that failed."""
+        nearest = program.nearest(self.data)
+        if not nearest.solved:
+            return
+        if nearest.value > BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench))):
+            self.certificate = self._certify(nearest)
+            return
+        # rounding put the wrench a hair outside: plan for the nearest that can be had
+        inside = program.body_wrench(self.data, nearest.loads)
+        self.outcome = program.margin(StanceData(self.data.hands, inside))
+
+    def _certify(self, nearest: Outcome) -> Certificate | None:
+        """Return a checked proof that no loads at any utilisation give the body wrench.
+
+        With the direction d and multipliers λ ≥ 0 of the hard rows, every z with H z ≤ h has
+
+            d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h
+
+        over the box |z| ≤ X. The bound must be below d · W.
+        """
+        reached = program.body_wrench(self.data, nearest.loads)
+        missing = self.data.wrench - reached
+        direction = missing / np.linalg.norm(missing)
+        supremum = 0.0
+        blocking: list[tuple[float, LimitName]] = []
+        for place, space, hand, duals in zip(
+            self.question.stance.hands,
+            self.spaces,
+            self.data.hands,
+            nearest.hard_duals,
+            strict=True,
+        ):
+            multipliers = np.maximum(duals, 0.0)
+            slope = hand.G.T @ direction
+            leak = np.abs(slope - hand.H.T @ multipliers).sum() * UNLIMITED
+            supremum += float(direction @ hand.g + multipliers @ hand.h + leak)
+            hard_rows = space.rows[len(space.s) :]
+            blocking += [
+                (float(value), _name(place.limb, row))
+                for row, value in zip(hard_rows, multipliers, strict=True)
+                if value > BLOCKING
+            ]
+        needed = float(direction @ self.data.wrench)
+        if not supremum < needed:
+            return None
+        return Certificate(
+            direction=direction,
+            scale=1.0 / WRENCH_UNIT,
+            supremum=supremum,
+            needed=needed,
+            shortfall=missing * WRENCH_UNIT,
+            nearest=reached * WRENCH_UNIT,
+            blocking=tuple(name for _, name in sorted(blocking, key=lambda pair: -pair[0])),
+        )
+
+    def _find_load_factor(self) -> None:
+        if not np.abs(self.data.wrench).max() > 1e-9:
+            # nothing is asked of the hands: any multiple of it can be held, or none
+            self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
+            return
+        result = program.load_factor(self.data)
+        if result.solved:
+            scaled = StanceData(self.data.hands, self.data.wrench * result.value)
+            error = program.body_wrench(scaled, result.loads) - scaled.wrench
+            used = max(
+                float(np.max(hand.L @ (y / LOAD_UNIT) + hand.l0, initial=0.0))
+                for hand, y in zip(self.data.hands, result.loads, strict=True)
+            )
+            if np.abs(error).max() <= SLACK and used <= 1.0 + SLACK:
+                self.load_factor = max(result.value, 0.0)
+
+    # Reading ------------------------------------------------------------------------------------
+
+    def _hands(self, loads: Sequence[Array]) -> tuple[HandPlan, ...]:
+        return tuple(
+            _read_hand(place.limb, settled, space, y)
+            for place, settled, space, y in zip(
+                self.question.stance.hands, self.settled, self.spaces, loads, strict=True
+            )
+        )
+
+    def _problems(self, loads: Sequence[Array]) -> list[str]:
+        hands = self._hands(loads)
+        used = max(hand.utilisation for hand in hands)
+        return problems(self.question, self.settled, hands, used, self.wrench)
+
+    def read(self, times: Times, start: float) -> Plan:
+        """Return the plan, verified."""
+        hands: tuple[HandPlan, ...] | None = None
+        utilisation: float | None = None
+        limiting: LimitName | None = None
+        residual: Array | None = None
+        verified = False
+        status: Status = "failed"
+        if self.outcome.solved:
+            hands = self._hands(self.loads)
+            utilisation = max(hand.utilisation for hand in hands)
+            wrong = problems(self.question, self.settled, hands, utilisation, self.wrench)
+            if wrong:
+                reason = f"the solver's plan does not pass the checks: {wrong[0]}"
+                hands = utilisation = None
+            else:
+                verified = True
+                cap = self.question.limits.utilisation
+                status = "optimal" if utilisation <= cap + SLACK else "overloaded"
+                residual = self._residual(hands)
+                limiting, reason = self._explain(utilisation, status)
+        elif self.certificate is not None:
+            status = "infeasible"
+            verified = True
+            reason = _explain_shortfall(self.certificate)
+        else:
+            reason = f"the solver gave no usable answer ({self.outcome.status})"
+        prices = None
+        if "prices" in self.question.want and verified and self.outcome.solved:
+            prices = self._prices()
+        return Plan(
+            status=status,
+            body_wrench=self.wrench,
+            utilisation=utilisation,
+            load_factor=self.load_factor,
+            load_factor_unbounded=self.unbounded,
+            limiting=limiting,
+            hands=hands,
+            prices=prices,
+            certificate=self.certificate,
+            residual=residual,
+            verified=verified,
+            reason=reason,
+            solver=SolverInfo(SOLVER, self.outcome.status, self.outcome.iterations),
+            time=Times(times.model, times.solve, time.perf_counter() - start),
+        )
+
+    def _residual(self, hands: Sequence[HandPlan]) -> Array:
+        body = self.question.stance.body.inverse()
+        total = -self.wrench
+        for place, hand in zip(self.question.stance.hands, hands, strict=True):
+            total = total - wrench_transport(body @ place.pose) @ hand.wrench
+        return np.asarray(total)
+
+    def _explain(self, utilisation: float, status: Status) -> tuple[LimitName | None, str]:
+        """Return the limit with the largest utilisation, and a sentence about it."""
+        best: tuple[float, LimitName, float, float] | None = None
+        for place, space, y in zip(
+            self.question.stance.hands, self.spaces, self.loads, strict=True
+        ):
+            used = space.utilisations(y)
+            if len(used) and (best is None or used.max() > best[0]):
+                row = int(used.argmax())
+                load = float(space.L[row] @ y + space.l0[row])
+                name = _name(place.limb, space.rows[row])
+                best = (float(used[row]), name, load, float(space.s[row]))
+        if best is None:
+            return None, "nothing limits this stance"
+        _, name, load, capacity = best
+        verb = "carries" if utilisation <= 1.0 + SLACK else "would carry"
+        sentence = f"{_spoken(name)} {verb} {load:.0f} N of {capacity:.0f} N{_manner(name)}"
+        if status == "overloaded" and utilisation <= 1.0 + SLACK:
+            cap = self.question.limits.utilisation
+            sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
+        return name, sentence
+
+    def _prices(self) -> tuple[Price, ...]:
+        prices = []
+        for place, space, duals in zip(
+            self.question.stance.hands, self.spaces, self.outcome.limit_duals, strict=True
+        ):
+            for row, multiplier, capacity in zip(space.rows, duals, space.s, strict=False):
+                if multiplier > BINDING:
+                    price = float(multiplier * self.outcome.value / capacity)
+                    prices.append(Price(_name(place.limb, row), price))
+        return tuple(sorted(prices, key=lambda p: -p.price))
+
+
+def _read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:
+    """Turn one hand's loads y into tile loads and forces."""
+    column = {name: i for i, name in enumerate(space.columns)}
+
+    def load(name: str) -> float:
+        return float(y[column[name]]) if name in column else 0.0
+
+    tensions = np.array([max(load(f"{finger}/tension"), 0.0) for finger in FINGERS])
+    laterals = np.array([load(f"{finger}/lateral") for finger in FINGERS])
+    loads = settled.tile_loads(tensions, laterals)
+    forces = np.einsum("tk,tkx->tx", loads, settled.axes)
+    pieces = settled.surface.pieces()
+    planes = np.array([(p.a_shear, p.a_normal, p.a_lateral) for p in pieces])
+    capacities = np.array([p.capacity for p in pieces])
+    magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
+    used = np.where(settled.touching, (magnitudes @ planes.T / capacities).max(axis=1), 0.0)
+    used = np.maximum(used, 0.0)
+    fingers = []
+    for i, finger in enumerate(FINGERS):
+        tiles = tuple(
+            TileLoad(
+                phalanx=settled.tiles[t].phalanx,
+                contact=settled.tiles[t].contact,
+                position=settled.positions[t],
+                force=forces[t],
+                shear=float(loads[t, 0]),
+                normal=float(loads[t, 1]),
+                lateral=float(loads[t, 2]),
+                shear_axis=settled.axes[t, 0],
+                normal_axis=settled.axes[t, 1],
+                lateral_axis=settled.axes[t, 2],
+                utilisation=float(used[t]),
+                load_at_zero=settled.loads[t, :, 0],
+                load_per_newton=settled.loads[t, :, 1],
+                half_planes=pieces,
+            )
+            for t in np.flatnonzero(settled.finger_of == i)
+        )
+        fingers.append(FingerPlan(finger, float(tensions[i]), tiles))
+    shear = max(load("palm_shear"), 0.0)
+    pressing = max(load("palm_pressing"), 0.0)
+    palm = PalmPlan(
+        position=settled.palm.centre,
+        force=np.array([-shear, 0.0, pressing]),
+        moment=np.zeros(3),
+        engaged=settled.palm.engaged,
+        utilisation=(
+            max(shear / settled.palm.shear_limit, pressing / settled.palm.pressing_limit)
+            if settled.palm.engaged
+            else 0.0
+        ),
+    )
+    wrench = np.concatenate([palm.force, np.cross(palm.position, palm.force)])
+    wrench = wrench + np.concatenate(
+        [forces.sum(axis=0), np.cross(settled.positions, forces).sum(axis=0)]
+    )
+    maximum = min(
+        (
+            float(capacity)
+            for row, capacity in zip(space.rows, space.s, strict=False)
+            if row.limit == "tendon_tension"
+        ),
+    )
+    utilisation = max(float(used.max()), float(tensions.max()) / maximum, palm.utilisation)
+    return HandPlan(
+        limb=limb,
+        wrench=wrench,
+        fingers=tuple(fingers),
+        palm=palm,
+        utilisation=utilisation,
+        seating=settled.seating,
+        space=space,
+    )
+
+
+def _name(limb: str, row: Row) -> LimitName:
+    return LimitName(limb, row.finger, row.phalanx, row.limit)
+
+
+def _spoken(name: LimitName) -> str:
+    """Say whose limit it is: ``front_left: proximal tile of inner_right``."""
+    if name.phalanx is not None:
+        return f"{name.limb}: {name.phalanx} tile of {name.finger}"
+    if name.finger is not None:
+        return f"{name.limb}: tendon of {name.finger}"
+    return f"{name.limb}: palm"
+
+
+MANNERS: Final = {
+    "shear": " in shear",
+    "pull_off": " toward pull-off",
+    "palm_shear": " in shear",
+    "palm_pressing": " in pressing",
+}
+
+
+def _manner(name: LimitName) -> str:
+    return MANNERS.get(name.limit, "")
+
+
+def _explain_shortfall(certificate: Certificate) -> str:
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    units = ("N",) * 3 + ("N·m",) * 3
+    worst = int(np.argmax(np.abs(certificate.direction)))
+    missing = float(certificate.shortfall[worst])
+    sentence = (
+        f"no plan balances the body at any utilisation: {missing:+.3g} {units[worst]} of "
+        f"{axes[worst]} (in B) is missing"
+    )
+    if certificate.blocking:
+        first = certificate.blocking[0]
+        sentence += f"; {first.limit.replace('_', ' ')} of {_spoken(first)} is in the way"
+    return sentence

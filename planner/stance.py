@@ -1,0 +1,183 @@
+"""Where the hands are, what the body needs, and what is asked about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+
+from hand_models.errors import InvalidInputError
+from hand_models.frames import Array, Pose
+from hand_models.hand import Grasp
+from hand_models.holds import Hold
+from hand_models.spines import Surface
+from planner.robosimian import Robot, robosimian
+
+__all__ = ["EARTH", "HandOnHold", "Limits", "Load", "Question", "Stance"]
+
+EARTH: Final = (0.0, 0.0, -9.81)
+"""Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandOnHold:
+    """One hand of a stance.
+
+    Attributes
+    ----------
+    limb : str
+        One of the robot's limbs.
+    pose : Pose
+        H in W.
+    hold : Hold
+    surface : Surface
+    hold_pose : Pose, optional
+        The hold's frame in W.
+    hold_in_hand : Pose, optional
+        The hold's frame in H. With neither, the hand is seated on the hold.
+    grasp : Grasp
+    """
+
+    limb: str
+    pose: Pose
+    hold: Hold
+    surface: Surface
+    hold_pose: Pose | None = None
+    hold_in_hand: Pose | None = None
+    grasp: Grasp = field(default_factory=Grasp)
+
+    def __post_init__(self) -> None:
+        if self.hold_pose is not None and self.hold_in_hand is not None:
+            raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
+
+    def placed_hold(self) -> Pose | None:
+        """Return the hold's frame in H, or None if the hand is to be seated."""
+        if self.hold_pose is not None:
+            return self.pose.inverse() @ self.hold_pose
+        return self.hold_in_hand
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """Hands on holds around a body.
+
+    Attributes
+    ----------
+    hands : tuple of HandOnHold
+        Between one and the number of the robot's limbs, each limb once.
+    body : Pose
+        B in W.
+    gravity : ndarray, shape (3,)
+        In W [m/s²].
+    robot : Robot
+    """
+
+    hands: tuple[HandOnHold, ...]
+    body: Pose
+    gravity: Array = field(default_factory=lambda: np.array(EARTH))
+    robot: Robot = field(default_factory=robosimian)
+
+    def __post_init__(self) -> None:
+        if not self.hands:
+            raise InvalidInputError("at least one hand is needed", field="hands")
+        seen: set[str] = set()
+        for i, hand in enumerate(self.hands):
+            if hand.limb not in self.robot.limbs:
+                raise InvalidInputError(
+                    f"unknown limb {hand.limb!r}; known are {', '.join(self.robot.limbs)}",
+                    field=f"hands[{i}].limb",
+                )
+            if hand.limb in seen:
+                raise InvalidInputError(
+                    f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
+                )
+            seen.add(hand.limb)
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the body weighs and how it is to move.
+
+    Attributes
+    ----------
+    mass : float, optional
+        [kg]; the robot's own with its hands.
+    com : tuple of float, optional
+        Centre of mass in B [m]; the robot's own.
+    acceleration : tuple of float
+        Of the body in W [m/s²].
+    """
+
+    mass: float | None = None
+    com: tuple[float, float, float] | None = None
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def body_wrench(self, stance: Stance) -> Array:
+        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
+
+        ``f = m (a − g)`` at the centre of mass; the body does not turn.
+        """
+        mass = stance.robot.mass if self.mass is None else self.mass
+        if not (math.isfinite(mass) and mass > 0.0):
+            raise InvalidInputError(f"must be above 0 kg, got {mass:g}", field="mass")
+        com = np.asarray(stance.robot.com if self.com is None else self.com, dtype=float)
+        force = mass * stance.body.rotation.T @ (np.asarray(self.acceleration) - stance.gravity)
+        return np.concatenate([force, np.cross(com, force)])
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Caps that a caller puts on a plan.
+
+    Attributes
+    ----------
+    utilisation : float
+        Largest utilisation that still counts as ``optimal``, in (0, 1].
+    tendon_tension : float, optional
+        Of every tendon [N]; the hand's own maximum if that is less.
+    """
+
+    utilisation: float = 1.0
+    tendon_tension: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.utilisation <= 1.0:
+            raise InvalidInputError(
+                f"must be in (0, 1], got {self.utilisation:g}", field="utilisation"
+            )
+        tension = self.tendon_tension
+        if tension is not None and not (math.isfinite(tension) and tension > 0.0):
+            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tendon_tension")
+
+
+Want = Literal["load_factor", "prices", "model"]
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A stance, and what is asked of it.
+
+    Attributes
+    ----------
+    stance : Stance
+    body_wrench : ndarray, shape (6,), optional
+        In B [N, N·m]; computed from ``load`` if it is not given.
+    load : Load
+    limits : Limits
+    want : frozenset of {'load_factor', 'prices', 'model'}
+        Extras.
+    """
+
+    stance: Stance
+    body_wrench: Array | None = None
+    load: Load = field(default_factory=Load)
+    limits: Limits = field(default_factory=Limits)
+    want: frozenset[Want] = frozenset()
+
+    def needed_wrench(self) -> Array:
+        """Return the body wrench that is planned for, shape (6,) [N, N·m]."""
+        if self.body_wrench is not None:
+            return self.body_wrench
+        return self.load.body_wrench(self.stance)

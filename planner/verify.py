@@ -1,0 +1,226 @@
+"""The check that every plan passes before it leaves: from its numbers back to the rock.
+
+Nothing here is shared with the way the plan was found. Tile loads are recomputed from the tensions
+by solving the full equilibrium of Eq. 6 (joint rows and tile rows, forces in the finger's frame),
+not by the affine maps of Eq. 14; wrenches are summed force by force; limits are Eq. 21 itself and
+the plan's half-planes; balance is added up in the body frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.finger import SettledFinger
+from hand_models.frames import Array
+from hand_models.hand import SettledHand
+from planner.plan import HandPlan, TileLoad
+from planner.stance import Question
+
+__all__ = ["BALANCE", "LOAD", "UTILISATION", "equilibrium", "problems"]
+
+BALANCE: Final = 1e-6
+"""Largest error of the balance, relative to the body wrench (moments over a metre)."""
+
+LOAD: Final = 1e-6
+"""Largest disagreement of a tile's load, relative to the largest load of its hand."""
+
+STOP: Final = 1e-6
+"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
+
+UTILISATION: Final = 1e-6
+"""How far a utilisation may be from what the plan says."""
+
+
+def equilibrium(
+    finger: SettledFinger, tension: float, closing_tension: float, base_tile: bool
+) -> tuple[Array, Array, Array]:
+    """Solve A f_c = b (Eqs. 6–8) for the contact forces of one finger at one tension.
+
+    Parameters
+    ----------
+    finger : SettledFinger
+    tension, closing_tension : float
+        [N]
+    base_tile : bool
+        Whether a base tile comes before the phalanges on the tendon.
+
+    Returns
+    -------
+    shear, normal : ndarray, shape (3,)
+        Tile loads on the rock, in each phalanx's frame [N].
+    stop : ndarray, shape (3,)
+        Torque that holds each joint at its upper limit where its phalanx touches nothing, zero
+        elsewhere [N·m].
+    """
+    model = finger.model
+    count = len(finger.contacts)
+    angles = np.cumsum(finger.joint_angles)
+    joints = [np.zeros(2)]
+    for angle in angles:
+        step = model.joint_spacing * np.array([math.cos(angle), math.sin(angle)])
+        joints.append(joints[-1] + step)
+    A = np.zeros((2 * count, 2 * count))
+    b = np.zeros(2 * count)
+    touching = [contact.kind != "none" for contact in finger.contacts]
+    along = np.column_stack([np.cos(angles), np.sin(angles)])
+    into = np.column_stack([-along[:, 1], along[:, 0]])
+    loss = 1.0 - model.friction
+    local, closing = (v * loss if base_tile else v for v in (tension, closing_tension))
+    for i in range(count):
+        # joint row: a force (fx, fz) of the rock on tile j turns joint i from x toward z (J^T f_c)
+        for j in range(i, count):
+            if touching[j]:
+                contact = joints[j] + finger.contacts[j].along * along[j]
+                arm = contact + model.tile_height * into[j] - joints[i]
+                A[2 * i, 2 * j : 2 * j + 2] = (-arm[1], arm[0])
+        b[2 * i] = (
+            model.joint_stiffness[i] * finger.joint_angles[i]
+            + model.joint_preload[i]
+            - local * model.pulley_radii[i]
+        )
+        # tile row: the rock's force on the tile along +x of its phalanx is the shear
+        if touching[i]:
+            A[2 * i + 1, 2 * i : 2 * i + 2] = along[i]
+            b[2 * i + 1] = model.engagement[i] * closing + model.shear_gain * (local - closing)
+        local, closing = local * loss, closing * loss
+    kept = np.repeat(touching, 2)
+    forces = np.zeros(2 * count)
+    if kept.any():
+        forces[kept] = np.linalg.solve(A[np.ix_(kept, kept)], b[kept])
+    stop = np.where(touching, 0.0, (A @ forces - b)[::2])
+    pairs = forces.reshape(count, 2)
+    return (pairs * along).sum(axis=1), -(pairs * into).sum(axis=1), stop
+
+
+def problems(
+    question: Question,
+    settled: Sequence[SettledHand],
+    hands: Sequence[HandPlan],
+    utilisation: float,
+    body_wrench: Array,
+) -> list[str]:
+    """Return what is wrong with a plan, each in a sentence; nothing if it may leave.
+
+    Parameters
+    ----------
+    question : Question
+    settled : sequence of SettledHand
+        The hands on their holds.
+    hands : sequence of HandPlan
+        The plan's numbers.
+    utilisation : float
+        The plan's.
+    body_wrench : ndarray, shape (6,)
+        The one planned for, in B.
+    """
+    found: list[str] = []
+    total = np.zeros(6)
+    worst = 0.0
+    into_body = question.stance.body.rotation.T
+    for place, hand, plan in zip(question.stance.hands, settled, hands, strict=True):
+        worst = max(worst, _check_hand(found, question, hand, plan))
+        # carried to B by hand: the rock's reaction at the hand's place
+        force = into_body @ place.pose.rotation @ -plan.wrench[:3]
+        moment = into_body @ place.pose.rotation @ -plan.wrench[3:]
+        lever = into_body @ (place.pose.position - question.stance.body.position)
+        total += np.concatenate([force, moment + np.cross(lever, force)])
+    error = float(np.linalg.norm(total - body_wrench))
+    allowed = BALANCE * max(float(np.linalg.norm(body_wrench)), 1.0)
+    if not error <= allowed:
+        found.append(f"balance is off by {error:.3g} of {np.linalg.norm(body_wrench):.3g}")
+    if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
+        found.append(f"utilisation is {worst:.8g}, not {utilisation:.8g}")
+    return found
+
+
+def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: HandPlan) -> float:
+    """Check one hand; return its utilisation as recomputed."""
+    limb = plan.limb
+    loads = [abs(v) for f in plan.fingers for t in f.tiles for v in (t.shear, t.normal)]
+    allowed = LOAD * max(1.0, *loads)
+    maximum = hand.hand.maximum_tension
+    if question.limits.tendon_tension is not None:
+        maximum = min(maximum, question.limits.tendon_tension)
+    worst = 0.0
+    wrench = np.zeros(6)
+    for finger, planned in zip(hand.fingers, plan.fingers, strict=True):
+        outer = planned.name.startswith("outer")
+        tension = planned.tendon_tension
+        if not (math.isfinite(tension) and tension >= -allowed):
+            found.append(f"{limb}: tension of {planned.name} is {tension:g} N")
+            continue
+        worst = max(worst, tension / maximum)
+        shear, normal, stop = equilibrium(finger, tension, hand.closing_tension, outer)
+        if stop.min() < -STOP:
+            found.append(f"{limb}: a joint of {planned.name} would leave its stop")
+        if outer:
+            model = hand.hand.finger
+            base = planned.tiles[0]
+            drag = model.base_engagement * hand.closing_tension
+            drag += model.shear_gain * (tension - hand.closing_tension)
+            shear = np.append(drag if base.contact != "none" else 0.0, shear)
+            normal = np.append(0.0, normal)
+        for tile, t, n in zip(planned.tiles, shear, normal, strict=True):
+            name = f"{limb}: {tile.phalanx} tile of {planned.name}"
+            off = max(abs(tile.shear - t), abs(tile.normal - n))
+            if not off <= allowed:
+                found.append(f"{name} carries {t:.6g}, {n:.6g} N, not what the plan says")
+            if t < -allowed:
+                found.append(f"{name} would be dragged backwards with {-t:.3g} N")
+            force = (
+                tile.shear * tile.shear_axis
+                + tile.normal * tile.normal_axis
+                + tile.lateral * tile.lateral_axis
+            )
+            if not np.abs(force - tile.force).max() <= allowed:
+                found.append(f"{name}: force and loads disagree")
+            if tile.contact == "none" and np.abs(tile.force).max() > 0.0:
+                found.append(f"{name} carries a load but touches nothing")
+            wrench += np.concatenate([tile.force, np.cross(tile.position, tile.force)])
+            if tile.contact != "none":
+                used = _tile_utilisation(tile, t, n)
+                worst = max(worst, used)
+                if used <= 1.0 and not _inside_curve(hand, tile, t, n, allowed):
+                    found.append(f"{name} is beyond its limit curve")
+    worst = max(worst, _check_palm(found, hand, plan, allowed))
+    force = plan.palm.force
+    wrench += np.concatenate([force, plan.palm.moment + np.cross(plan.palm.position, force)])
+    if not np.abs(wrench - plan.wrench).max() <= allowed:
+        found.append(f"{limb}: the wrench is not the sum of its tiles' and palm's forces")
+    if not abs(worst - plan.utilisation) <= UTILISATION * max(1.0, worst):
+        found.append(f"{limb}: utilisation is {worst:.8g}, not {plan.utilisation:.8g}")
+    return worst
+
+
+def _tile_utilisation(tile: TileLoad, shear: float, normal: float) -> float:
+    return max(
+        (piece.a_shear * shear + piece.a_normal * normal + piece.a_lateral * abs(tile.lateral))
+        / piece.capacity
+        for piece in tile.half_planes
+    )
+
+
+def _inside_curve(
+    hand: SettledHand, tile: TileLoad, shear: float, normal: float, allowed: float
+) -> bool:
+    """Whether a tile's load in the finger plane is inside the limit curve itself (Eq. 21)."""
+    angle = math.atan2(-normal, shear)
+    if abs(angle) > math.pi / 2:
+        return math.hypot(shear, normal) <= allowed or shear >= -allowed
+    strength = float(hand.surface.strength(angle))
+    return math.hypot(shear, normal) <= strength * (1.0 + UTILISATION) + allowed
+
+
+def _check_palm(found: list[str], hand: SettledHand, plan: HandPlan, allowed: float) -> float:
+    x, y, z = (float(v) for v in plan.palm.force)
+    if x > allowed or abs(y) > 0.0 or z < -allowed:
+        found.append(f"{plan.limb}: the palm cannot exert {plan.palm.force.tolist()} N")
+    if not plan.palm.engaged:
+        if np.abs(plan.palm.force).max() > 0.0:
+            found.append(f"{plan.limb}: the palm carries a load but touches nothing")
+        return 0.0
+    return max(-x / hand.palm.shear_limit, z / hand.palm.pressing_limit)
