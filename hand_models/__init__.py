@@ -1,4 +1,4 @@
-"""One hand on one hold: what can it carry?
+"""One hand on one hold: what it can carry.
 
 hold + hand parameters → settled finger (q, c) → tile loads as affine maps of tendon tension
   → WrenchSpace { o + V y : A y ≤ b } and its views.

@@ -8,8 +8,8 @@ n; the rock pushes back equally, so that joint i balances when (Eq. 4, written o
     Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + f M_i r_i − K_i q_i − p_i = 0,
 
 with d_ij from joint i to contact j and a × b = a_x b_z − a_z b_x. The shear follows the tendon
-alone (Eq. 5 with a tile that has caught the rock): ``T_i = M_i (τ_i f_close + g (f − f_close))``. Solving
-for N gives both loads as affine functions of the tension f (Eq. 14).
+alone (Eq. 5 with a tile that has caught the rock): ``T_i = M_i (τ_i f_close + g (f − f_close))``.
+Solving for N gives both loads as affine functions of the tension f (Eq. 14).
 """
 
 from __future__ import annotations

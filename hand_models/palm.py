@@ -96,7 +96,7 @@ def share_load(
     n = len(k)
     rho = (1.0 - friction / 2.0) / (1.0 + friction / 2.0)
     # In units of k_mean·x. The unknowns are the strands' excesses α_i = F_i − ρ F_{i−1}: they give
-    # the strands F = G α + g F_0, F_0 by the tendon's length, and from these the slips δ and travels m.
+    # the strands F = G α + g F_0, F_0 by the tendon's length, and from these slips δ and travels m.
     scale = k.mean()
     kappa, spring = k / scale, spring_stiffness / scale
     index = np.arange(n + 1)

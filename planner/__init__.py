@@ -1,4 +1,4 @@
-"""Many hands, one body: who carries what?
+"""Many hands, one body: who carries what.
 
 stance + question → WrenchSpace of every hand → conic program → solution → verified Plan.
 """

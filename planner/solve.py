@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import linprog
 
 from hand_models.errors import InvalidInputError
 from hand_models.fixed_wrist import wrench_space
@@ -44,6 +46,9 @@ BINDING: Final = 1e-6
 
 BLOCKING: Final = 1e-3
 """Multipliers of hard rows below this do not count as blocking a direction of unit length."""
+
+CLOSE: Final = 1e3
+"""How much a certificate's direction is held to that of the shortfall, against its bound."""
 
 UNLIMITED: Final = 1e4
 """Box, in `LOAD_UNIT`, over which a certificate must hold: far beyond any strength."""
@@ -188,26 +193,31 @@ class _Answer:
 
         over the box |z| ≤ X. The bound must be below d · W.
         """
+        hands = self.data.hands
         reached = program.body_wrench(self.data, nearest.loads)
         missing = self.data.wrench - reached
-        direction = missing / np.linalg.norm(missing)
+        direction, multipliers = _polish(
+            missing / np.linalg.norm(missing),
+            block_diag(*(hand.H for hand in hands)),
+            np.concatenate([hand.h for hand in hands]),
+            np.hstack([hand.G for hand in hands]),
+        )
         supremum = 0.0
         blocking: list[tuple[float, LimitName]] = []
-        for place, space, hand, duals in zip(
+        splits = np.cumsum([len(hand.h) for hand in hands])[:-1]
+        for place, space, hand, mine in zip(
             self.question.stance.hands,
             self.spaces,
-            self.data.hands,
-            nearest.hard_duals,
+            hands,
+            np.split(multipliers, splits),
             strict=True,
         ):
-            multipliers = np.maximum(duals, 0.0)
-            slope = hand.G.T @ direction
-            leak = np.abs(slope - hand.H.T @ multipliers).sum() * UNLIMITED
-            supremum += float(direction @ hand.g + multipliers @ hand.h + leak)
+            leak = np.abs(hand.G.T @ direction - hand.H.T @ mine).sum() * UNLIMITED
+            supremum += float(direction @ hand.g + mine @ hand.h + leak)
             hard_rows = space.rows[len(space.s) :]
             blocking += [
                 (float(value), _name(place.limb, row))
-                for row, value in zip(hard_rows, multipliers, strict=True)
+                for row, value in zip(hard_rows, mine, strict=True)
                 if value > BLOCKING
             ]
         needed = float(direction @ self.data.wrench)
@@ -340,6 +350,34 @@ class _Answer:
                     price = float(multiplier * self.outcome.value / capacity)
                     prices.append(Price(_name(place.limb, row), price))
         return tuple(sorted(prices, key=lambda p: -p.price))
+
+
+def _polish(direction: Array, H: Array, h: Array, G: Array) -> tuple[Array, Array]:
+    """Return the d next to ``direction``, and the λ of least λ·h, with Gᵀd = Hᵀλ, λ ≥ 0; |d| = 1.
+
+    An interior-point solution leaves an error that a box as large as `UNLIMITED` would magnify; the
+    vertex of a linear program (least `CLOSE` Σ |d − direction| + λ·h) does not.
+    """
+    rows, size = H.shape
+    # variables: d (6), t ≥ |d − direction| (6), λ (rows)
+    one = np.eye(6)
+    none = np.zeros((6, rows))
+    result = linprog(
+        np.concatenate([np.zeros(6), np.full(6, CLOSE), h]),
+        A_ub=np.vstack([np.hstack([one, -one, none]), np.hstack([-one, -one, none])]),
+        b_ub=np.concatenate([direction, -direction]),
+        A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T]),
+        b_eq=np.zeros(size),
+        bounds=[(None, None)] * 6 + [(0.0, None)] * (6 + rows),
+        method="highs-ds",
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    if result.status != 0 or result.x is None:
+        return direction, np.zeros(rows)
+    length = float(np.linalg.norm(result.x[:6]))
+    if length < BLOCKING:
+        return direction, np.zeros(rows)
+    return result.x[:6] / length, np.maximum(result.x[12:], 0.0) / length
 
 
 def _read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:
