@@ -15,7 +15,7 @@ Solving for N gives both loads as affine functions of the tension f (Eq. 14).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -227,7 +227,7 @@ class SettledFinger:
 
     @cached_property
     def directions(self) -> Array:
-        """U of each phalanx in (x, z) of F, shape (3, 2)."""
+        """Unit vectors u along the phalanges in (x, z) of F, shape (3, 2)."""
         return np.array([(math.cos(c.angle), math.sin(c.angle)) for c in self.contacts])
 
     def losses(self, base_tile: bool) -> Array:
@@ -286,6 +286,10 @@ class SettledFinger:
         """
         normal_arms, rest = self._joint_balance(shears, base_tile)
         return np.where(np.array(self.touching)[:, None], 0.0, rest - normal_arms @ normals)
+
+    def released(self) -> SettledFinger:
+        """Return the finger where it is, but touching nothing."""
+        return replace(self, contacts=tuple(replace(c, kind="none") for c in self.contacts))
 
     def _joint_balance(self, shears: Array, base_tile: bool) -> tuple[Array, Array]:
         """Return (A, b) with A N = b for the three joints; b has a column as each of `shears`."""

@@ -348,12 +348,19 @@ class SpinyHand:
         palm = self._settle_palm(hold, surface, grasp, hand_in_hold)
 
         frames = self.frames(grasp.outer_rotation)
-        fingers = tuple(self._settle_finger(frame, hold, hand_in_hold) for frame in frames)
+        closed = [
+            _close(
+                self._settle_finger(frame, hold, hand_in_hold), closing, name.startswith("outer")
+            )
+            for name, frame in zip(FINGERS, frames, strict=True)
+        ]
         tiles: list[Tile] = []
         positions, axes, loads = [], [], []
         stops: list[tuple[int, int, Array]] = []
         up = np.array([0.0, 0.0, 1.0])
-        for i, (name, frame, finger) in enumerate(zip(FINGERS, frames, fingers, strict=True)):
+        for i, (name, frame, (finger, shears, normals, torques)) in enumerate(
+            zip(FINGERS, frames, closed, strict=True)
+        ):
             outer = name.startswith("outer")
             if outer:
                 place = frame.joint + frame.along * (self.base_tile_reach - self.outer_reach)
@@ -366,8 +373,6 @@ class SpinyHand:
                 gain = self.finger.shear_gain
                 shear = ((self.finger.base_engagement - gain) * closing, gain)
                 loads.append(np.array([[shear if engaged else (0.0, 0.0), (0.0, 0.0)]]))
-            shears = finger.shears(closing, base_tile=outer)
-            normals = finger.normals(shears, base_tile=outer)
             u = finger.directions
             along = u[:, :1] * frame.along + u[:, 1:] * up
             into = -u[:, 1:] * frame.along + u[:, :1] * up
@@ -380,8 +385,7 @@ class SpinyHand:
             positions.append(frame.joint + points[:, :1] * frame.along + points[:, 1:] * up)
             axes.append(np.stack([-along, into, across], axis=1))
             loads.append(np.stack([shears, normals], axis=1))
-            if not all(finger.touching):
-                torques = finger.stop_torques(shears, normals, base_tile=outer)
+            if any(finger.touching):
                 stops.extend(
                     (i, j, torques[j]) for j in range(len(PHALANGES)) if not finger.touching[j]
                 )
@@ -391,7 +395,7 @@ class SpinyHand:
             surface=surface,
             closing_tension=closing,
             seating=seating,
-            fingers=fingers,
+            fingers=tuple(finger for finger, _, _, _ in closed),
             tiles=tuple(tiles),
             finger_of=np.array([FINGERS.index(tile.finger) for tile in tiles]),
             positions=np.concatenate(positions),
@@ -428,6 +432,30 @@ class SpinyHand:
             ),
             pressing_limit=self.palm_pressing * len(engaged),
         )
+
+
+def _close(
+    finger: SettledFinger, closing_tension: float, outer: bool
+) -> tuple[SettledFinger, Array, Array, Array]:
+    """Return a finger with its shears, normals and stop torques, affine in tension.
+
+    If no tension keeps its tiles dragged forward and its joints' stops pushing, the finger cannot
+    stay where it closed: it is released, and carries nothing.
+    """
+    shears = finger.shears(closing_tension, base_tile=outer)
+    normals = finger.normals(shears, base_tile=outer)
+    torques = finger.stop_torques(shears, normals, base_tile=outer)
+    least, most = 0.0, math.inf
+    for constant, slope in np.vstack([shears, torques]):
+        if slope > 0.0:
+            least = max(least, -constant / slope)
+        elif slope < 0.0:
+            most = min(most, -constant / slope)
+        elif constant < 0.0:
+            most = -math.inf
+    if any(finger.touching) and least > most:
+        return _close(finger.released(), closing_tension, outer)
+    return finger, shears, normals, torques
 
 
 def _frames(hand: SpinyHand, outer_rotation: float) -> tuple[_Frame, ...]:

@@ -155,7 +155,7 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             continue
         worst = max(worst, tension / maximum)
         shear, normal, stop = equilibrium(finger, tension, hand.closing_tension, outer)
-        if stop.min() < -STOP:
+        if any(finger.touching) and stop.min() < -STOP:
             found.append(f"{limb}: a joint of {planned.name} would leave its stop")
         if outer:
             model = hand.hand.finger
