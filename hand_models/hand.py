@@ -138,6 +138,7 @@ class SettledHand:
     Attributes
     ----------
     hand : SpinyHand
+    hold : Hold
     grasp : Grasp
     surface : Surface
     closing_tension : float
@@ -161,6 +162,7 @@ class SettledHand:
     """
 
     hand: SpinyHand
+    hold: Hold
     grasp: Grasp
     surface: Surface
     closing_tension: float
@@ -391,6 +393,7 @@ class SpinyHand:
                 )
         return SettledHand(
             hand=self,
+            hold=hold,
             grasp=grasp,
             surface=surface,
             closing_tension=closing,
