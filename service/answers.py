@@ -1,0 +1,248 @@
+"""From the planner's answer to a reply: plain numbers, every name spelled out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from msgspec import UNSET
+
+from hand_models.fixed_wrist import TensionLimit
+from hand_models.frames import Array
+from hand_models.hand import Seating, SettledHand
+from hand_models.spines import HalfPlane
+from hand_models.wrench_space import WrenchSpace
+from planner.plan import Certificate, HandPlan, LimitName, Plan, Price, TileLoad
+from service import replies
+from service.replies import AXES
+
+__all__ = ["plan_reply", "wrench_space_reply"]
+
+
+def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
+    """Return a plan as a reply.
+
+    Parameters
+    ----------
+    answer : Plan
+    identifier : str or None
+        The request's, echoed.
+    model : bool
+        Whether tiles carry their load laws and hands their wrench spaces.
+    """
+    return replies.PlanReply(
+        id=identifier,
+        status=answer.status,
+        reason=answer.reason,
+        body_wrench=_vector(answer.body_wrench),
+        utilisation=_number(answer.utilisation),
+        load_factor=_number(answer.load_factor),
+        load_factor_unbounded=answer.load_factor_unbounded,
+        limiting=None if answer.limiting is None else _limit(answer.limiting),
+        hands=None if answer.hands is None else [_hand(h, model) for h in answer.hands],
+        prices=None if answer.prices is None else [_price(price) for price in answer.prices],
+        certificate=None if answer.certificate is None else _certificate(answer.certificate),
+        residual=None if answer.residual is None else _vector(answer.residual),
+        verified=answer.verified,
+        solver=replies.Solver(
+            answer.solver.name, answer.solver.status, int(answer.solver.iterations)
+        ),
+        time=replies.Time(answer.time.model, answer.time.solve, answer.time.total),
+    )
+
+
+def wrench_space_reply(
+    robot: str,
+    limb: str,
+    settled: SettledHand,
+    space: WrenchSpace,
+    limits: Iterable[TensionLimit],
+) -> replies.WrenchSpaceReply:
+    """Return one hand's wrench space as a reply, with its views at utilisation 1.
+
+    Raises
+    ------
+    EmptySetError
+        If nothing is left at utilisation 1.
+    SolverError
+        If a view could not be computed.
+    """
+    faces = space.half_spaces()
+    volume, dimension = space.volume()
+    parts = _wrench_set(space)
+    return replies.WrenchSpaceReply(
+        robot=robot,
+        limb=limb,
+        seating=_seating(settled.seating),
+        contacts=[
+            replies.Contact(
+                finger=tile.finger,
+                phalanx=tile.phalanx,
+                contact=tile.contact,
+                position=_vector(position),
+                shear_axis=_vector(axes[0]),
+                normal_axis=_vector(axes[1]),
+                lateral_axis=_vector(axes[2]),
+            )
+            for tile, position, axes in zip(
+                settled.tiles, settled.positions, settled.axes, strict=True
+            )
+        ],
+        tension_limits=[
+            replies.TensionLimit(limit.finger, _number(limit.tension), limit.phalanx)
+            for limit in limits
+        ],
+        origin=parts.origin,
+        generators=parts.generators,
+        rows=parts.rows,
+        vertices=_vectors(space.vertices()),
+        half_spaces=replies.HalfSpaces(
+            _vectors(faces.normals),
+            _vector(faces.offsets),
+            replies.HalfSpaceEquations(
+                _vectors(faces.equation_normals), _vector(faces.equation_offsets)
+            ),
+        ),
+        dimension=int(dimension),
+        volume=float(volume),
+        capability=_capability(space),
+    )
+
+
+def _vector(values: Array) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _vectors(values: Array) -> list[list[float]]:
+    return [_vector(row) for row in values]
+
+
+def _number(value: float | None) -> float | None:
+    """Return a number as it travels: what is infinite does not exist."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _limit(name: LimitName) -> replies.LimitName:
+    return replies.LimitName(name.limb, name.finger, name.phalanx, name.limit)
+
+
+def _price(price: Price) -> replies.Price:
+    name = price.name
+    return replies.Price(name.limb, name.finger, name.phalanx, name.limit, float(price.price))
+
+
+def _certificate(certificate: Certificate) -> replies.Certificate:
+    return replies.Certificate(
+        direction=_vector(certificate.direction),
+        scale=_vector(certificate.scale),
+        supremum=float(certificate.supremum),
+        needed=float(certificate.needed),
+        shortfall=_vector(certificate.shortfall),
+        nearest=_vector(certificate.nearest),
+        blocking=[_limit(name) for name in certificate.blocking],
+    )
+
+
+def _hand(part: HandPlan, model: bool) -> replies.Hand:
+    palm = part.palm
+    return replies.Hand(
+        limb=part.limb,
+        wrench=_vector(part.wrench),
+        fingers=[
+            replies.Finger(
+                name=finger.name,
+                tendon_tension=float(finger.tendon_tension),
+                tiles=[_tile(tile, model) for tile in finger.tiles],
+            )
+            for finger in part.fingers
+        ],
+        palm=replies.Palm(
+            position=_vector(palm.position),
+            force=_vector(palm.force),
+            moment=_vector(palm.moment),
+            engaged=[int(tile) for tile in palm.engaged],
+            utilisation=float(palm.utilisation),
+        ),
+        utilisation=float(part.utilisation),
+        seating=_seating(part.seating),
+        wrench_space=_wrench_set(part.space) if model else UNSET,
+    )
+
+
+def _tile(tile: TileLoad, model: bool) -> replies.Tile:
+    return replies.Tile(
+        phalanx=tile.phalanx,
+        contact=tile.contact,
+        position=_vector(tile.position),
+        force=_vector(tile.force),
+        shear=float(tile.shear),
+        normal=float(tile.normal),
+        lateral=float(tile.lateral),
+        shear_axis=_vector(tile.shear_axis),
+        normal_axis=_vector(tile.normal_axis),
+        lateral_axis=_vector(tile.lateral_axis),
+        utilisation=float(tile.utilisation),
+        load_at_zero=_vector(tile.load_at_zero) if model else UNSET,
+        load_per_newton=_vector(tile.load_per_newton) if model else UNSET,
+        half_planes=[row for plane in tile.half_planes for row in _both_signs(plane)]
+        if model
+        else UNSET,
+    )
+
+
+def _both_signs(plane: HalfPlane) -> list[list[float]]:
+    """Return ``a · (shear, normal, lateral) ≤ capacity`` for a lateral load of either sign."""
+    signs = (1.0, -1.0) if plane.a_lateral > 0.0 else (1.0,)
+    return [
+        [plane.a_shear, plane.a_normal, sign * plane.a_lateral, plane.capacity] for sign in signs
+    ]
+
+
+def _seating(seating: Seating) -> replies.Seating:
+    pose = seating.pose
+    return replies.Seating(
+        seating.rule, replies.PlacedFrame(_vector(pose.position), _vector(pose.quaternion()))
+    )
+
+
+def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
+    coefficients = np.vstack([space.L, space.H])
+    constants = np.concatenate([space.l0, np.zeros(len(space.h))])
+    capacities = np.concatenate([space.s, space.h])
+    return replies.WrenchSet(
+        origin=_vector(space.origin),
+        generators=[
+            replies.Generator(name, _vector(column))
+            for name, column in zip(space.columns, space.generators.T, strict=True)
+        ],
+        rows=[
+            replies.Row(
+                name=row.label,
+                kind=row.kind,
+                finger=row.finger,
+                phalanx=row.phalanx,
+                limit=row.limit,
+                coefficients=_vector(a),
+                constant=float(constant),
+                capacity=float(capacity),
+            )
+            for row, a, constant, capacity in zip(
+                space.rows, coefficients, constants, capacities, strict=True
+            )
+        ],
+    )
+
+
+def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
+    reaches = {}
+    for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
+        ends = space.capability(direction)
+        low, high = (math.inf, -math.inf) if ends is None else ends
+        reaches[f"+{axis}"] = _reach(high, space.support(direction))
+        reaches[f"-{axis}"] = _reach(-low, space.support(-direction))
+    return reaches
+
+
+def _reach(end: float, extent: float) -> replies.AxisCapability:
+    return replies.AxisCapability(float(end) if end >= 0.0 else None, float(extent))

@@ -1,0 +1,86 @@
+"""What types alone cannot say of a request.
+
+Every number is finite, and nothing is asked that this version cannot do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import msgspec
+
+from hand_models.errors import InvalidInputError, UnsupportedError
+from service import requests
+
+__all__ = ["check"]
+
+
+class _Later(NamedTuple):
+    """The only value of a field that this version supports, and what to tell who gives another."""
+
+    supported: object
+    advice: str
+
+
+_OMIT = "leave it out"
+_SHAPES = "valid shapes are plane, cylinder, sphere and edge"
+
+LATER: Final[dict[type, dict[str, _Later]]] = {
+    requests.PlanRequest: {
+        "objective": _Later("max_margin", "valid is max_margin"),
+        "confidence": _Later(None, f"{_OMIT}: tile limits are nominal"),
+        "deadline": _Later(None, f"{_OMIT}: a plan takes as long as it takes"),
+    },
+    requests.Stance: {
+        "joints": _Later(None, f"{_OMIT}: joint torques are not planned"),
+    },
+    requests.Hand: {
+        "wrist": _Later("fixed", "valid is fixed"),
+        "tendon_preload": _Later(None, f"{_OMIT}: it is for a floating wrist"),
+    },
+    requests.Limits: {
+        "joint_torque": _Later(None, f"{_OMIT}; valid limits are utilisation and tendon_tension"),
+        "per_hand": _Later(None, f"{_OMIT}; valid limits are utilisation and tendon_tension"),
+    },
+}
+"""By message and field, what this version supports of the fields that later versions will."""
+
+LATER_HOLDS: Final = (requests.Ellipsoid, requests.Profile, requests.Mesh)
+
+
+def check(value: object, path: str = "") -> None:
+    """Check a decoded request, or a part of it, for what its type does not ensure.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is not finite.
+    UnsupportedError
+        If a field has a value that this version does not support.
+    """
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise InvalidInputError(f"must be a finite number, got {value}", field=path)
+    elif isinstance(value, LATER_HOLDS):
+        shape = value.__struct_config__.tag
+        raise UnsupportedError(
+            f"{shape} is not supported in this version; {_SHAPES}", field=f"{path}.shape"
+        )
+    elif isinstance(value, msgspec.Struct):
+        later = LATER.get(type(value), {})
+        for name in value.__struct_fields__:
+            part, field = getattr(value, name), f"{path}.{name}" if path else name
+            if name in later and part != later[name].supported:
+                raise UnsupportedError(
+                    f"{_given(part)}not supported in this version; {later[name].advice}",
+                    field=field,
+                )
+            check(part, field)
+    elif isinstance(value, (list, tuple)):
+        for i, part in enumerate(value):
+            check(part, f"{path}[{i}]")
+
+
+def _given(value: Any) -> str:
+    return f"{value} is " if isinstance(value, str) else ""

@@ -1,0 +1,109 @@
+"""How messages travel: JSON or MessagePack, named by a zenoh encoding."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, TypeVar
+
+import msgspec
+
+from hand_models.errors import CruxError, InvalidInputError
+from service.blame import blame
+from service.checks import check
+from service.errors import MalformedError
+from service.replies import ErrorDetail, ErrorReply
+
+__all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error"]
+
+T = TypeVar("T")
+
+LARGEST_REQUEST: Final = 2**20
+"""Bytes of a request; a stance takes a few thousand."""
+
+ALIASES: Final = {
+    "": "application/json",
+    "zenoh/bytes": "application/json",
+    "text/json": "application/json",
+}
+
+
+class Format(Enum):
+    """A way to write a message down; the value is its encoding."""
+
+    JSON = "application/json"
+    MSGPACK = "application/msgpack"
+
+    @classmethod
+    def named(cls, encoding: str) -> Format:
+        """Return the format of a zenoh encoding, whatever schema it names after a semicolon.
+
+        No encoding, and zenoh's own default, mean JSON.
+
+        Raises
+        ------
+        MalformedError
+            If the encoding is of neither format.
+        """
+        plain = encoding.partition(";")[0].strip().lower()
+        try:
+            return cls(ALIASES.get(plain, plain))
+        except ValueError:
+            raise MalformedError(
+                f"unknown encoding {plain[:80]!r}; valid: {', '.join(f.value for f in cls)}"
+            ) from None
+
+    def label(self, message: msgspec.Struct) -> str:
+        """Return the encoding of a message with its schema, as in ``…/json;crux.PlanReply@1``."""
+        return f"{self.value};crux.{type(message).__name__}@1"
+
+    def encode(self, message: msgspec.Struct) -> bytes:
+        """Return a message as bytes."""
+        if self is Format.JSON:
+            return msgspec.json.encode(message)
+        return msgspec.msgpack.encode(message)
+
+    def decode(self, payload: bytes, kind: type[T]) -> T:
+        """Return bytes as a message.
+
+        Raises
+        ------
+        msgspec.ValidationError
+            If they are another message.
+        MalformedError
+            If they are none.
+        """
+        try:
+            if self is Format.JSON:
+                return msgspec.json.decode(payload, type=kind)
+            return msgspec.msgpack.decode(payload, type=kind)
+        except msgspec.ValidationError:
+            raise
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise MalformedError(f"not {self.name.lower()}: {error}") from None
+        except RecursionError:
+            raise MalformedError("nested too deeply") from None
+
+
+def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) -> T:
+    """Return bytes as a request that has passed every check which needs no model.
+
+    Raises
+    ------
+    InvalidInputError
+        With the field to blame; as `MalformedError` or `UnsupportedError` where that is the case.
+    """
+    if len(payload) > LARGEST_REQUEST:
+        raise MalformedError(f"{len(payload)} bytes; a request may have {LARGEST_REQUEST} at most")
+    try:
+        request = form.decode(payload, kind)
+    except msgspec.ValidationError as error:
+        field, message = blame(error, kind)
+        raise InvalidInputError(message, field=field) from None
+    check(request)
+    return request
+
+
+def encode_error(kind: str, error: CruxError, form: Format) -> tuple[bytes, str]:
+    """Return an error reply's bytes and encoding."""
+    reply = ErrorReply(error=ErrorDetail(kind, error.field, error.message))
+    return form.encode(reply), form.label(reply)

@@ -1,0 +1,278 @@
+"""The ``crux`` command.
+
+Exit status: 0 done and feasible; 3 done, but infeasible or overloaded; 2 bad input, with one line
+on standard error; 1 anything else.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import click
+import msgspec
+import zenoh
+
+from hand_models.errors import CruxError, InvalidInputError
+from service.client import TIMEOUT, CruxClient
+from service.config import (
+    listening,
+    open_session,
+    start_zenoh_log,
+    zenoh_config,
+    zenoh_options,
+)
+from service.errors import REQUEST_KINDS
+from service.replies import PlanReply
+from service.requests import PlanRequest, Want, WrenchSpaceRequest
+from service.schema import schema as message_schema
+from service.stances import read_request
+from service.tables import console, print_plan, print_wrench_space
+
+__all__ = ["crux", "main", "run"]
+
+DONE: Final = 0
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+OVERLOADED: Final = 3
+
+EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": OVERLOADED}
+"""By a plan's status; any other is `FAILED`."""
+
+PICTURES: Final = (".png", ".pdf", ".svg")
+DEMO_STANCE: Final = "wall-300"
+EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
+"""What the command line asks for besides the plan."""
+
+
+def main() -> None:
+    """Run the command line of this process, and exit."""
+    sys.exit(run())
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line, and return its exit status."""
+    try:
+        status = crux.main(args=arguments, prog_name="crux", standalone_mode=False)
+        return status if isinstance(status, int) else DONE
+    except click.ClickException as error:
+        return _complain(error.format_message(), BAD_INPUT)
+    except CruxError as error:
+        bad = isinstance(error, InvalidInputError) or error.kind in REQUEST_KINDS
+        return _complain(str(error), BAD_INPUT if bad else FAILED)
+    except click.Abort:
+        return _complain("interrupted", FAILED)
+    except BrokenPipeError:
+        # nobody reads any more; keep Python from saying so at its exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except OSError as error:
+        return _complain(str(error), FAILED)
+
+
+def _complain(message: str, status: int) -> int:
+    click.echo(f"crux: {' '.join(message.split())}", err=True)
+    return status
+
+
+def _say(result: object) -> None:
+    """Write a result as one line of JSON."""
+    click.echo(msgspec.json.encode(result))
+
+
+def _check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+    if path is not None and path.suffix not in PICTURES:
+        raise click.BadParameter(f"{path}: valid endings are {', '.join(PICTURES)}")
+    if path is not None and not path.parent.is_dir():
+        raise click.BadParameter(f"{path}: no such folder")
+    return path
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
+def crux() -> None:
+    """Plan which hand of a climbing robot carries how much.
+
+    STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
+    bundled stance.
+    """
+
+
+@crux.command()
+@click.argument("stance")
+@json_option
+def plan(stance: str, as_json: bool) -> int:
+    """Make one plan, without the network."""
+    from service import dispatch
+
+    request = _with_extras(read_request(stance))
+    reply = dispatch.plan(request)
+    bare = dispatch.plan(_without_palms(request))
+    if as_json:
+        _say(msgspec.to_builtins(reply) | {"load_factor_without_palm": bare.load_factor})
+    else:
+        print_plan(reply, console(), without_palm=bare)
+    return EXIT_STATUS.get(reply.status, FAILED)
+
+
+def _with_extras(request: PlanRequest) -> PlanRequest:
+    return msgspec.structs.replace(request, want=list(dict.fromkeys([*request.want, *EXTRAS])))
+
+
+def _without_palms(request: PlanRequest) -> PlanRequest:
+    """Return the question how much could be carried if no palm did."""
+    replace = msgspec.structs.replace
+    hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
+    return replace(request, stance=replace(request.stance, hands=hands), want=["load_factor"])
+
+
+@crux.command("wrench-space")
+@click.argument("stance")
+@click.option("--hand", "limb", required=True, metavar="LIMB", help="Whose wrench space.")
+@click.option(
+    "--plot",
+    "picture",
+    type=click.Path(path_type=Path),
+    callback=_check_picture,
+    metavar="FILE",
+    help="Draw it there.",
+)
+@json_option
+def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) -> None:
+    """Show what one hand can carry."""
+    from planner import solve
+    from service import dispatch, questions
+
+    request = WrenchSpaceRequest(v=1, stance=read_request(stance).stance, limb=limb)
+    reply = dispatch.wrench_space(request)
+    if picture is not None:
+        from planner import plots
+
+        settled, space = solve.hand_space(questions.stance(request.stance), limb)
+        plots.plot_wrench_space(settled, space, picture, f"{limb} of {stance}")
+    if as_json:
+        _say(reply)
+    else:
+        print_wrench_space(reply, console())
+
+
+@crux.command()
+@zenoh_options
+@json_option
+def serve(config: zenoh.Config, as_json: bool) -> None:
+    """Answer questions on zenoh until SIGTERM or Ctrl-C."""
+    stop = _StopSignal()
+    from service.server import PlanService, prepare_zenoh
+
+    logging.basicConfig(format="crux: %(levelname)s: %(message)s")
+    prepare_zenoh()
+    start_zenoh_log()
+    endpoints = listening(config)
+    with open_session(config) as session, PlanService(session) as service:
+        if as_json:
+            _say({"v": 1, "keys": service.keys, "listen": endpoints})
+        where = ", ".join(endpoints) or "no address"
+        click.echo(f"crux: serving {', '.join(service.keys)}; listening on {where}", err=True)
+        stop.wait()
+
+
+class _StopSignal:
+    """SIGTERM or Ctrl-C, from now on.
+
+    A signal may well arrive in a thread of zenoh's or of a solver's, and does not wake the main
+    thread then; what does is the byte that its handler writes to a pipe.
+    """
+
+    NUMBERS = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self) -> None:
+        self._arrived, wakeup = os.pipe()
+        os.set_blocking(wakeup, False)
+        signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
+        for number in self.NUMBERS:
+            signal.signal(number, lambda *_: None)
+
+    def wait(self) -> None:
+        """Wait for the first; a second one kills."""
+        os.read(self._arrived, 1)
+        for number in self.NUMBERS:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _timeout_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option(
+        "--timeout", type=click.FloatRange(min=0.01), default=TIMEOUT, show_default=True, help="[s]"
+    )(command)
+
+
+@crux.command()
+@click.argument("stance")
+@zenoh_options
+@_timeout_option
+@json_option
+def query(stance: str, config: zenoh.Config, timeout: float, as_json: bool) -> int:
+    """Ask a running service for a plan."""
+    request = _with_extras(read_request(stance))
+    start_zenoh_log()
+    with CruxClient(config, request.stance.robot, timeout=timeout) as client:
+        reply = client.plan(request)
+    return _show(reply, as_json)
+
+
+def _show(reply: PlanReply, as_json: bool) -> int:
+    if as_json:
+        _say(reply)
+    else:
+        print_plan(reply, console())
+    return EXIT_STATUS.get(reply.status, FAILED)
+
+
+@crux.command()
+@click.option(
+    "-o",
+    "--output",
+    "picture",
+    type=click.Path(path_type=Path),
+    callback=_check_picture,
+    default=Path("crux-demo.png"),
+    show_default=True,
+    metavar="FILE",
+    help="Where the picture goes.",
+)
+@json_option
+def demo(picture: Path, as_json: bool) -> int:
+    """Start the service, ask it for a plan of a real stance, and draw the answer."""
+    from planner import plots, solve
+    from service import questions
+    from service.server import PlanService
+
+    request = _with_extras(read_request(DEMO_STANCE))
+    start_zenoh_log()
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(config) as session, PlanService(session):
+        reply = CruxClient(session).plan(request)
+    question = questions.question(request)
+    plots.plot_plan(solve.plan(question), question.stance, picture)
+    status = _show(reply, as_json)
+    if not as_json:
+        console().print(f"picture: {picture}", markup=False)
+    return status
+
+
+@crux.command()
+@json_option
+def schema(as_json: bool) -> None:
+    """Print the JSON Schema of every message."""
+    text = msgspec.json.encode(message_schema())
+    click.echo(text if as_json else msgspec.json.format(text))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""What can go wrong between a caller and the service."""
+
+from __future__ import annotations
+
+from hand_models.errors import CruxError, InvalidInputError
+
+__all__ = ["REQUEST_KINDS", "MalformedError", "NoServiceError", "ServiceError", "ServiceTimeout"]
+
+REQUEST_KINDS = frozenset({"malformed", "invalid", "unsupported"})
+"""Kinds of error that are the request's fault, so that asking again is of no use."""
+
+
+class MalformedError(InvalidInputError):
+    """Bytes that are not the encoding they claim to be, or too many of them."""
+
+    kind = "malformed"
+
+
+class ServiceError(CruxError):
+    """The service's own error reply.
+
+    Parameters
+    ----------
+    kind : str
+        As in the reply.
+    message : str
+    field : str, optional
+    """
+
+    def __init__(self, kind: str, message: str, *, field: str | None = None) -> None:
+        super().__init__(message, field=field)
+        self.kind = kind
+
+
+class NoServiceError(CruxError):
+    """Nobody answered: no service, or one that died with the question in its hands."""
+
+    kind = "no_service"
+
+
+class ServiceTimeout(CruxError):  # noqa: N818 - a timeout says what it is
+    """The service took the question but did not answer in time."""
+
+    kind = "timeout"

@@ -1,0 +1,17 @@
+"""Keys of the service in zenoh's key space."""
+
+from __future__ import annotations
+
+from typing import Final
+
+__all__ = ["ALIVE", "PLAN", "WRENCH_SPACE", "service_key"]
+
+PLAN: Final = "plan"
+WRENCH_SPACE: Final = "wrench_space"
+ALIVE: Final = "alive"
+"""The liveliness token, which is there while the service is."""
+
+
+def service_key(robot: str, name: str) -> str:
+    """Return the key of one of a robot's services, ``crux/<robot>/<name>``."""
+    return f"crux/{robot}/{name}"

@@ -1,0 +1,128 @@
+"""From a request to the planner's own terms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final, overload
+
+import msgspec
+import numpy as np
+
+from hand_models import holds
+from hand_models.errors import InvalidInputError, UnsupportedError
+from hand_models.frames import Pose
+from hand_models.hand import Grasp
+from hand_models.spines import Surface
+from planner.robosimian import Robot, robosimian
+from planner.stance import EARTH, HandOnHold, Limits, Load, Question, Stance
+from service import requests
+
+__all__ = ["ROBOTS", "question", "stance"]
+
+ROBOTS: Final[dict[str, Callable[[], Robot]]] = {"robosimian": robosimian}
+
+
+@contextmanager
+def _within(path: str) -> Iterator[None]:
+    """Put a path before the field of an error."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise error.within(path) from None
+
+
+def question(request: requests.PlanRequest) -> Question:
+    """Return what a plan request asks.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field is relative to the request.
+    """
+    if request.body_wrench is not None and request.load is not None:
+        raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
+    load, limits = request.load or requests.Load(), request.limits
+    with _within("limits"):
+        caps = Limits(limits.utilisation, limits.tendon_tension)
+    return Question(
+        stance=stance(request.stance),
+        body_wrench=None if request.body_wrench is None else np.array(request.body_wrench),
+        load=Load(load.mass, load.com, load.acceleration),
+        limits=caps,
+        want=frozenset(request.want),
+    )
+
+
+def stance(message: requests.Stance) -> Stance:
+    """Return the stance of a request.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field begins with ``stance``.
+    """
+    with _within("stance"):
+        if message.robot not in ROBOTS:
+            raise InvalidInputError(
+                f"unknown robot {message.robot!r}; known are {', '.join(ROBOTS)}", field="robot"
+            )
+        return Stance(
+            hands=tuple(_hand(hand, i) for i, hand in enumerate(message.hands)),
+            body=_pose(message.body, "body"),
+            gravity=np.array(EARTH if message.gravity is None else message.gravity),
+            robot=ROBOTS[message.robot](),
+        )
+
+
+def _hand(message: requests.Hand, index: int) -> HandOnHold:
+    with _within(f"hands[{index}]"):
+        with _within("grasp"):
+            grasp = Grasp(**msgspec.structs.asdict(message.grasp))
+        with _within("surface"):
+            surface = _surface(message.surface)
+        with _within("hold"):
+            hold = _hold(message.hold)
+            hold_pose = _pose(message.hold.pose, "pose")
+            hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
+        return HandOnHold(
+            limb=message.limb,
+            pose=_pose(message.pose, "pose"),
+            hold=hold,
+            surface=surface,
+            hold_pose=hold_pose,
+            hold_in_hand=hold_in_hand,
+            grasp=grasp,
+        )
+
+
+@overload
+def _pose(message: requests.Pose, field: str) -> Pose: ...
+@overload
+def _pose(message: requests.Pose | None, field: str) -> Pose | None: ...
+def _pose(message: requests.Pose | None, field: str) -> Pose | None:
+    if message is None:
+        return None
+    with _within(field):
+        return Pose.from_quaternion(message.position, message.orientation)
+
+
+def _surface(message: str | requests.Surface) -> Surface:
+    if isinstance(message, str):
+        return Surface.named(message)
+    given = msgspec.structs.asdict(message)
+    return Surface.from_values({name: v for name, v in given.items() if v is not None})
+
+
+def _hold(message: requests.Hold) -> holds.Hold:
+    match message:
+        case requests.Plane():
+            return holds.Plane()
+        case requests.Cylinder():
+            return holds.Cylinder(message.diameter)
+        case requests.Sphere():
+            return holds.Sphere(message.diameter)
+        case requests.Edge():
+            return holds.Edge(message.fillet_radius, message.angle)
+        case _:
+            raise UnsupportedError("not supported in this version", field="shape")

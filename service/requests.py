@@ -1,0 +1,222 @@
+"""What a caller may ask: every request, strict, with the bounds of its numbers.
+
+Fields that the contract knows but this version does not are declared, so that they are refused by
+name (`service.checks`) and not as unknown. Bounds are far beyond any climbing robot; they keep
+arithmetic finite.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+
+__all__ = [
+    "Cylinder",
+    "Edge",
+    "Ellipsoid",
+    "Grasp",
+    "Hand",
+    "Hold",
+    "Limits",
+    "Load",
+    "Mesh",
+    "Placed",
+    "PlanRequest",
+    "Plane",
+    "Pose",
+    "Profile",
+    "Request",
+    "Sphere",
+    "Stance",
+    "Strict",
+    "Surface",
+    "WrenchSpaceRequest",
+]
+
+Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="[m]")]
+QuaternionEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Quaternion = Annotated[
+    tuple[QuaternionEntry, QuaternionEntry, QuaternionEntry, QuaternionEntry],
+    Meta(description="[x, y, z, w], of norm 1 within 1e-3"),
+]
+AccelerationEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Acceleration = Annotated[
+    tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+    Meta(description="in W [m/s²]"),
+]
+WrenchEntry = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Wrench = Annotated[
+    tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry],
+    Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]"),
+]
+Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
+Diameter = Annotated[float, Meta(ge=1e-3, le=1e3, description="[m]")]
+FilletRadius = Annotated[float, Meta(ge=1e-4, le=1e3, description="[m]")]
+EdgeAngle = Annotated[
+    float, Meta(ge=1e-2, lt=math.pi, description="of the rock between the faces [rad]")
+]
+TileForce = Annotated[float, Meta(ge=1e-3, le=1e5, description="of one tile [N]")]
+PullOffAngle = Annotated[float, Meta(ge=1e-3, le=math.pi / 2, description="[rad]")]
+Gain = Annotated[float, Meta(ge=0.0, le=1e3)]
+Count = Annotated[int, Meta(ge=1, le=64)]
+OuterRotation = Annotated[float, Meta(ge=0.0, le=math.pi + 1e-6, description="[rad]")]
+Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
+Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
+Name = Annotated[str, Meta(max_length=64)]
+Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
+Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
+
+
+class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A part of a request: an unknown field in it is an error."""
+
+
+class Pose(Strict, frozen=True, kw_only=True):
+    """A frame in another."""
+
+    position: Position
+    orientation: Quaternion
+
+
+class Placed(Strict, frozen=True, kw_only=True, tag_field="shape"):
+    """A hold, placed by one pose or none; with none the hand is seated on it."""
+
+    pose: Annotated[Pose | None, Meta(description="in W")] = None
+    pose_in_hand: Annotated[Pose | None, Meta(description="in H")] = None
+
+
+class Plane(Placed, frozen=True, kw_only=True, tag="plane"):
+    """A flat wall."""
+
+
+class Cylinder(Placed, frozen=True, kw_only=True, tag="cylinder"):
+    """A round log of rock along y of its frame."""
+
+    diameter: Diameter
+
+
+class Sphere(Placed, frozen=True, kw_only=True, tag="sphere"):
+    """A ball of rock."""
+
+    diameter: Diameter
+
+
+class Edge(Placed, frozen=True, kw_only=True, tag="edge"):
+    """Two flat faces that meet in a fillet along y of its frame."""
+
+    fillet_radius: FilletRadius
+    angle: EdgeAngle
+
+
+class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid", forbid_unknown_fields=False):
+    """Not supported in this version."""
+
+
+class Profile(Placed, frozen=True, kw_only=True, tag="profile", forbid_unknown_fields=False):
+    """Not supported in this version."""
+
+
+class Mesh(Placed, frozen=True, kw_only=True, tag="mesh", forbid_unknown_fields=False):
+    """Not supported in this version."""
+
+
+Hold = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+
+
+class Surface(Strict, frozen=True, kw_only=True):
+    """A surface of the caller's own; what is left out follows from the shear limit."""
+
+    shear_limit: TileForce
+    pull_off_limit: TileForce | None = None
+    pull_off_angle: PullOffAngle | None = None
+    lateral_limit: TileForce | None = None
+    compression_gain: Gain | None = None
+    half_planes: Count | None = None
+
+
+class Grasp(Strict, frozen=True, kw_only=True):
+    """How a hand takes its hold."""
+
+    outer_rotation: OuterRotation = 0.0
+    closing_tension: Tension | None = None
+    palm: bool = True
+    lateral: bool = True
+
+
+class Hand(Strict, frozen=True, kw_only=True):
+    """One hand on its hold."""
+
+    limb: Name
+    pose: Annotated[Pose, Meta(description="of H in W")]
+    hold: Hold
+    surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")]
+    grasp: Grasp = Grasp()
+    wrist: Annotated[
+        Literal["fixed", "floating"], Meta(description="only fixed in this version")
+    ] = "fixed"
+    tendon_preload: Later = None
+
+
+class Stance(Strict, frozen=True, kw_only=True):
+    """Where the body and the hands are."""
+
+    robot: Name = "robosimian"
+    gravity: Acceleration | None = None
+    body: Annotated[Pose, Meta(description="of B in W")]
+    joints: Later = None
+    hands: Annotated[list[Hand], Meta(max_length=16)]
+
+
+class Load(Strict, frozen=True, kw_only=True):
+    """What the body weighs and how it is to move; by default the robot's own weight, at rest."""
+
+    mass: Mass | None = None
+    com: Annotated[Position | None, Meta(description="centre of mass in B")] = None
+    acceleration: Acceleration = (0.0, 0.0, 0.0)
+
+
+class Limits(Strict, frozen=True, kw_only=True):
+    """Caps that the caller puts on the plan."""
+
+    utilisation: Utilisation = 1.0
+    tendon_tension: Tension | None = None
+    joint_torque: Later = None
+    per_hand: Later = None
+
+
+Want = Literal["load_factor", "prices", "model"]
+
+
+class Request(Strict, frozen=True, kw_only=True):
+    """What every request has."""
+
+    v: Literal[1]
+
+
+class PlanRequest(Request, frozen=True, kw_only=True):
+    """Asks who carries what in a stance."""
+
+    id: Identifier | None = None
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    objective: Annotated[
+        Literal["max_margin", "min_effort", "max_reliability"],
+        Meta(description="only max_margin in this version"),
+    ] = "max_margin"
+    limits: Limits = Limits()
+    confidence: Later = None
+    deadline: Later = None
+    want: list[Want] = []
+
+
+class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
+    """Asks what one hand of a stance can carry."""
+
+    stance: Stance
+    limb: Name

@@ -1,0 +1,31 @@
+"""The JSON Schema of every message."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
+from service.requests import PlanRequest, WrenchSpaceRequest
+
+__all__ = ["MESSAGES", "schema"]
+
+MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
+    PlanRequest,
+    PlanReply,
+    WrenchSpaceRequest,
+    WrenchSpaceReply,
+    ErrorReply,
+)
+
+
+def schema() -> dict[str, Any]:
+    """Return one schema whose ``$defs`` hold every message; a valid document is one of them."""
+    wholes, parts = msgspec.json.schema_components(MESSAGES, ref_template="#/$defs/{name}")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Messages of crux, version 1",
+        "anyOf": list(wholes),
+        "$defs": parts,
+    }

@@ -1,0 +1,152 @@
+"""Replies as tables for a person, in 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from service.replies import AXES, Finger, Hand, PlanReply, Price, Tile, WrenchSpaceReply
+
+__all__ = ["console", "print_plan", "print_wrench_space"]
+
+MOST_PRICES: Final = 8
+"""Prices shown; the dearest first."""
+
+
+def console() -> Console:
+    """Return the console on standard output."""
+    return Console(highlight=False)
+
+
+def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None = None) -> None:
+    """Print a plan.
+
+    Parameters
+    ----------
+    reply : PlanReply
+    out : Console
+    without_palm : PlanReply, optional
+        The same question's answer with every palm left out.
+    """
+    parts = [f"[bold]{reply.status.upper()}[/bold]"]
+    if reply.utilisation is not None:
+        parts.append(f"utilisation {reply.utilisation:.3f}")
+    parts.append(f"load factor {_load_factor(reply)}")
+    parts.append(f"{1e3 * reply.time.total:.0f} ms")
+    out.print("   ".join(parts))
+    out.print(reply.reason, markup=False)
+    if without_palm is not None:
+        out.print(f"load factor without the palms: {_load_factor(without_palm)}")
+    if reply.hands is not None:
+        _show(
+            "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
+        )
+        _show("tendons, and each finger's most loaded tile", _tendon_table(reply.hands), out)
+    if reply.prices:
+        title = "what one newton more of a limit would take off the utilisation"
+        if len(reply.prices) > MOST_PRICES:
+            title += f" ({MOST_PRICES} of {len(reply.prices)})"
+        _show(title, _price_table(reply.prices[:MOST_PRICES]), out)
+    if reply.certificate is not None:
+        lacking = ", ".join(
+            f"{axis} {_fixed(value, 1)}"
+            for axis, value in zip(AXES, reply.certificate.shortfall, strict=True)
+        )
+        out.print(f"missing body wrench (in B): {lacking} [N, N·m]", markup=False)
+
+
+def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
+    """Print what one hand can carry."""
+    seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
+    out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
+    out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
+    out.print(
+        f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
+        f"dimension {reply.dimension}, volume {reply.volume:.3g} N^{reply.dimension}"
+    )
+    tensions = _table("finger", "phalanx")
+    tensions.add_column("f_t(max) N", justify="right")
+    for limit in reply.tension_limits:
+        tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
+        tensions.add_row(limit.finger, limit.phalanx or "-", tension)
+    _show("tendon tension at which the finger's first tile lets go", tensions, out)
+    reaches = _table("axis")
+    for name in ("pure -", "pure +", "extent -", "extent +"):
+        reaches.add_column(name, justify="right")
+    for axis in AXES:
+        less, more = reply.capability[f"-{axis}"], reply.capability[f"+{axis}"]
+        unit = "N" if axis.startswith("f") else "N·m"
+        cells = [less.pure, more.pure, less.extent, more.extent]
+        reaches.add_row(f"{axis} {unit}", *("-" if c is None else _fixed(c, 2) for c in cells))
+    _show("capability along the axes of H", reaches, out)
+    out.print("pure: with nothing else; extent: with whatever else the hand can carry")
+
+
+def _load_factor(reply: PlanReply) -> str:
+    if reply.load_factor_unbounded:
+        return "unbounded"
+    return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Return a number without the sign of a zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _show(title: str, table: Table, out: Console) -> None:
+    out.print(f"\n[bold]{title}[/bold]")
+    out.print(table)
+
+
+def _table(*names: str) -> Table:
+    """Return a table with left-justified columns of names."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for name in names:
+        table.add_column(name, no_wrap=True)
+    return table
+
+
+def _hand_table(hands: Iterable[Hand]) -> Table:
+    table = _table("hand")
+    for name in (*AXES, "palm\nshear", "palm\npress", "util"):
+        table.add_column(name, justify="right")
+    for hand in hands:
+        force = hand.palm.force
+        cells = [_fixed(value, 0) for value in hand.wrench[:3]]
+        cells += [_fixed(value, 1) for value in hand.wrench[3:]]
+        cells += [_fixed(-force[0], 0), _fixed(force[2], 0), _fixed(hand.utilisation, 2)]
+        table.add_row(hand.limb, *cells)
+    return table
+
+
+def _tendon_table(hands: Iterable[Hand]) -> Table:
+    table = _table("hand", "finger")
+    table.add_column("tension N", justify="right")
+    table.add_column("tile")
+    table.add_column("util", justify="right")
+    for hand in hands:
+        for finger in hand.fingers:
+            worst = _worst(finger)
+            cells = ("-", "-") if worst is None else (worst.phalanx, f"{worst.utilisation:.2f}")
+            table.add_row(hand.limb, finger.name, f"{finger.tendon_tension:.1f}", *cells)
+        table.add_section()
+    return table
+
+
+def _worst(finger: Finger) -> Tile | None:
+    """Return the most loaded tile of those that touch rock."""
+    touching = [tile for tile in finger.tiles if tile.contact != "none"]
+    return max(touching, key=lambda tile: tile.utilisation, default=None)
+
+
+def _price_table(prices: Iterable[Price]) -> Table:
+    table = _table("hand", "finger", "tile", "limit")
+    table.add_column("price 1/N", justify="right")
+    for price in prices:
+        names = (price.limb, price.finger or "-", price.phalanx or "-", price.limit)
+        table.add_row(*names, f"{price.price:.2g}")
+    return table

@@ -1,0 +1,306 @@
+"""The ``crux`` command: what it prints where, and its exit status."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from asked import HEAVY, flat_request, put, wall_request
+from test_service import ROOT, Served, free_endpoint
+
+from service import command, dispatch
+from service.command import run
+from service.replies import PlanReply
+from service.stances import bundled
+
+DONE, FAILED, BAD_INPUT, OVERLOADED = 0, 1, 2, 3
+
+
+@pytest.fixture
+def stance(tmp_path: Path):
+    """Writes a request to a file, and returns its path."""
+
+    def write(request: object, name: str = "stance.json") -> str:
+        path = tmp_path / name
+        path.write_text(request if isinstance(request, str) else json.dumps(request))
+        return str(path)
+
+    return write
+
+
+def result(capfd: pytest.CaptureFixture[str]) -> dict:
+    """The one line of JSON on standard output, with nothing on standard error."""
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.endswith("\n")
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+def complaint(capfd: pytest.CaptureFixture[str]) -> str:
+    """The one line on standard error, with nothing on standard output."""
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith("crux: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-m", "service.command", *arguments],
+        input=given,
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
+        timeout=60,
+        check=False,
+    )
+
+
+# plan ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("request_", "status", "code"),
+    [
+        (wall_request(), "optimal", DONE),
+        (wall_request(HEAVY), "overloaded", OVERLOADED),
+        (
+            put(flat_request(), ("stance", "hands", 0, "grasp", "palm"), False),
+            "infeasible",
+            OVERLOADED,
+        ),
+    ],
+)
+def test_the_exit_status_of_a_plan(
+    request_: dict, status: str, code: int, stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["plan", stance(request_), "--json"]) == code
+    assert result(capfd)["status"] == status
+    assert run(["plan", stance(request_)]) == code
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.startswith(status.upper())
+    assert max(len(line) for line in out.splitlines()) <= 80
+
+
+def test_a_failed_plan_is_a_failure(
+    stance, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(request: object) -> PlanReply:
+        reply = good(request)
+        reply.status = "failed"
+        return reply
+
+    good = dispatch.plan
+    monkeypatch.setattr(dispatch, "plan", fail)
+    assert run(["plan", stance(wall_request()), "--json"]) == FAILED
+    assert result(capfd)["status"] == "failed"
+
+
+def test_a_plan_says_how_much_hangs_on_the_palms(stance, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance(wall_request())
+    run(["plan", path, "--json"])
+    reply = result(capfd)
+    assert 0.0 < reply["load_factor_without_palm"] < reply["load_factor"]
+    assert reply["prices"]
+    run(["plan", path])
+    out = capfd.readouterr().out
+    assert f"load factor {reply['load_factor']:.3f}" in out
+    assert f"load factor without the palms: {reply['load_factor_without_palm']:.3f}" in out
+    assert reply["reason"] in out.replace("\n", " ")
+    for hand in reply["hands"]:
+        assert hand["limb"] in out
+
+
+def test_what_is_asked_for_is_added_to_what_the_file_wants(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run(["plan", stance(wall_request() | {"want": ["model", "prices"]}), "--json"])
+    reply = result(capfd)
+    assert reply["hands"][0]["wrench_space"]["rows"]
+    assert reply["load_factor"] is not None
+
+
+def test_a_stance_from_standard_input(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = io.BytesIO(json.dumps(wall_request()).encode())
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=given))
+    assert run(["plan", "-", "--json"]) == DONE
+    assert result(capfd)["id"] == "wall"
+
+
+@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab"])
+def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert name in bundled()
+    assert run(["plan", name, "--json"]) in (DONE, OVERLOADED)
+    assert result(capfd)["verified"] is True
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("{", "crux: not json: Input data was truncated\n"),
+        ("{}", "crux: v: missing\n"),
+        (json.dumps(wall_request() | {"colour": 1}), "crux: colour: unknown field; known are "),
+        (json.dumps(wall_request() | {"deadline": 1}), "crux: deadline: not supported in this"),
+        (
+            json.dumps(put(wall_request(), ("stance", "hands", 3, "limb"), "nose")),
+            "crux: stance.hands[3].limb: unknown limb 'nose'; known are front_right",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(
+    text: str, line: str, stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for flags in ([], ["--json"]):
+        assert run(["plan", stance(text), *flags]) == BAD_INPUT
+        assert complaint(capfd).startswith(line)
+
+
+def test_a_stance_that_is_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["plan", "no/such.json"]) == BAD_INPUT
+    line = complaint(capfd)
+    assert line.startswith("crux: STANCE: no such file, and no bundled stance 'no/such.json'")
+    assert "wall-300" in line
+
+
+# wrench-space -------------------------------------------------------------------------------------
+
+
+def test_a_wrench_space(stance, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance(flat_request())
+    assert run(["wrench-space", path, "--hand", "front_left", "--json"]) == DONE
+    reply = result(capfd)
+    assert run(["wrench-space", path, "--hand", "front_left"]) == DONE
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "seated by rule pinch" in out
+    assert f"{len(reply['vertices'])} vertices, {len(reply['half_spaces']['offsets'])} half-" in out
+    assert f"dimension {reply['dimension']}" in out
+    for limit in reply["tension_limits"]:
+        assert f"{limit['tension']:.1f}" in out
+
+
+def test_a_wrench_space_of_a_hand_that_is_not_there(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["wrench-space", stance(flat_request()), "--hand", "nose"]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: limb: no hand 'nose' in this stance; it has front_")
+
+
+def test_a_picture_of_a_wrench_space(stance, tmp_path: Path) -> None:
+    picture = tmp_path / "space.png"
+    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+    assert run([*arguments, "--plot", str(picture), "--json"]) == DONE
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("picture", ["space.xyz", "no/folder/space.png"])
+def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+    assert run([*arguments, "--plot", picture]) == BAD_INPUT
+    assert picture in complaint(capfd)
+
+
+# serve and query ----------------------------------------------------------------------------------
+
+
+def test_query_and_serve(stance) -> None:
+    server = Served(free_endpoint())
+    flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
+    try:
+        asked = process("query", stance(wall_request()), *flags, "--json")
+        assert (asked.returncode, asked.stderr) == (DONE, b"")
+        reply = json.loads(asked.stdout)
+        assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
+        assert reply["prices"]
+        heavy = json.dumps(wall_request(HEAVY)).encode()
+        asked = process("query", "-", *flags, given=heavy)
+        assert (asked.returncode, asked.stderr) == (OVERLOADED, b"")
+        assert asked.stdout.startswith(b"OVERLOADED")
+        twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
+        asked = process("query", stance(twice), *flags, "--json")
+        assert (asked.returncode, asked.stdout) == (BAD_INPUT, b"")
+        assert asked.stderr.startswith(b"crux: stance.hands[1].limb: limb 'front_right' appears")
+        taken = process("serve", "-l", server.endpoint, "--no-multicast-scouting", "--json")
+        assert (taken.returncode, taken.stdout) == (FAILED, b"")
+        assert taken.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
+    finally:
+        server.process.terminate()
+        server.process.communicate()
+    asked = process("query", stance(wall_request()), *flags, "--json")
+    assert (asked.returncode, asked.stdout) == (FAILED, b"")
+    assert asked.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
+
+
+def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
+    arguments = ["query", stance(wall_request()), "--no-multicast-scouting", "-l", free_endpoint()]
+    asked = subprocess.run(
+        [sys.executable, "-m", "service.command", *arguments, "--json"],
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},
+        timeout=60,
+        check=False,
+    )
+    assert (asked.returncode, asked.stdout) == (FAILED, b"")
+    assert b"DEBUG" in asked.stderr
+    assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
+
+
+@pytest.mark.parametrize(
+    ("flags", "line"),
+    [
+        (["--cfg", "colour:1"], "crux: --cfg: colour: "),
+        (["-c", "/nowhere.json5"], "crux: --config: "),
+        (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
+        (["--timeout", "0"], "crux: Invalid value for '--timeout'"),
+    ],
+)
+def test_bad_flags(flags: list[str], line: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["query", stance(wall_request()), *flags]) == BAD_INPUT
+    assert complaint(capfd).startswith(line)
+
+
+# The rest -----------------------------------------------------------------------------------------
+
+
+def test_demo(tmp_path: Path) -> None:
+    picture = tmp_path / "demo.png"
+    shown = process("demo", "-o", str(picture), "--json")
+    assert shown.stderr == b""
+    assert shown.returncode in (DONE, OVERLOADED)
+    assert json.loads(shown.stdout)["verified"] is True
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_schema(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["schema", "--json"]) == DONE
+    assert "PlanRequest" in result(capfd)["$defs"]
+    assert run(["schema"]) == DONE
+    assert "PlanRequest" in json.loads(capfd.readouterr().out)["$defs"]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["plan"], ["plan", "--fast"], ["wrench-space", "x"]]
+)
+def test_wrong_usage_is_one_line(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments) == BAD_INPUT
+    complaint(capfd)
+
+
+def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == DONE
+    out = capfd.readouterr().out
+    for name in command.crux.commands:
+        assert f"  {name} " in out

@@ -1,0 +1,538 @@
+"""What travels: strict requests, errors that name the field, replies that a caller can check."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import random
+
+import msgspec
+import numpy as np
+import pytest
+from asked import (
+    HAND,
+    HEAVY,
+    JSON,
+    LATER,
+    MSGPACK,
+    at,
+    dotted,
+    drop,
+    flat_request,
+    full_request,
+    paths,
+    put,
+    spoil,
+    wall_request,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hand_models.errors import EmptySetError, InvalidInputError, SolverError, UnsupportedError
+from hand_models.frames import Pose, wrench_transport
+from planner import solve
+from service import dispatch
+from service.codec import LARGEST_REQUEST, Format, decode_request
+from service.errors import MalformedError
+from service.questions import question
+from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
+from service.requests import PlanRequest, WrenchSpaceRequest
+from service.schema import MESSAGES, schema
+
+PLAN = "crux/robosimian/plan"
+WRENCH_SPACE = "crux/robosimian/wrench_space"
+FRONT = ("stance", "hands", 0)
+KINDS = {"malformed", "invalid", "unsupported"}
+
+
+def read(request: object) -> PlanRequest:
+    return decode_request(msgspec.json.encode(request), PlanRequest)
+
+
+def refusal(request: object, key: str = PLAN, form: str = JSON) -> tuple[str, str | None, str]:
+    """Kind, field and message of the error that a request gets."""
+    encode = msgspec.msgpack.encode if "msgpack" in form else msgspec.json.encode
+    answer = dispatch.handle(key, encode(request), form)
+    assert not answer.good
+    error = Format.named(answer.encoding).decode(answer.payload, ErrorReply).error
+    assert "\n" not in error.message
+    return error.kind, error.field, error.message
+
+
+def reply_to(request: object, form: str = JSON) -> PlanReply:
+    encode = msgspec.msgpack.encode if "msgpack" in form else msgspec.json.encode
+    answer = dispatch.handle(PLAN, encode(request), form)
+    assert answer.good, answer.payload
+    return Format.named(answer.encoding).decode(answer.payload, PlanReply)
+
+
+# Requests -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", Format)
+def test_a_request_survives_the_journey(form: Format) -> None:
+    request = read(full_request())
+    assert decode_request(form.encode(request), PlanRequest, form) == request
+
+
+def test_defaults_do_not_travel() -> None:
+    sent = json.loads(msgspec.json.encode(read(wall_request())))
+    assert set(sent) == {"v", "id", "stance", "load"}
+    assert set(sent["stance"]["hands"][0]) == {"limb", "pose", "hold", "surface", "grasp"}
+
+
+def test_null_means_left_out() -> None:
+    request = wall_request()
+    spelled = request | {"body_wrench": None, "confidence": None, "deadline": None}
+    assert read(spelled) == read(request)
+
+
+def test_a_request_becomes_a_question() -> None:
+    asked = question(read(full_request()))
+    plane, sphere, edge, cylinder = asked.stance.hands
+    assert [h.hold.shape for h in asked.stance.hands] == ["plane", "sphere", "edge", "cylinder"]
+    assert plane.placed_hold() is None
+    np.testing.assert_allclose(sphere.placed_hold().position, [0.0, 0.0, 0.003])
+    assert (edge.hold.fillet_radius, edge.hold.angle) == (0.05, 2.0)
+    assert (edge.grasp.outer_rotation, edge.grasp.closing_tension) == (0.5, 30.0)
+    assert (cylinder.surface.pull_off_limit, cylinder.surface.half_planes) == (15.0, 3)
+    assert asked.stance.gravity.tolist() == [0.0, 0.0, -3.7]
+    assert asked.load.acceleration == (0.0, 0.0, 0.2)
+    assert (asked.limits.utilisation, asked.limits.tendon_tension) == (0.8, 150.0)
+    assert asked.want == {"load_factor", "prices", "model"}
+    np.testing.assert_allclose(
+        asked.needed_wrench()[:3], asked.stance.body.rotation.T @ [0.0, 0.0, 390.0]
+    )
+
+
+def test_hold_placed_in_the_world() -> None:
+    request = wall_request()
+    hand = request["stance"]["hands"][0]
+    hand["hold"]["pose"] = hand["pose"]
+    placed = question(read(request)).stance.hands[0].placed_hold()
+    np.testing.assert_allclose(placed.position, 0.0, atol=1e-12)
+    np.testing.assert_allclose(placed.rotation, np.eye(3), atol=1e-12)
+
+
+def test_every_missing_field_is_named() -> None:
+    optional = {"id", "load", "grasp", "outer_rotation", "com", "mass"}
+    request = wall_request()
+    for path in paths(request)[1:]:
+        if path[-1] in optional or not isinstance(path[-1], str):
+            continue
+        kind, field, message = refusal(drop(request, path))
+        assert (kind, field, message) == ("invalid", dotted(path), "missing")
+
+
+def test_an_unknown_field_is_named_wherever_it_is() -> None:
+    request = full_request()
+    for path in paths(request):
+        if isinstance(at(request, path), dict):
+            where = (*path, "colour")
+            kind, field, message = refusal(put(request, where, 1))
+            assert (kind, field) == ("invalid", dotted(where))
+            assert "unknown field; known are " in message
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_no_number_may_be_other_than_finite(number: float) -> None:
+    request = full_request() | {"body_wrench": [0.0, 0.0, 10.0, 0.0, 0.0, 0.0]}
+    floats = [p for p in paths(request) if type(at(request, p)) is float]
+    assert len(floats) > 60
+    for path in floats:
+        kind, field, _ = refusal(put(request, path, number), form=MSGPACK)
+        assert (kind, field) == ("invalid", dotted(path))
+
+
+@pytest.mark.parametrize("token", ["NaN", "Infinity", "1e999", "-1e999"])
+def test_json_has_no_infinite_numbers_either(token: str) -> None:
+    text = json.dumps(wall_request(mass=12345.0)).replace("12345.0", token)
+    answer = dispatch.handle(PLAN, text.encode())
+    assert not answer.good
+
+
+INVALID = [
+    (("v",), 2, "v", "2 is not known; valid: 1"),
+    (("stance", "robot"), "loris", "stance.robot", "known are robosimian"),
+    (("stance", "hands"), [], "stance.hands", "at least one hand"),
+    (("stance", "gravity"), [0.0, 0.0], "stance.gravity", "length 3"),
+    (("stance", "body", "position", 1), 2e4, "stance.body.position[1]", "a number <= 10000"),
+    (
+        ("stance", "body", "orientation"),
+        [0.0, 0.0, 0.0, 1.01],
+        "stance.body.orientation",
+        "the norm is 1.01",
+    ),
+    ((*FRONT, "limb"), "nose", f"{HAND}.limb", "known are front_right"),
+    ((*FRONT, "limb"), 3, f"{HAND}.limb", "a string, got a whole number"),
+    ((*FRONT, "pose", "orientation"), [0.0] * 4, f"{HAND}.pose.orientation", "the norm is 0"),
+    ((*FRONT, "hold", "shape"), "cone", f"{HAND}.hold.shape", "plane, cylinder, sphere, edge"),
+    ((*FRONT, "hold", "diameter"), -0.3, f"{HAND}.hold.diameter", "a number >= 0.001"),
+    ((*FRONT, "surface"), "butter", f"{HAND}.surface", "unknown surface 'butter'; known are"),
+    ((*FRONT, "surface"), {"shear_limit": 0.0}, f"{HAND}.surface.shear_limit", ">= 0.001"),
+    ((*FRONT, "surface"), 3, f"{HAND}.surface", "a string or an object"),
+    ((*FRONT, "grasp", "outer_rotation"), 4.0, f"{HAND}.grasp.outer_rotation", "<= 3.14"),
+    ((*FRONT, "grasp", "palm"), 1, f"{HAND}.grasp.palm", "true or false"),
+    ((*FRONT, "wrist"), "limp", f"{HAND}.wrist", "'limp' is not known; valid: fixed, floating"),
+    (("load", "mass"), "heavy", "load.mass", "a number or null, got a string"),
+    (("load", "acceleration"), None, "load.acceleration", "a list"),
+    (("body_wrench",), [0.0] * 6, "body_wrench", "give body_wrench or load, not both"),
+    (("objective",), "fun", "objective", "valid: max_margin, max_reliability, min_effort"),
+    (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
+    (("want",), ["model", "price"], "want[1]", "valid: load_factor, model, prices"),
+    (("id",), "x" * 257, "id", "length <= 256"),
+    ((), [], None, "expected an object, got a list"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "field", "hint"), INVALID)
+def test_a_bad_value_is_named_with_what_would_be_valid(
+    path: tuple, value: object, field: str | None, hint: str
+) -> None:
+    kind, blamed, message = refusal(put(wall_request(), path, value))
+    assert (kind, blamed) == ("invalid", field)
+    assert hint in message
+
+
+def test_errors_of_the_models_come_with_the_whole_path() -> None:
+    request = wall_request()
+    own = {"shear_limit": 20.0, "pull_off_limit": 30.0}
+    field = refusal(put(request, (*FRONT, "surface"), own))[1]
+    assert field == "stance.hands[0].surface.pull_off_limit"
+    twice = put(request, ("stance", "hands", 1, "limb"), "front_right")
+    assert refusal(twice)[1] == "stance.hands[1].limb"
+    home = request["stance"]["hands"][2]["pose"]
+    hold = {"shape": "plane", "pose": home, "pose_in_hand": home}
+    assert refusal(put(request, ("stance", "hands", 2, "hold"), hold))[1] == "stance.hands[2].hold"
+    deep = {"position": [0.0, 0.0, -0.05], "orientation": [0.0, 0.0, 0.0, 1.0]}
+    hold = {"shape": "plane", "pose_in_hand": deep}
+    kind, field, message = refusal(put(request, ("stance", "hands", 3, "hold"), hold))
+    assert (kind, field) == ("invalid", "stance.hands[3].hold")
+    assert "inside the palm" in message
+
+
+@pytest.mark.parametrize(("path", "value", "field"), LATER)
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_what_later_versions_will_do_is_refused_by_name(
+    path: tuple, value: object, field: str, form: str
+) -> None:
+    kind, blamed, message = refusal(put(wall_request(), path, value), form=form)
+    assert (kind, blamed) == ("unsupported", field)
+    assert "not supported in this version; " in message
+
+
+@pytest.mark.parametrize("shape", ["ellipsoid", "profile", "mesh"])
+def test_shapes_to_come(shape: str) -> None:
+    hold = {"shape": shape, "semi_axes": [0.1, 0.2, 0.3]}
+    kind, field, message = refusal(put(wall_request(), (*FRONT, "hold"), hold))
+    assert (kind, field) == ("unsupported", "stance.hands[0].hold.shape")
+    assert "plane, cylinder, sphere and edge" in message
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding"),
+    [
+        (b"", JSON),
+        (b"{", JSON),
+        (b"\xff\xfe", JSON),
+        (b'{"v": 1, "id": "\xff"}', JSON),
+        (b'{"v": 1, "id": "\\ud800"}', JSON),
+        (b"\xc1", MSGPACK),
+        (b"\x81\xa1v", MSGPACK),
+        (b"{}", "image/png"),
+        (b"{}", "application/jsonp"),
+        (b" " * (LARGEST_REQUEST + 1), JSON),
+        (b'{"v":1,"deadline":' + b"[" * 400_000, JSON),
+        (b"\x82\xa1v\x01\xa8deadline" + b"\x91" * 400_000, MSGPACK),
+    ],
+)
+def test_bytes_that_are_no_message(payload: bytes, encoding: str) -> None:
+    answer = dispatch.handle(PLAN, payload, encoding)
+    error = Format.named(answer.encoding).decode(answer.payload, ErrorReply).error
+    assert not answer.good
+    assert error.kind == "malformed"
+    assert len(answer.payload) < 1000
+
+
+def test_errors_do_not_grow_with_the_request() -> None:
+    for key, value in itertools.product(("x" * 500_000, "id"), ("y" * 500_000,)):
+        answer = dispatch.handle(PLAN, msgspec.json.encode({key: value}))
+        assert len(answer.payload) < 2000
+
+
+@pytest.mark.parametrize(
+    ("encoding", "form"),
+    [
+        ("", Format.JSON),
+        ("zenoh/bytes", Format.JSON),
+        ("text/json", Format.JSON),
+        ("application/json;crux.PlanRequest@1", Format.JSON),
+        ("Application/MsgPack; crux.PlanReply@1", Format.MSGPACK),
+    ],
+)
+def test_names_of_encodings(encoding: str, form: Format) -> None:
+    assert Format.named(encoding) is form
+
+
+# Replies ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_a_reply_can_be_checked_with_nothing_but_it_and_the_request(form: str) -> None:
+    request = wall_request() | {"want": ["model", "load_factor", "prices"]}
+    reply = reply_to(request, form)
+    assert (reply.v, reply.id, reply.status, reply.verified) == (1, "wall", "optimal", True)
+    body = _pose(request["stance"]["body"]).inverse()
+    balance = -np.array(reply.body_wrench)
+    for asked, hand in zip(request["stance"]["hands"], reply.hands, strict=True):
+        assert hand.limb == asked["limb"]
+        palm = np.array(hand.palm.force)
+        total = np.concatenate([palm, np.cross(hand.palm.position, palm) + hand.palm.moment])
+        loads = {}
+        for finger in hand.fingers:
+            loads[f"{finger.name}/tension"] = finger.tendon_tension
+            assert [t.phalanx for t in finger.tiles[-3:]] == ["proximal", "middle", "distal"]
+            assert len(finger.tiles) == (4 if finger.name.startswith("outer") else 3)
+            for tile in finger.tiles:
+                force = (
+                    tile.shear * np.array(tile.shear_axis)
+                    + tile.normal * np.array(tile.normal_axis)
+                    + tile.lateral * np.array(tile.lateral_axis)
+                )
+                np.testing.assert_allclose(tile.force, force, atol=1e-9)
+                total += np.concatenate([tile.force, np.cross(tile.position, tile.force)])
+                law = np.array(tile.load_at_zero) + finger.tendon_tension * np.array(
+                    tile.load_per_newton
+                )
+                np.testing.assert_allclose([tile.shear, tile.normal], law, atol=1e-9)
+                assert any(a[2] < 0 for a in tile.half_planes)
+                if tile.contact != "none":
+                    load = (tile.shear, tile.normal, tile.lateral)
+                    used = max(np.dot(a[:3], load) / a[3] for a in tile.half_planes)
+                    assert tile.utilisation == pytest.approx(max(used, 0.0), abs=1e-9)
+                assert tile.utilisation <= hand.utilisation + 1e-9
+        np.testing.assert_allclose(hand.wrench, total, atol=1e-6)
+        assert hand.utilisation <= reply.utilisation + 1e-9
+        balance -= wrench_transport(body @ _pose(asked["pose"])) @ hand.wrench
+        _check_rows(hand, loads, reply.utilisation)
+    np.testing.assert_allclose(balance, reply.residual, atol=1e-9)
+    assert np.abs(balance).max() < 1e-3
+    assert reply.load_factor > 1.0
+    assert reply.limiting.limb in {hand.limb for hand in reply.hands}
+    assert all(price.price > 0.0 for price in reply.prices)
+
+
+def _pose(message: dict) -> Pose:
+    return Pose.from_quaternion(message["position"], message["orientation"])
+
+
+def _check_rows(hand, loads: dict[str, float], utilisation: float) -> None:
+    """The reply's own loads satisfy the rows of its wrench space, and give its wrench."""
+    space = hand.wrench_space
+    loads["palm_shear"], loads["palm_pressing"] = -hand.palm.force[0], hand.palm.force[2]
+    lateral = {
+        f"{finger.name}/lateral": sum(tile.lateral for tile in finger.tiles)
+        for finger in hand.fingers
+    }
+    y = np.array([(loads | lateral)[generator.name] for generator in space.generators])
+    V = np.array([generator.wrench for generator in space.generators]).T
+    np.testing.assert_allclose(np.array(space.origin) + V @ y, hand.wrench, atol=1e-6)
+    for row in space.rows:
+        load = np.dot(row.coefficients, y) + row.constant
+        allowed = row.capacity * utilisation if row.kind == "limit" else row.capacity
+        assert load <= allowed + 1e-5, row.name
+    assert len({row.name for row in space.rows}) == len(space.rows)
+
+
+def test_every_field_of_the_contract_is_there_and_nothing_of_the_model_unasked() -> None:
+    answer = dispatch.handle(PLAN, msgspec.json.encode(wall_request()))
+    reply = json.loads(answer.payload)
+    assert set(reply) >= {
+        "v", "id", "status", "body_wrench", "utilisation", "load_factor",
+        "load_factor_unbounded", "survival_probability", "limiting", "hands", "joint_torque",
+        "prices", "certificate", "residual", "verified", "solver", "time", "reason",
+    }  # fmt: skip
+    finger = reply["hands"][0]["fingers"][0]
+    assert set(finger) == {"name", "tendon_tension", "motor_torque", "motor_current", "tiles"}
+    assert reply["survival_probability"] is reply["joint_torque"] is reply["prices"] is None
+    assert "load_at_zero" not in finger["tiles"][0]
+    assert "wrench_space" not in reply["hands"][0]
+
+
+def test_an_infeasible_stance_comes_with_its_certificate() -> None:
+    request = flat_request()
+    request["stance"]["hands"][0]["grasp"]["palm"] = False
+    reply = reply_to(request)
+    assert reply.status == "infeasible"
+    assert reply.hands is None
+    assert reply.utilisation is None
+    proof = reply.certificate
+    asked = np.dot(np.multiply(proof.direction, proof.scale), reply.body_wrench)
+    assert proof.needed == pytest.approx(asked)
+    assert proof.supremum < proof.needed
+    np.testing.assert_allclose(np.add(proof.nearest, proof.shortfall), reply.body_wrench)
+
+
+def test_an_overloaded_stance_still_has_its_best_plan() -> None:
+    reply = reply_to(wall_request(HEAVY))
+    assert reply.status == "overloaded"
+    assert reply.utilisation > 1.0
+    assert reply.hands
+
+
+def wrench_space_request(limb: str = "front_left") -> dict:
+    return {"v": 1, "stance": flat_request()["stance"], "limb": limb}
+
+
+def test_a_wrench_space_and_its_views_agree() -> None:
+    answer = dispatch.handle(WRENCH_SPACE, msgspec.json.encode(wrench_space_request()))
+    assert answer.good, answer.payload
+    assert answer.encoding == "application/json;crux.WrenchSpaceReply@1"
+    reply = msgspec.json.decode(answer.payload, type=WrenchSpaceReply)
+    assert (reply.robot, reply.limb) == ("robosimian", "front_left")
+    assert reply.seating.rule == "pinch"
+    assert reply.seating.pose.position[2] == pytest.approx(2.3e-3, abs=1e-4)
+    assert [limit.finger for limit in reply.tension_limits] == [
+        "outer_left", "inner_left", "inner_right", "outer_right",
+    ]  # fmt: skip
+    assert len(reply.contacts) == 14
+    vertices = np.array(reply.vertices)
+    faces = reply.half_spaces
+    assert (vertices @ np.array(faces.normals).T <= np.array(faces.offsets) + 1e-6).all()
+    flat = vertices @ np.array(faces.equations.normals).T
+    np.testing.assert_allclose(
+        flat, np.tile(faces.equations.offsets, (len(vertices), 1)), atol=1e-6
+    )
+    assert reply.dimension == 6 - len(faces.equations.offsets)
+    assert reply.volume > 0.0
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    assert set(reply.capability) == {sign + axis for sign in "+-" for axis in axes}
+    for i, axis in enumerate(axes):
+        for sign, factor in (("+", 1.0), ("-", -1.0)):
+            reach = reply.capability[sign + axis]
+            extent = (factor * vertices[:, i]).max()
+            assert reach.extent == pytest.approx(extent, abs=1e-6)
+            assert reach.pure is None or -1e-6 <= reach.pure <= reach.extent + 1e-6
+    assert {row.kind for row in reply.rows} == {"limit", "hard"}
+    assert all(row.constant == 0.0 for row in reply.rows if row.kind == "hard")
+
+
+def test_a_hand_that_is_not_there() -> None:
+    kind, field, message = refusal(wrench_space_request("rear_left"), WRENCH_SPACE)
+    assert (kind, field) == ("invalid", "limb")
+    assert "front_left" in message
+
+
+def test_numbers_that_do_not_exist_are_null(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hand_models.fixed_wrist import TensionLimit
+
+    endless = (TensionLimit("inner_left", math.inf, None),)
+    monkeypatch.setattr(dispatch, "tension_limits", lambda _: endless)
+    request = msgspec.msgpack.encode(wrench_space_request())
+    answer = dispatch.handle(WRENCH_SPACE, request, MSGPACK)
+    reply = msgspec.msgpack.decode(answer.payload, type=WrenchSpaceReply)
+    assert reply.tension_limits[0].tension is None
+
+
+@pytest.mark.parametrize(
+    ("error", "kind"),
+    [
+        (InvalidInputError("no", field="stance.hands[0]"), "invalid"),
+        (UnsupportedError("no", field="stance"), "unsupported"),
+        (SolverError("no"), "internal"),
+        (RuntimeError("no"), "internal"),
+        (RecursionError("no"), "internal"),
+        (MemoryError("no"), "internal"),
+    ],
+)
+def test_whatever_the_planner_does_the_caller_gets_an_error(
+    error: Exception, kind: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(solve, "plan", fail)
+    got, _, message = refusal(wall_request())
+    assert got == kind
+    assert ("Traceback" in caplog.text) == (kind == "internal")
+    if kind == "internal":
+        assert type(error).__name__ in message
+
+
+def test_a_hand_that_can_carry_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def empty(*_: object) -> None:
+        raise EmptySetError("nothing is left")
+
+    monkeypatch.setattr(dispatch, "wrench_space_reply", empty)
+    kind, field, _ = refusal(wrench_space_request(), WRENCH_SPACE)
+    assert (kind, field) == ("invalid", "limb")
+
+
+# Schema -------------------------------------------------------------------------------------------
+
+
+def test_the_schema_names_every_message_and_every_part_of_it() -> None:
+    whole = schema()
+    text = json.dumps(whole)
+    defined = set(whole["$defs"])
+    assert {message.__name__ for message in MESSAGES} <= defined
+    wanted = {ref.split('"')[0] for ref in text.split("#/$defs/")[1:]}
+    assert wanted <= defined
+    request = whole["$defs"]["PlanRequest"]
+    assert request["additionalProperties"] is False
+    assert set(request["required"]) == {"v", "stance"}
+    assert request["properties"]["v"]["enum"] == [1]
+    assert "not supported" in request["properties"]["deadline"]["description"]
+
+
+def test_replies_may_gain_fields() -> None:
+    answer = dispatch.handle(PLAN, msgspec.json.encode(wall_request()))
+    grown = json.loads(answer.payload) | {"news": {"of": ["a later version"]}}
+    Format.JSON.decode(json.dumps(grown).encode(), PlanReply)
+
+
+# Fuzz ---------------------------------------------------------------------------------------------
+
+
+def check_answer(answer: dispatch.Answer, what: object) -> str:
+    """An answer is a plan that says what it is, or an error that is the request's."""
+    form = Format.named(answer.encoding)
+    if answer.good:
+        reply = form.decode(answer.payload, PlanReply)
+        assert reply.status in {"optimal", "overloaded", "infeasible", "failed"}, what
+        assert reply.verified == (reply.status != "failed"), what
+        return reply.status
+    error = form.decode(answer.payload, ErrorReply).error
+    assert error.kind in KINDS, (error, what)
+    return error.kind
+
+
+def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
+    chance = random.Random(20260)
+    seen: dict[str, int] = {}
+    for i in range(2000):
+        request = flat_request() if i % 4 else full_request()
+        payload, encoding = spoil(request, chance)
+        outcome = check_answer(dispatch.handle(PLAN, payload, encoding), (i, payload[:2000]))
+        seen[outcome] = seen.get(outcome, 0) + 1
+    assert seen["invalid"] > 500
+    assert seen["malformed"] > 50
+    assert seen["unsupported"] > 10
+    assert sum(seen.get(status, 0) for status in ("optimal", "overloaded", "infeasible")) > 100
+
+
+@settings(max_examples=200, deadline=None)
+@given(payload=st.binary(max_size=300), form=st.sampled_from([JSON, MSGPACK]))
+def test_random_bytes_are_never_more_than_an_error(payload: bytes, form: str) -> None:
+    answer = dispatch.handle(PLAN, payload, form)
+    assert not answer.good
+
+
+def test_malformed_errors_are_the_callers() -> None:
+    with pytest.raises(MalformedError, match="not json"):
+        decode_request(b"{", PlanRequest)
+    with pytest.raises(InvalidInputError, match=r"limb: missing"):
+        decode_request(
+            msgspec.json.encode({"v": 1, "stance": flat_request()["stance"]}), WrenchSpaceRequest
+        )
