@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import UNSET
 
+from hand_models.errors import EmptySetError
 from hand_models.fixed_wrist import TensionLimit
 from hand_models.frames import Array
 from hand_models.hand import Seating, SettledHand
@@ -61,15 +63,22 @@ def wrench_space_reply(
 ) -> replies.WrenchSpaceReply:
     """Return one hand's wrench space as a reply, with its views at utilisation 1.
 
+    Where nothing is left at utilisation 1 there are no vertices, and the other views are null.
+
     Raises
     ------
-    EmptySetError
-        If nothing is left at utilisation 1.
     SolverError
         If a view could not be computed.
     """
-    faces = space.half_spaces()
-    volume, dimension = space.volume()
+    try:
+        views = _Views(
+            vertices=_vectors(space.vertices()),
+            half_spaces=_half_spaces(space),
+            dimension=space.dimension,
+            capability=_capability(space),
+        )
+    except EmptySetError:
+        views = _Views([], None, None, None)
     parts = _wrench_set(space)
     return replies.WrenchSpaceReply(
         robot=robot,
@@ -96,17 +105,27 @@ def wrench_space_reply(
         origin=parts.origin,
         generators=parts.generators,
         rows=parts.rows,
-        vertices=_vectors(space.vertices()),
-        half_spaces=replies.HalfSpaces(
-            _vectors(faces.normals),
-            _vector(faces.offsets),
-            replies.HalfSpaceEquations(
-                _vectors(faces.equation_normals), _vector(faces.equation_offsets)
-            ),
+        **views._asdict(),
+    )
+
+
+class _Views(NamedTuple):
+    """What a reply says of a set at utilisation 1."""
+
+    vertices: list[list[float]]
+    half_spaces: replies.HalfSpaces | None
+    dimension: int | None
+    capability: dict[str, replies.AxisCapability] | None
+
+
+def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
+    faces = space.half_spaces()
+    return replies.HalfSpaces(
+        _vectors(faces.normals),
+        _vector(faces.offsets),
+        replies.HalfSpaceEquations(
+            _vectors(faces.equation_normals), _vector(faces.equation_offsets)
         ),
-        dimension=int(dimension),
-        volume=float(volume),
-        capability=_capability(space),
     )
 
 

@@ -68,7 +68,7 @@ def check(value: object, path: str = "") -> None:
             f"{shape} is not supported in this version; {_SHAPES}", field=f"{path}.shape"
         )
     elif isinstance(value, msgspec.Struct):
-        later = LATER.get(type(value), {})
+        later = {k: v for kind in type(value).__mro__ for k, v in LATER.get(kind, {}).items()}
         for name in value.__struct_fields__:
             part, field = getattr(value, name), f"{path}.{name}" if path else name
             if name in later and part != later[name].supported:

@@ -31,7 +31,7 @@ from service.errors import REQUEST_KINDS
 from service.replies import PlanReply
 from service.requests import PlanRequest, Want, WrenchSpaceRequest
 from service.schema import schema as message_schema
-from service.stances import read_request
+from service.stances import read_request, read_route
 from service.tables import console, print_plan, print_wrench_space
 
 __all__ = ["crux", "main", "run"]
@@ -145,14 +145,14 @@ def _without_palms(request: PlanRequest) -> PlanRequest:
     help="Draw it there.",
 )
 @json_option
-def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) -> None:
+def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) -> int:
     """Show what one hand can carry."""
     from planner import solve
     from service import dispatch, questions
 
     request = WrenchSpaceRequest(v=1, stance=read_request(stance).stance, limb=limb)
     reply = dispatch.wrench_space(request)
-    if picture is not None:
+    if picture is not None and reply.vertices:
         from planner import plots
 
         settled, space = solve.hand_space(questions.stance(request.stance), limb)
@@ -161,6 +161,7 @@ def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) ->
         _say(reply)
     else:
         print_wrench_space(reply, console())
+    return DONE if reply.vertices else OVERLOADED
 
 
 @crux.command()
@@ -264,6 +265,52 @@ def demo(picture: Path, as_json: bool) -> int:
     if not as_json:
         console().print(f"picture: {picture}", markup=False)
     return status
+
+
+@crux.command()
+@click.argument("route")
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    metavar="DIR",
+    help="Where the table, the picture and the summary go.",
+)
+@click.option(
+    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
+)
+@json_option
+def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
+    """Evaluate a climb: every stance, and every one with a limb in the air.
+
+    ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
+    """
+    from rich.progress import Progress
+
+    from planner.report import summary, write_report
+    from planner.route import evaluate
+    from service import questions
+    from service.climb import print_route
+
+    climb = questions.route(read_route(route))
+    with Progress(console=console(stderr=True), transient=True, disable=as_json) as bar:
+        task = bar.add_task(f"planning {climb.name}", total=None)
+        result = evaluate(
+            climb, workers, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    try:
+        files = write_report(result, folder)
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+    if as_json:
+        _say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
+    else:
+        print_route(result, files, console())
+    if result.feasible:
+        return DONE
+    return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
 
 
 @crux.command()

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from hand_models.errors import CruxError, EmptySetError, InvalidInputError
+from hand_models.errors import CruxError, InvalidInputError
 from hand_models.fixed_wrist import tension_limits
 from planner import solve
 from service.answers import plan_reply, wrench_space_reply
@@ -59,15 +59,12 @@ def wrench_space(request: WrenchSpaceRequest) -> WrenchSpaceReply:
     Raises
     ------
     InvalidInputError
-        If the request is impossible, or the hand can carry nothing at utilisation 1.
+        If the request is impossible.
     """
     settled, space = solve.hand_space(stance(request.stance), request.limb)
-    try:
-        return wrench_space_reply(
-            request.stance.robot, request.limb, settled, space, tension_limits(settled)
-        )
-    except EmptySetError as error:
-        raise InvalidInputError(error.message, field="limb") from None
+    return wrench_space_reply(
+        request.stance.robot, request.limb, settled, space, tension_limits(settled)
+    )
 
 
 class _Service(NamedTuple):

@@ -15,10 +15,11 @@ from hand_models.frames import Pose
 from hand_models.hand import Grasp
 from hand_models.spines import Surface
 from planner.robosimian import Robot, robosimian
+from planner.route import Move, Route
 from planner.stance import EARTH, HandOnHold, Limits, Load, Question, Stance
 from service import requests
 
-__all__ = ["ROBOTS", "question", "stance"]
+__all__ = ["ROBOTS", "question", "route", "stance"]
 
 ROBOTS: Final[dict[str, Callable[[], Robot]]] = {"robosimian": robosimian}
 
@@ -42,15 +43,32 @@ def question(request: requests.PlanRequest) -> Question:
     """
     if request.body_wrench is not None and request.load is not None:
         raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
-    load, limits = request.load or requests.Load(), request.limits
-    with _within("limits"):
-        caps = Limits(limits.utilisation, limits.tendon_tension)
     return Question(
         stance=stance(request.stance),
         body_wrench=None if request.body_wrench is None else np.array(request.body_wrench),
-        load=Load(load.mass, load.com, load.acceleration),
-        limits=caps,
+        load=_load(request.load),
+        limits=_limits(request.limits),
         want=frozenset(request.want),
+    )
+
+
+def route(request: requests.RouteRequest) -> Route:
+    """Return the climb of a route file.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field is relative to the file.
+    """
+    return Route(
+        name=request.name,
+        start=stance(request.stance),
+        moves=tuple(
+            Move(_hand(move, f"moves[{i}]"), _pose(move.body, f"moves[{i}].body"))
+            for i, move in enumerate(request.moves)
+        ),
+        load=_load(request.load),
+        limits=_limits(request.limits),
     )
 
 
@@ -68,15 +86,25 @@ def stance(message: requests.Stance) -> Stance:
                 f"unknown robot {message.robot!r}; known are {', '.join(ROBOTS)}", field="robot"
             )
         return Stance(
-            hands=tuple(_hand(hand, i) for i, hand in enumerate(message.hands)),
+            hands=tuple(_hand(hand, f"hands[{i}]") for i, hand in enumerate(message.hands)),
             body=_pose(message.body, "body"),
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
             robot=ROBOTS[message.robot](),
         )
 
 
-def _hand(message: requests.Hand, index: int) -> HandOnHold:
-    with _within(f"hands[{index}]"):
+def _load(message: requests.Load | None) -> Load:
+    message = message or requests.Load()
+    return Load(message.mass, message.com, message.acceleration)
+
+
+def _limits(message: requests.Limits) -> Limits:
+    with _within("limits"):
+        return Limits(message.utilisation, message.tendon_tension)
+
+
+def _hand(message: requests.Hand, path: str) -> HandOnHold:
+    with _within(path):
         with _within("grasp"):
             grasp = Grasp(**msgspec.structs.asdict(message.grasp))
         with _within("surface"):

@@ -276,7 +276,7 @@ class AxisCapability(Struct):
 
 
 class WrenchSpaceReply(Reply, kw_only=True):
-    """What one hand can carry, at utilisation 1."""
+    """What one hand can carry, at utilisation 1: if nothing, no vertices, and null for the rest."""
 
     robot: str
     limb: str
@@ -287,7 +287,6 @@ class WrenchSpaceReply(Reply, kw_only=True):
     generators: list[Generator]
     rows: list[Row]
     vertices: list[Vector]
-    half_spaces: HalfSpaces
-    dimension: int
-    volume: float
-    capability: dict[str, AxisCapability]
+    half_spaces: HalfSpaces | None
+    dimension: int | None
+    capability: dict[str, AxisCapability] | None

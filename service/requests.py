@@ -22,12 +22,14 @@ __all__ = [
     "Limits",
     "Load",
     "Mesh",
+    "Move",
     "Placed",
     "PlanRequest",
     "Plane",
     "Pose",
     "Profile",
     "Request",
+    "RouteRequest",
     "Sphere",
     "Stance",
     "Strict",
@@ -220,3 +222,21 @@ class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
 
     stance: Stance
     limb: Name
+
+
+class Move(Hand, frozen=True, kw_only=True):
+    """One limb to its next hold."""
+
+    body: Annotated[
+        Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
+    ] = None
+
+
+class RouteRequest(Request, frozen=True, kw_only=True):
+    """A climb: a start stance, and moves. Not asked over zenoh; a file of the command line."""
+
+    name: Identifier = "route"
+    stance: Stance
+    load: Load | None = None
+    limits: Limits = Limits()
+    moves: Annotated[list[Move], Meta(max_length=10_000)]

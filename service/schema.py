@@ -7,7 +7,7 @@ from typing import Any, Final
 import msgspec
 
 from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
-from service.requests import PlanRequest, WrenchSpaceRequest
+from service.requests import PlanRequest, RouteRequest, WrenchSpaceRequest
 
 __all__ = ["MESSAGES", "schema"]
 
@@ -16,6 +16,7 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanReply,
     WrenchSpaceRequest,
     WrenchSpaceReply,
+    RouteRequest,
     ErrorReply,
 )
 

@@ -1,22 +1,25 @@
-"""Where the command line finds a stance: a file, standard input, or one of the bundled ones."""
+"""Where the command line finds a stance or a route: a file, standard input, or a bundled one."""
 
 from __future__ import annotations
 
 import sys
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import TypeVar
 
 from hand_models.errors import InvalidInputError
 from service.codec import decode_request
-from service.requests import PlanRequest
+from service.requests import PlanRequest, Request, RouteRequest
 
-__all__ = ["bundled", "read_request"]
+__all__ = ["bundled", "read_request", "read_route"]
+
+R = TypeVar("R", bound=Request)
 
 
-def bundled() -> tuple[str, ...]:
-    """Return the names of the bundled stances."""
-    folder = resources.files("service") / "examples"
-    return tuple(sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".json")))
+def bundled(kind: type[Request] = PlanRequest) -> tuple[str, ...]:
+    """Return the names of the bundled stances, or of the bundled routes."""
+    return tuple(sorted(Path(f.name).stem for f in _folder(kind).iterdir() if _is_json(f)))
 
 
 def read_request(source: str) -> PlanRequest:
@@ -32,18 +35,35 @@ def read_request(source: str) -> PlanRequest:
     InvalidInputError
         If there is none, or it is not a plan request.
     """
+    return _read(source, PlanRequest, "STANCE", "stance")
+
+
+def read_route(source: str) -> RouteRequest:
+    """Return the route that a command was given; as `read_request`."""
+    return _read(source, RouteRequest, "ROUTE", "route")
+
+
+def _folder(kind: type[Request]) -> Traversable:
+    folder = resources.files("service") / "examples"
+    return folder / "routes" if kind is RouteRequest else folder
+
+
+def _is_json(file: Traversable) -> bool:
+    return file.is_file() and file.name.endswith(".json")
+
+
+def _read(source: str, kind: type[R], field: str, noun: str) -> R:
     if source == "-":
-        return decode_request(sys.stdin.buffer.read(), PlanRequest)
+        return decode_request(sys.stdin.buffer.read(), kind)
     path = Path(source)
     if path.is_file():
         try:
-            return decode_request(path.read_bytes(), PlanRequest)
+            return decode_request(path.read_bytes(), kind)
         except OSError as error:
-            raise InvalidInputError(f"{error.strerror}: {source}", field="STANCE") from None
-    if source in bundled():
-        text = resources.files("service") / "examples" / f"{source}.json"
-        return decode_request(text.read_bytes(), PlanRequest)
+            raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
+    if source in bundled(kind):
+        return decode_request((_folder(kind) / f"{source}.json").read_bytes(), kind)
     raise InvalidInputError(
-        f"no such file, and no bundled stance {source!r}; bundled are {', '.join(bundled())}",
-        field="STANCE",
+        f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
+        field=field,
     )

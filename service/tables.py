@@ -11,15 +11,15 @@ from rich.table import Table
 
 from service.replies import AXES, Finger, Hand, PlanReply, Price, Tile, WrenchSpaceReply
 
-__all__ = ["console", "print_plan", "print_wrench_space"]
+__all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
 
 
-def console() -> Console:
-    """Return the console on standard output."""
-    return Console(highlight=False)
+def console(stderr: bool = False) -> Console:
+    """Return the console on standard output, or on standard error."""
+    return Console(highlight=False, stderr=stderr)
 
 
 def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None = None) -> None:
@@ -64,17 +64,20 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
     out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
-    out.print(
-        f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
-        f"dimension {reply.dimension}, volume {reply.volume:.3g} N^{reply.dimension}"
-    )
-    tensions = _table("finger", "phalanx")
+    tensions = table_of("finger", "phalanx")
     tensions.add_column("f_t(max) N", justify="right")
     for limit in reply.tension_limits:
         tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
         tensions.add_row(limit.finger, limit.phalanx or "-", tension)
     _show("tendon tension at which the finger's first tile lets go", tensions, out)
-    reaches = _table("axis")
+    if reply.half_spaces is None or reply.capability is None:
+        out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
+        return
+    out.print(
+        f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
+        f"dimension {reply.dimension}"
+    )
+    reaches = table_of("axis")
     for name in ("pure -", "pure +", "extent -", "extent +"):
         reaches.add_column(name, justify="right")
     for axis in AXES:
@@ -102,7 +105,7 @@ def _show(title: str, table: Table, out: Console) -> None:
     out.print(table)
 
 
-def _table(*names: str) -> Table:
+def table_of(*names: str) -> Table:
     """Return a table with left-justified columns of names."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in names:
@@ -111,7 +114,7 @@ def _table(*names: str) -> Table:
 
 
 def _hand_table(hands: Iterable[Hand]) -> Table:
-    table = _table("hand")
+    table = table_of("hand")
     for name in (*AXES, "palm\nshear", "palm\npress", "util"):
         table.add_column(name, justify="right")
     for hand in hands:
@@ -124,7 +127,7 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
 
 
 def _tendon_table(hands: Iterable[Hand]) -> Table:
-    table = _table("hand", "finger")
+    table = table_of("hand", "finger")
     table.add_column("tension N", justify="right")
     table.add_column("tile")
     table.add_column("util", justify="right")
@@ -144,7 +147,7 @@ def _worst(finger: Finger) -> Tile | None:
 
 
 def _price_table(prices: Iterable[Price]) -> Table:
-    table = _table("hand", "finger", "tile", "limit")
+    table = table_of("hand", "finger", "tile", "limit")
     table.add_column("price 1/N", justify="right")
     for price in prices:
         names = (price.limb, price.finger or "-", price.phalanx or "-", price.limit)

@@ -1,0 +1,251 @@
+"""A climb: its stages, its crux, what is written of it, and processes that die under it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import multiprocessing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_models.errors import InvalidInputError
+from hand_models.frames import Pose
+from planner.report import COLUMNS, summary, write_report
+from planner.route import Route, evaluate, stages
+from planner.solve import plan
+from planner.stance import Limits, Load
+from service import questions
+from service.command import run
+from service.stances import bundled, read_request, read_route
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture(scope="module")
+def route() -> Route:
+    return questions.route(read_route("six-moves"))
+
+
+@pytest.fixture(scope="module")
+def result(route: Route):
+    return evaluate(route)
+
+
+def test_the_bundled_route_has_six_moves_with_a_limb_in_the_air_in_each(route):
+    assert len(route.moves) == 6
+    lifts = [stage for stage in stages(route) if stage.phase == "lift"]
+    assert [stage.move for stage in lifts] == [1, 2, 3, 4, 5, 6]
+    for stage in lifts:
+        limbs = [hand.limb for hand in stage.question.stance.hands]
+        assert len(limbs) == 3
+        assert stage.limb not in limbs
+
+
+def test_a_placed_hand_stays_where_it_was_put(route):
+    todo = list(stages(route))
+    for number, move in enumerate(route.moves, start=1):
+        (placed,) = [s for s in todo if s.move == number and s.phase == "place"]
+        assert move.hand in placed.question.stance.hands
+    last = {hand.limb: hand for hand in todo[-1].question.stance.hands}
+    for move in route.moves:
+        latest = [m.hand for m in route.moves if m.hand.limb == move.hand.limb][-1]
+        assert last[move.hand.limb] is latest
+
+
+def test_the_body_shifts_before_the_limb_lifts_and_stays_there(route):
+    for stage in stages(route):
+        shifts = [m.body for m in route.moves[: stage.move] if m.body is not None]
+        expected = shifts[-1] if shifts else route.start.body
+        assert stage.question.stance.body is expected
+    phases = [s.phase for s in stages(route) if s.move == 2]
+    assert phases == ["shift", "lift", "place"]
+
+
+def test_each_stage_is_planned_as_its_stance_alone_would_be(result):
+    for stage, answer in list(zip(result.stages, result.plans, strict=True))[::5]:
+        alone = plan(stage.question)
+        assert answer.status == alone.status
+        assert answer.utilisation == pytest.approx(alone.utilisation, rel=1e-6)
+        assert answer.load_factor == pytest.approx(alone.load_factor, rel=1e-6)
+
+
+def test_the_crux_is_the_stage_with_the_least_margin_and_no_plan_is_worse_than_any(route, result):
+    used = [p.utilisation for p in result.plans]
+    assert result.crux == int(np.argmax(used))
+    heavy = evaluate(replace(route, load=Load(mass=400.0, com=(0.0, 0.0, 0.4))))
+    statuses = [p.status for p in heavy.plans]
+    worst = heavy.plans[heavy.crux]
+    if "infeasible" in statuses:
+        assert worst.status == "infeasible"
+    else:
+        assert worst.utilisation == max(p.utilisation for p in heavy.plans)
+    assert not heavy.feasible
+
+
+def test_a_cap_on_the_utilisation_can_make_the_crux_too_hard(route, result):
+    cap = 0.9 * result.plans[result.crux].utilisation
+    capped = evaluate(replace(route, limits=Limits(utilisation=cap)))
+    assert result.feasible
+    assert not capped.feasible
+    assert capped.plans[capped.crux].status == "overloaded"
+
+
+def test_the_table_tells_every_stage_and_the_summary_its_crux(result, tmp_path: Path):
+    files = write_report(result, tmp_path / "new" / "folder")
+    with files["table"].open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) == len(result.plans)
+    for row, answer in zip(rows, result.plans, strict=True):
+        assert float(row["utilisation"]) == pytest.approx(answer.utilisation)
+        assert float(row["margin"]) == pytest.approx(1.0 - answer.utilisation)
+        assert float(row["load_factor"]) == pytest.approx(answer.load_factor)
+        assert row["limiting_limb"] == answer.limiting.limb
+    told = json.loads(files["summary"].read_text(encoding="utf-8"))
+    assert told == json.loads(json.dumps(summary(result)))
+    assert told["crux"]["stage"] == result.crux
+    assert "with rear right in the air" in told["crux"]["sentence"]
+    assert files["picture"].read_bytes().startswith(PNG)
+
+
+def test_processes_give_what_one_process_gives_and_tell_their_progress(route, result):
+    seen: list[tuple[int, int]] = []
+    spread = evaluate(route, workers=2, progress=lambda done, total: seen.append((done, total)))
+    assert [p.status for p in spread.plans] == [p.status for p in result.plans]
+    np.testing.assert_allclose(
+        [p.utilisation for p in spread.plans],
+        [p.utilisation for p in result.plans],
+        rtol=1e-6,
+    )
+    count = len(result.plans)
+    assert seen == [(i, count) for i in range(1, count + 1)]
+
+
+def test_a_killed_process_costs_no_stage(route, result):
+    killed = []
+
+    def kill_one(done: int, total: int) -> None:
+        if not killed:
+            child = multiprocessing.active_children()[0]
+            child.kill()
+            killed.append(child.pid)
+
+    survived = evaluate(route, workers=2, progress=kill_one)
+    assert killed
+    np.testing.assert_allclose(
+        [p.utilisation for p in survived.plans],
+        [p.utilisation for p in result.plans],
+        rtol=1e-6,
+    )
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_hold_inside_the_palm_names_its_move(route, workers: int):
+    move = route.moves[2]
+    nearer = Pose(np.array([0.0, 0.0, -0.05]), np.eye(3))
+    into_palm = replace(move.hand, hold_in_hand=nearer)
+    broken = replace(route, moves=(*route.moves[:2], replace(move, hand=into_palm)))
+    with pytest.raises(InvalidInputError, match="inside the palm") as caught:
+        evaluate(broken, workers=workers)
+    assert caught.value.field == "moves[2] (place).stance.hands[0].hold"
+
+
+def test_a_limb_that_holds_nothing_cannot_move(route):
+    lonely = replace(route.start, hands=route.start.hands[:1])
+    with pytest.raises(InvalidInputError) as caught:
+        evaluate(replace(route, start=lonely))
+    assert caught.value.field == "moves[0].limb"
+
+
+def test_the_only_hand_cannot_lift(route):
+    move = next(m for m in route.moves if m.hand.limb == "front_left")
+    hands = tuple(hand for hand in route.start.hands if hand.limb == "front_left")
+    lonely = replace(route, start=replace(route.start, hands=hands), moves=(move,))
+    with pytest.raises(InvalidInputError, match="only hand"):
+        evaluate(lonely)
+
+
+# The bundled stances ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_every_bundled_hand_is_within_its_limbs_reach(name: str):
+    stance = questions.question(read_request(name)).stance
+    for hand in stance.hands:
+        assert stance.robot.stretch(hand.limb, stance.body.inverse() @ hand.pose) < 0.95
+
+
+def test_every_hand_of_the_route_is_within_its_limbs_reach(route):
+    for stage in stages(route):
+        stance = stage.question.stance
+        for hand in stance.hands:
+            assert stance.robot.stretch(hand.limb, stance.body.inverse() @ hand.pose) < 0.95
+
+
+@pytest.mark.parametrize(
+    ("name", "status"),
+    [
+        ("wall-300", "optimal"),
+        ("wall-700", "overloaded"),
+        ("wall", "optimal"),
+        ("overhang", "optimal"),
+        ("slab", "optimal"),
+    ],
+)
+def test_what_the_bundled_stances_come_to(name: str, status: str):
+    answer = plan(questions.question(read_request(name)))
+    assert answer.status == status
+    upper = [h for h in answer.hands if h.limb.startswith("front")]
+    lower = [h for h in answer.hands if h.limb.startswith("rear")]
+    if name != "slab":
+        # the upper hands pull off the rock more than the lower ones
+        assert sum(h.wrench[2] for h in upper) < sum(h.wrench[2] for h in lower)
+    assert sum(h.wrench[2] for h in upper) < 0.0 or name == "slab"
+
+
+# The command ------------------------------------------------------------------------------------
+
+
+def test_route_command_writes_its_files_and_prints_json_alone(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    assert run(["route", "six-moves", "-o", str(tmp_path), "--json"]) == 0
+    told = json.loads(capfd.readouterr().out)
+    assert told["feasible"] is True
+    assert {Path(path).name for path in told["files"].values()} == {
+        path.name for path in tmp_path.iterdir()
+    }
+
+
+def test_route_command_tells_a_person_the_crux(tmp_path, capfd: pytest.CaptureFixture[str]):
+    assert run(["route", "six-moves", "-o", str(tmp_path)]) == 0
+    out = capfd.readouterr().out
+    assert "The crux is move 6" in out
+    assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
+
+
+def test_route_command_ends_with_3_where_it_does_not_go_and_2_for_bad_input(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    text = json.loads(read_text("six-moves"))
+    text["load"] = {"mass": 300.0}
+    hard = tmp_path / "hard.json"
+    hard.write_text(json.dumps(text), encoding="utf-8")
+    assert run(["route", str(hard), "-o", str(tmp_path / "out")]) == 3
+    text["moves"][1]["hold"]["diameter"] = -1.0
+    hard.write_text(json.dumps(text), encoding="utf-8")
+    capfd.readouterr()
+    assert run(["route", str(hard), "-o", str(tmp_path / "out")]) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("crux: moves[1].hold.diameter: ")
+    assert len(error.splitlines()) == 1
+
+
+def read_text(name: str) -> bytes:
+    import service
+
+    folder = Path(service.__file__).parent / "examples" / "routes"
+    return (folder / f"{name}.json").read_bytes()
