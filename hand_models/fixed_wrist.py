@@ -211,13 +211,10 @@ def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:
     """Return f_t(max) of each finger and the phalanx that lets go first (Eqs. 14–15).
 
     With the linear law itself, not its half-planes, and no lateral load. Eq. 15 is a fixed point
-    ``f ← f · f_s(φ(f)) / |f_c(f)|``; here it is found by bracketing, which does not depend on the
-    loading angle staying nearly constant.
-
-    Raises
-    ------
-    SolverError
-        If a finger's tiles are beyond their limits already at the closing tension.
+    ``f ← f · f_s(φ(f)) / |f_c(f)|``; here it is found by bracketing upward from the closing
+    tension, which does not depend on the loading angle staying nearly constant. A tile that is
+    beyond its limit by closing alone gives the largest tension below that is safe, zero if there is
+    none.
     """
     limits = []
     for i, finger in enumerate(FINGERS):
@@ -241,14 +238,26 @@ def _tile_tension_limit(settled: SettledHand, t: int) -> float:
 
     start = settled.closing_tension
     stop = max(10.0 * settled.hand.maximum_tension, 10.0 * start)
+    # tensions at which the load crosses the kinks of the curve, φ = 0 and φ_max: between them what
+    # holds is convex, so that a load that leaves between two samples is still out at the second
+    (t0, t1), (n0, n1) = settled.loads[t].tolist()
+    turns = (0.0, math.tan(settled.surface.pull_off_angle))
+    kinks = [-(n0 + k * t0) / (n1 + k * t1) for k in turns if n1 + k * t1 != 0.0]
     tensions = np.geomspace(start, stop, 400)
-    values = excess(tensions)
-    if values[0] > 0.0:
-        return float(start)
-    beyond = np.flatnonzero(values > 0.0)
+    tensions = np.sort(np.append(tensions, [f for f in kinks if start < f < stop]))
+    beyond = np.flatnonzero(excess(tensions) > 0.0)
     if not len(beyond):
         return math.inf
-    low, high = tensions[beyond[0] - 1], tensions[beyond[0]]
+    if beyond[0] == 0:
+        forward = max(0.0, -t0 / t1)
+        tensions = np.linspace(min(forward, start), start, 400)
+        safe = np.flatnonzero(excess(tensions) <= 0.0)
+        if not len(safe):
+            return 0.0
+        first = safe[-1] + 1
+    else:
+        first = beyond[0]
+    low, high = tensions[first - 1], tensions[first]
     for _ in range(80):
         middle = 0.5 * (low + high)
         if excess(np.array([middle]))[0] > 0.0:

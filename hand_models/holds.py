@@ -39,6 +39,9 @@ PARALLEL: Final = 1e-3
 SAMPLES: Final = 48
 """Angles tried to bracket a root where there is no closed form."""
 
+ZOOMS: Final = 6
+"""How often the samples near a root that may hide between two of them are refined, 8 to 1."""
+
 
 class Tangency(NamedTuple):
     """A tile's face tangent to the rock.
@@ -131,6 +134,8 @@ class RoundSection(Section):
     ) -> float | None:
         distance, bearing = self._polar(joint)
         arm = math.hypot(along, height)
+        if distance == 0.0:
+            return None
         cosine = (arm**2 + distance**2 - self.radius**2) / (2.0 * arm * distance)
         if abs(cosine) > 1.0:
             return None
@@ -199,9 +204,31 @@ class ProfileSection(Section):
 
 
 def _descent(function: Callable[[Array], Array], low: float, high: float) -> float | None:
-    """Return the first angle where a sampled function falls through zero."""
+    """Return the first angle where a sampled function falls through zero.
+
+    Between two samples it may rise above zero and fall again (a face on rock that curves little),
+    or dip below: peaks below zero and troughs above it are therefore sampled more closely.
+    """
     angles = np.linspace(low, high, SAMPLES)
     values = function(angles)
+    for _ in range(ZOOMS):
+        above = values > 0.0
+        falls = np.flatnonzero(above[:-1] & ~above[1:])
+        height = np.where(above, -values, values)
+        beside = np.pad(height, 1, constant_values=-np.inf)
+        alike = np.pad(above, 1, mode="edge")
+        peaks = (height >= beside[:-2]) & (height >= beside[2:])
+        peaks &= (above == alike[:-2]) & (above == alike[2:])
+        # a smooth peak rises above its highest sample by no more than the samples differ there
+        steps = np.abs(np.diff(np.where(np.isfinite(height), height, 0.0)))
+        peaks &= height + np.maximum(np.append(steps, steps[-2]), np.append(steps[1], steps)) > 0.0
+        places = np.flatnonzero(peaks[: falls[0] if len(falls) else None])
+        if not len(places):
+            break
+        left = angles[np.maximum(places - 1, 0)]
+        right = angles[np.minimum(places + 1, len(angles) - 1)]
+        angles = np.unique(np.concatenate([angles, np.linspace(left, right, 17)[1:-1].ravel()]))
+        values = function(angles)
     falls = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
     if not len(falls):
         return None

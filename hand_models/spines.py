@@ -99,7 +99,7 @@ class Surface:
             raise InvalidInputError(
                 f"must not be negative, got {self.compression_gain:g}", field="compression_gain"
             )
-        if not 1 <= self.half_planes <= 64:
+        if not (1 <= self.half_planes <= 64 and self.half_planes == int(self.half_planes)):
             raise InvalidInputError(
                 f"must be a whole number from 1 to 64, got {self.half_planes}", field="half_planes"
             )
@@ -212,7 +212,7 @@ def _pieces(surface: Surface) -> tuple[HalfPlane, ...]:
             surface.shear_limit,
         )
     ]
-    angles = np.linspace(0.0, surface.pull_off_angle, surface.half_planes + 1)
+    angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
     radii = surface.strength(angles)
     # points (shear T, pull P) on the curve
     nodes = [

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -24,9 +23,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, HalfspaceIntersection
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from hand_models.errors import EmptySetError, InvalidInputError, SolverError
+from hand_models.errors import EmptySetError, InvalidInputError, SolverError, UnsupportedError
 from hand_models.frames import Array, Indices, finite_vector
 
 __all__ = ["MOMENT_ARM", "SCALE", "HalfSpaces", "Row", "WrenchSpace"]
@@ -39,6 +38,12 @@ SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
 
 TOLERANCE: Final = 1e-9
 """Relative tolerance of the geometry in this module."""
+
+FLATNESS: Final = 1e-9
+"""A set is flat in a direction in which it reaches less than this times its longest reach."""
+
+MOST_CANDIDATES: Final = 500_000
+"""How many sums of the blocks' vertices are looked through; that many take some 20 s."""
 
 
 class Row(NamedTuple):
@@ -195,33 +200,53 @@ class WrenchSpace:
         return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
 
     @cached_property
-    def _basis(self) -> Array:
-        """Orthonormal basis, shape (r, 6), of the directions of the set's affine hull."""
+    def _axes(self) -> tuple[Array, Array]:
+        """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
+
+        Facets and vertices are found in coordinates along these, divided by the reach: there a
+        thin set is as round as any other, and the normals of its facets are well apart.
+        """
         edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
         if not edges:
-            return np.zeros((0, 6))
-        _, values, basis = np.linalg.svd(np.vstack(edges))
-        rank = int((values > 1e-10 * max(values[0], TOLERANCE)).sum())
-        return np.asarray(basis[:rank])
+            return np.zeros((0, 6)), np.zeros(0)
+        _, reach, directions = np.linalg.svd(np.vstack(edges), full_matrices=False)
+        rank = int((reach > FLATNESS * reach[0]).sum())
+        return directions[:rank], reach[:rank]
+
+    @cached_property
+    def _parts(self) -> list[_Summand]:
+        """The summands that are more than a point, about `_base`, in the coordinates of `_axes`."""
+        directions, reach = self._axes
+        summands = [s for s in self._summands if s.dimension]
+        candidates = math.prod(len(s.points) for s in summands)
+        if candidates > MOST_CANDIDATES:
+            raise UnsupportedError(
+                f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
+                "use fewer half_planes, or leave lateral out"
+            )
+        return [
+            _Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
+        ]
+
+    @property
+    def _rounding(self) -> float:
+        """How far rounding may move points in the coordinates of `_axes`: more in a thin set."""
+        reach = self._axes[1]
+        return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
 
     @property
     def dimension(self) -> int:
         """Of the set's affine hull, from 0 to 6."""
-        return len(self._basis)
+        return len(self._axes[1])
 
     @cached_property
     def _facets(self) -> tuple[Array, Array]:
-        """Unit normals (k, r) and offsets (k,) in the basis, about `_base`."""
-        basis, r = self._basis, self.dimension
+        """Unit normals (k, r) and offsets (k,) in the coordinates of `_axes`, about `_base`."""
+        parts, r = self._parts, self.dimension
         if r == 0:
             return np.zeros((0, 0)), np.zeros(0)
-        parts = [
-            _Summand((s.points - s.points[0]) @ basis.T, s.dimension)
-            for s in self._summands
-            if s.dimension
-        ]
         if all(part.dimension <= 2 for part in parts):
-            normals = _sum_normals(parts, r)
+            normals = _sum_normals(parts, r, self._rounding)
             offsets = sum(
                 ((part.points @ normals.T).max(axis=0) for part in parts),
                 start=np.zeros(len(normals)),
@@ -238,10 +263,12 @@ class WrenchSpace:
             If nothing is left at u = 1.
         """
         normals, offsets = self._facets
-        basis = self._basis
-        lifted = normals @ basis if len(basis) else np.zeros((0, 6))
-        _, _, full = np.linalg.svd(np.vstack([basis, np.zeros((1, 6))]))
-        flat = full[len(basis) :]
+        directions, reach = self._axes
+        lifted = (normals / reach) @ directions
+        lengths = np.linalg.norm(lifted, axis=1)
+        lifted, offsets = lifted / lengths[:, None], offsets / lengths
+        _, _, full = np.linalg.svd(np.vstack([directions, np.zeros((1, 6))]))
+        flat = full[len(directions) :]
         return HalfSpaces(
             normals=lifted * SCALE,
             offsets=offsets + lifted @ self._base,
@@ -257,16 +284,15 @@ class WrenchSpace:
         EmptySetError
             If nothing is left at u = 1.
         """
-        return np.asarray((self._vertices_in_basis @ self._basis + self._base) / SCALE)
+        directions, reach = self._axes
+        return np.asarray(((self._vertices * reach) @ directions + self._base) / SCALE)
 
     @cached_property
-    def _vertices_in_basis(self) -> Array:
-        parts = [
-            _Summand((s.points - s.points[0]) @ self._basis.T, s.dimension)
-            for s in self._summands
-            if s.dimension
-        ]
-        return _sum_vertices(parts, *self._facets) if parts else np.zeros((1, 0))
+    def _vertices(self) -> Array:
+        """Vertices (n, r) in the coordinates of `_axes`, about `_base`."""
+        if not self._parts:
+            return np.zeros((1, 0))
+        return _sum_vertices(self._parts, *self._facets, self._rounding)
 
     def support(self, direction: ArrayLike) -> float:
         """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
@@ -335,15 +361,24 @@ class WrenchSpace:
     def volume(self) -> tuple[float, int]:
         """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.
 
-        Measured in scaled wrenches, so its unit is N^r.
+        Measured in scaled wrenches, so its unit is N^r, to about 1e-5 of it. Thousands of vertices
+        take seconds.
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        SolverError
+            If the hull of the vertices cannot be found.
         """
         r = self.dimension
-        points = self._vertices_in_basis
+        stretch = float(np.prod(self._axes[1]))
         if r == 0:
             return 0.0, 0
         if r == 1:
-            return float(np.ptp(points)), 1
-        return float(ConvexHull(points, qhull_options="Qt Q12").volume), r
+            return float(np.ptp(self._vertices)) * stretch, 1
+        # joggled: merged facets may be so wide in a set of fine facets that volume is lost
+        return float(_hull(self._vertices, "QJ").volume) * stretch, r
 
 
 def _polytope_vertices(A: Array, b: Array) -> Array:
@@ -351,14 +386,20 @@ def _polytope_vertices(A: Array, b: Array) -> Array:
     d = A.shape[1]
     norms = np.linalg.norm(A, axis=1)
     A, b = A / norms[:, None], b / norms
-    slack = TOLERANCE * (1.0 + float(np.abs(b).max()))
+    unbounded = SolverError(f"a block of {d} columns is not bounded")
     if d == 1:
+        if (A > 0.0).all() or (A < 0.0).all():
+            raise unbounded
         upper = b[A[:, 0] > 0.0].min()
         lower = -b[A[:, 0] < 0.0].min()
+        slack = TOLERANCE * (1.0 + abs(lower) + abs(upper))
         if lower > upper + slack:
             return np.zeros((0, 1))
         return np.array([[lower], [upper]]) if upper > lower + slack else np.array([[lower]])
     if d == 2:
+        turns = np.sort(np.arctan2(A[:, 1], A[:, 0]))
+        if np.diff(turns, append=turns[0] + math.tau).max() >= math.pi:
+            raise unbounded
         first, second = np.triu_indices(len(b), 1)
         det = A[first, 0] * A[second, 1] - A[first, 1] * A[second, 0]
         crossing = np.abs(det) > TOLERANCE
@@ -369,7 +410,10 @@ def _polytope_vertices(A: Array, b: Array) -> Array:
                 (A[first, 0] * b[second] - A[second, 0] * b[first]) / det,
             ]
         )
-        return _distinct(points[(points @ A.T <= b + slack).all(axis=1)], slack)
+        # each row by its own size: one that is far away must not loosen the others
+        points = points[(points @ A.T <= b + TOLERANCE * (1.0 + np.abs(b))).all(axis=1)]
+        return _distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
+    slack = TOLERANCE * (1.0 + float(np.abs(b).max()))
     # the centre of the largest ball inside
     cost = np.zeros(d + 1)
     cost[-1] = -1.0
@@ -409,11 +453,11 @@ def _extreme_points(image: Array) -> _Summand:
     flat = centred @ basis[:rank].T
     if rank == 1:
         return _Summand(image[[flat[:, 0].argmin(), flat[:, 0].argmax()]], 1)
-    hull = ConvexHull(flat)
+    hull = _hull(flat)
     return _Summand(image[hull.vertices], rank)
 
 
-def _sum_normals(parts: list[_Summand], r: int) -> Array:
+def _sum_normals(parts: list[_Summand], r: int, rounding: float) -> Array:
     """Return the unit facet normals (k, r) of a sum of segments and polygons.
 
     A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
@@ -421,50 +465,62 @@ def _sum_normals(parts: list[_Summand], r: int) -> Array:
     """
     if r == 1:
         return np.array([[1.0], [-1.0]])
-    edges = [
-        np.diff(np.vstack([p.points, p.points[:1]]), axis=0)[: 1 if p.dimension == 1 else None]
-        for p in parts
-    ]
-    edges = [e / np.linalg.norm(e, axis=1)[:, None] for e in edges]
-    found = []
-    for use in _ways(parts, r - 1):
-        grids = np.meshgrid(
-            *(
-                np.arange(len(edges[k])) if u == 1 else np.zeros(1, dtype=int)
-                for k, u in enumerate(use)
-            ),
-            indexing="ij",
-        )
-        picks = [g.ravel() for g in grids]
-        spans = []
-        for k, u in enumerate(use):
-            if u >= 1:
-                spans.append(edges[k][picks[k]])
-            if u == 2:
-                spans.append(np.broadcast_to(edges[k][1], spans[-1].shape))
-        normals = _cross(np.stack(spans, axis=1))
-        lengths = np.linalg.norm(normals, axis=1)
-        independent = lengths > 1e-8
-        normals = normals[independent] / lengths[independent, None]
-        for side in (normals, -normals):
-            keep = np.ones(len(side), dtype=bool)
-            for k, u in enumerate(use):
-                if u == 1 and parts[k].dimension == 2:
-                    heights = side @ parts[k].points.T
-                    here = heights[np.arange(len(side)), picks[k][independent]]
-                    top = heights.max(axis=1)
-                    keep &= here >= top - 1e-9 * (1.0 + np.abs(top))
-            found.append(side[keep])
-    normals = np.vstack(found)
+    edges = []
+    for part in parts:
+        around = np.diff(np.vstack([part.points, part.points[:1]]), axis=0)
+        edges.append(around[:1] if part.dimension == 1 else around)
+    shapes = tuple((len(e), part.dimension) for e, part in zip(edges, parts, strict=True))
+    spanning, chosen = _choices(shapes, r - 1)
+    directions = np.vstack(edges)
+    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
+    normals = _cross(directions[spanning])
+    lengths = np.linalg.norm(normals, axis=1)
+    independent = lengths > 1e-8
+    normals = normals[independent] / lengths[independent, None]
+    normals = np.vstack([normals, -normals])
+    chosen = np.vstack([chosen[independent]] * 2)
+    keep = np.ones(len(normals), dtype=bool)
+    for k, part in enumerate(parts):
+        if part.dimension == 2:
+            one_edge = np.flatnonzero(chosen[:, k] >= 0)
+            heights = normals[one_edge] @ part.points.T
+            here = heights[np.arange(len(one_edge)), chosen[one_edge, k]]
+            top = heights.max(axis=1)
+            keep[one_edge] &= here >= top - rounding * (1.0 + np.abs(top))
+    normals = normals[keep]
     _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
     return np.asarray(normals[np.sort(first)])
 
 
-def _ways(parts: list[_Summand], total: int) -> Iterator[tuple[int, ...]]:
-    """Yield how many edge directions to take of each part, ``total`` in all."""
-    for use in itertools.product(*(range(part.dimension + 1) for part in parts)):
-        if sum(use) == total:
-            yield use
+@lru_cache(maxsize=256)
+def _choices(shapes: tuple[tuple[int, int], ...], total: int) -> tuple[Indices, Indices]:
+    """List every choice of ``total`` edges from parts of given (edges, dimension).
+
+    Returns
+    -------
+    spanning : ndarray of int, shape (n, total)
+        Into all parts' edges, one after another.
+    chosen : ndarray of int, shape (n, parts)
+        Which edge of a part is used alone; −1 where none, or its whole plane, is.
+    """
+    firsts = np.cumsum([0, *(count for count, _ in shapes)])
+    spanning, chosen = [], []
+    for use in itertools.product(*(range(dimension + 1) for _, dimension in shapes)):
+        if sum(use) != total:
+            continue
+        options = [
+            range(count) if u == 1 else (-1,) for u, (count, _) in zip(use, shapes, strict=True)
+        ]
+        picks = np.array(list(itertools.product(*options)))
+        columns = []
+        for k, u in enumerate(use):
+            if u == 1:
+                columns.append(firsts[k] + picks[:, k])
+            elif u == 2:
+                columns += [np.full(len(picks), firsts[k] + i) for i in range(2)]
+        spanning.append(np.column_stack(columns))
+        chosen.append(picks)
+    return np.vstack(spanning), np.vstack(chosen)
 
 
 def _cross(spans: Array) -> Array:
@@ -493,7 +549,7 @@ def _sums(parts: list[_Summand]) -> Array:
     return total
 
 
-def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array) -> Array:
+def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array, rounding: float) -> Array:
     """Return the vertices (n, r) of a sum, given its facets.
 
     A sum of points is a vertex if the mean normal of the facets it lies on makes each of them the
@@ -506,7 +562,7 @@ def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array) -> Arra
     chosen = []
     for start in range(0, len(sums), chunk):
         piece = sums[start : start + chunk]
-        active = (piece @ normals.T >= offsets - 1e-8 * size).astype(float)
+        active = (piece @ normals.T >= offsets - 10.0 * rounding * size).astype(float)
         outward = active @ normals
         keep = active.any(axis=1)
         for k, part in enumerate(parts):
@@ -521,11 +577,28 @@ def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array) -> Arra
     return np.vstack(chosen)
 
 
+def _hull(points: Array, options: str | None = None) -> ConvexHull:
+    """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
+
+    Raises
+    ------
+    SolverError
+        If that fails as well.
+    """
+    try:
+        return ConvexHull(points, qhull_options=options)
+    except QhullError:
+        try:
+            return ConvexHull(points, qhull_options="QJ")
+        except QhullError as error:
+            raise SolverError(f"convex hull: {str(error).splitlines()[0]}") from None
+
+
 def _hull_facets(points: Array) -> tuple[Array, Array]:
     """Return unit normals and offsets of the hull of points (n, r)."""
     if points.shape[1] == 1:
         return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
-    equations = ConvexHull(points).equations
+    equations = _hull(points).equations
     _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
     equations = equations[np.sort(first)]
     return equations[:, :-1], -equations[:, -1]

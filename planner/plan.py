@@ -149,14 +149,12 @@ class Certificate:
     Attributes
     ----------
     direction : ndarray, shape (6,)
-        Unit body-wrench direction d in B, in the program's scaled units: every wrench w that the
-        hands can give has ``d · S w ≤ supremum``.
-    scale : ndarray, shape (6,)
-        The diagonal of S.
+        d in B [1/N, 1/(N·m)], of unit length in the program's units of 300 N and 30 N·m: every body
+        wrench w that the hands can give has ``d · w ≤ supremum``.
     supremum : float
-        Of ``d · S w`` over all plans at any utilisation.
+        Of ``d · w`` over all plans at any utilisation.
     needed : float
-        ``d · S W`` of the body wrench asked for; larger than ``supremum``.
+        ``d · W`` of the body wrench W asked for; larger than ``supremum``.
     shortfall : ndarray, shape (6,)
         What is missing in B: the body wrench asked for minus the nearest that can be had.
     nearest : ndarray, shape (6,)
@@ -167,7 +165,6 @@ class Certificate:
     """
 
     direction: Array
-    scale: Array
     supremum: float
     needed: float
     shortfall: Array

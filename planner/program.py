@@ -25,7 +25,7 @@ import threading
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -71,8 +71,8 @@ SETTINGS: Final[dict[str, Any]] = {
 }
 """One physical scaling instead of equilibration; see the solver's documentation for the rest."""
 
-CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
-"""The solver's own defaults, for a second try."""
+CAREFUL: Final[dict[str, Any]] = {"max_threads": 1, "warm_start": False}
+"""The solver's own defaults, for a second try, on a new solver: an old one keeps its settings."""
 
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
@@ -221,8 +221,8 @@ class _Program(ABC):
                 warnings.simplefilter("ignore", UserWarning)
                 try:
                     self.problem.solve(solver=SOLVER, enforce_dpp=True, **settings)
-                except cp.SolverError as error:
-                    outcome = Outcome(False, str(error), 0, float("nan"))
+                except cp.SolverError:
+                    outcome = Outcome(False, str(cp.SOLVER_ERROR), 0, float("nan"))
                     continue
             stats = self.problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats else 0
@@ -296,11 +296,14 @@ class LoadFactor(_Program):
         return cp.Problem(cp.Maximize(self.factor), [self.balance, *self.limits, *self.hard])
 
     def solve(self, data: StanceData) -> Outcome:
-        """Return the largest load factor as ``value``."""
+        """Return the largest load factor as ``value``; the wrench must not be zero."""
+        size = float(np.abs(data.wrench).max())
         with self._lock:
             self._load(StanceData(data.hands, np.zeros(6)))
-            self.wrench.value = data.wrench
-            return self._run()
+            # of unit size, or a small wrench and its large factor would defeat the solver
+            self.wrench.value = data.wrench / size
+            outcome = self._run()
+        return replace(outcome, value=outcome.value / size)
 
 
 class Nearest(_Program):

@@ -44,11 +44,11 @@ BALANCED: Final = 1e-7
 BINDING: Final = 1e-6
 """Multipliers below this do not count as binding."""
 
-BLOCKING: Final = 1e-3
+BLOCKING: Final = 1e-6
 """Multipliers of hard rows below this do not count as blocking a direction of unit length."""
 
-CLOSE: Final = 1e3
-"""How much a certificate's direction is held to that of the shortfall, against its bound."""
+CLOSE: Final = 0.1
+"""What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
 
 UNLIMITED: Final = 1e4
 """Box, in `LOAD_UNIT`, over which a certificate must hold: far beyond any strength."""
@@ -197,10 +197,11 @@ class _Answer:
         reached = program.body_wrench(self.data, nearest.loads)
         missing = self.data.wrench - reached
         direction, multipliers = _polish(
-            missing / np.linalg.norm(missing),
+            missing,
+            self.data.wrench - sum(hand.g for hand in hands),
+            np.hstack([hand.G for hand in hands]),
             block_diag(*(hand.H for hand in hands)),
             np.concatenate([hand.h for hand in hands]),
-            np.hstack([hand.G for hand in hands]),
         )
         supremum = 0.0
         blocking: list[tuple[float, LimitName]] = []
@@ -224,8 +225,7 @@ class _Answer:
         if not supremum < needed:
             return None
         return Certificate(
-            direction=direction,
-            scale=1.0 / WRENCH_UNIT,
+            direction=direction / WRENCH_UNIT,
             supremum=supremum,
             needed=needed,
             shortfall=missing * WRENCH_UNIT,
@@ -334,49 +334,54 @@ class _Answer:
             return None, "nothing limits this stance"
         _, name, load, capacity = best
         verb = "carries" if utilisation <= 1.0 + SLACK else "would carry"
-        sentence = f"{_spoken(name)} {verb} {load:.0f} N of {capacity:.0f} N{_manner(name)}"
+        sentence = f"{_spoken(name)} {verb} {_newtons(load)} of {_newtons(capacity)}{_manner(name)}"
         if status == "overloaded" and utilisation <= 1.0 + SLACK:
             cap = self.question.limits.utilisation
             sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
         return name, sentence
 
     def _prices(self) -> tuple[Price, ...]:
-        prices = []
+        """Return the price of each limit that binds; rows of one name are one limit."""
+        prices: dict[LimitName, float] = {}
         for place, space, duals in zip(
             self.question.stance.hands, self.spaces, self.outcome.limit_duals, strict=True
         ):
             for row, multiplier, capacity in zip(space.rows, duals, space.s, strict=False):
                 if multiplier > BINDING:
+                    name = _name(place.limb, row)
                     price = float(multiplier * self.outcome.value / capacity)
-                    prices.append(Price(_name(place.limb, row), price))
-        return tuple(sorted(prices, key=lambda p: -p.price))
+                    prices[name] = prices.get(name, 0.0) + price
+        ranked = sorted(prices.items(), key=lambda item: -item[1])
+        return tuple(Price(name, price) for name, price in ranked)
 
 
-def _polish(direction: Array, H: Array, h: Array, G: Array) -> tuple[Array, Array]:
-    """Return the d next to ``direction``, and the λ of least λ·h, with Gᵀd = Hᵀλ, λ ≥ 0; |d| = 1.
+def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tuple[Array, Array]:
+    """Return a unit d near that of ``missing``, and λ ≥ 0 with Gᵀd = Hᵀλ, that prove the most.
 
     An interior-point solution leaves an error that a box as large as `UNLIMITED` would magnify; the
-    vertex of a linear program (least `CLOSE` Σ |d − direction| + λ·h) does not.
+    vertex of a linear program does not: max d·(W − g) − λ·h, less `CLOSE` for turning d away.
     """
     rows, size = H.shape
-    # variables: d (6), t ≥ |d − direction| (6), λ (rows)
+    length = float(np.linalg.norm(missing))
+    near = missing / length
+    # variables: d (6), t ≥ |d − near| (6), λ (rows)
     one = np.eye(6)
     none = np.zeros((6, rows))
     result = linprog(
-        np.concatenate([np.zeros(6), np.full(6, CLOSE), h]),
+        np.concatenate([-offset / length, np.full(6, CLOSE), h / length]),
         A_ub=np.vstack([np.hstack([one, -one, none]), np.hstack([-one, -one, none])]),
-        b_ub=np.concatenate([direction, -direction]),
+        b_ub=np.concatenate([near, -near]),
         A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T]),
         b_eq=np.zeros(size),
-        bounds=[(None, None)] * 6 + [(0.0, None)] * (6 + rows),
+        bounds=[(-1.0, 1.0)] * 6 + [(0.0, None)] * (6 + rows),
         method="highs-ds",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
     if result.status != 0 or result.x is None:
-        return direction, np.zeros(rows)
+        return near, np.zeros(rows)
     length = float(np.linalg.norm(result.x[:6]))
     if length < BLOCKING:
-        return direction, np.zeros(rows)
+        return near, np.zeros(rows)
     return result.x[:6] / length, np.maximum(result.x[12:], 0.0) / length
 
 
@@ -468,6 +473,10 @@ def _spoken(name: LimitName) -> str:
     return f"{name.limb}: palm"
 
 
+def _newtons(force: float) -> str:
+    return f"{force:.0f} N" if abs(force) >= 10.0 else f"{force:.2g} N"
+
+
 MANNERS: Final = {
     "shear": " in shear",
     "pull_off": " toward pull-off",
@@ -483,7 +492,7 @@ def _manner(name: LimitName) -> str:
 def _explain_shortfall(certificate: Certificate) -> str:
     axes = ("fx", "fy", "fz", "mx", "my", "mz")
     units = ("N",) * 3 + ("N·m",) * 3
-    worst = int(np.argmax(np.abs(certificate.direction)))
+    worst = int(np.argmax(np.abs(certificate.shortfall / WRENCH_UNIT)))
     missing = float(certificate.shortfall[worst])
     sentence = (
         f"no plan balances the body at any utilisation: {missing:+.3g} {units[worst]} of "

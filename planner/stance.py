@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from hand_models.errors import InvalidInputError
-from hand_models.frames import Array, Pose
+from hand_models.frames import Array, Pose, finite_vector
 from hand_models.hand import Grasp
 from hand_models.holds import Hold
 from hand_models.spines import Surface
@@ -19,6 +19,41 @@ __all__ = ["EARTH", "HandOnHold", "Limits", "Load", "Question", "Stance"]
 
 EARTH: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
+
+FARTHEST: Final = 1e9
+"""How far from its parent's origin a frame may be [m]; farther, its digits are all lost."""
+
+HEAVIEST: Final = 1e12
+"""Largest component of a body wrench that is taken for one [N, N·m]."""
+
+TOO_FAR: Final = 10.0
+"""How many times its limb's reach a hand may be from the body: beyond, the units are wrong."""
+
+ORTHONORMAL: Final = 1e-6
+"""How far the products of a pose's axes may be from those of orthonormal ones."""
+
+
+def _moderate(wrench: Array, field: str | None) -> Array:
+    """Return a body wrench; refuse one that is absurdly large."""
+    if not np.abs(wrench).max() <= HEAVIEST:
+        raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
+    return wrench
+
+
+def _possible(pose: Pose, field: str) -> None:
+    """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
+    position = finite_vector(pose.position, 3, f"{field}.position")
+    if np.abs(position).max() > FARTHEST:
+        raise InvalidInputError(
+            f"must be within {FARTHEST:g} m, got {position.tolist()}", field=f"{field}.position"
+        )
+    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").reshape(3, 3)
+    if np.abs(axes).max() > 2.0 or not (
+        np.abs(axes.T @ axes - np.eye(3)).max() <= ORTHONORMAL and np.linalg.det(axes) > 0.0
+    ):
+        raise InvalidInputError(
+            "orthonormal right-handed axes are needed", field=f"{field}.orientation"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +86,11 @@ class HandOnHold:
     def __post_init__(self) -> None:
         if self.hold_pose is not None and self.hold_in_hand is not None:
             raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
+        _possible(self.pose, "pose")
+        if self.hold_pose is not None:
+            _possible(self.hold_pose, "hold.pose")
+        if self.hold_in_hand is not None:
+            _possible(self.hold_in_hand, "hold.pose_in_hand")
 
     def placed_hold(self) -> Pose | None:
         """Return the hold's frame in H, or None if the hand is to be seated."""
@@ -82,6 +122,8 @@ class Stance:
     def __post_init__(self) -> None:
         if not self.hands:
             raise InvalidInputError("at least one hand is needed", field="hands")
+        _possible(self.body, "body")
+        object.__setattr__(self, "gravity", finite_vector(self.gravity, 3, "gravity"))
         seen: set[str] = set()
         for i, hand in enumerate(self.hands):
             if hand.limb not in self.robot.limbs:
@@ -94,6 +136,13 @@ class Stance:
                     f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
                 )
             seen.add(hand.limb)
+            away = float(np.linalg.norm(hand.pose.position - self.body.position))
+            if away > TOO_FAR * self.robot.reach:
+                raise InvalidInputError(
+                    f"the hand is {away:.3g} m from the body; its limb reaches about "
+                    f"{self.robot.reach:.2g} m (positions are in metres)",
+                    field=f"hands[{i}].pose.position",
+                )
 
 
 @dataclass(frozen=True)
@@ -122,9 +171,12 @@ class Load:
         mass = stance.robot.mass if self.mass is None else self.mass
         if not (math.isfinite(mass) and mass > 0.0):
             raise InvalidInputError(f"must be above 0 kg, got {mass:g}", field="mass")
-        com = np.asarray(stance.robot.com if self.com is None else self.com, dtype=float)
-        force = mass * stance.body.rotation.T @ (np.asarray(self.acceleration) - stance.gravity)
-        return np.concatenate([force, np.cross(com, force)])
+        com = finite_vector(stance.robot.com if self.com is None else self.com, 3, "com")
+        acceleration = finite_vector(self.acceleration, 3, "acceleration")
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
+            wrench = np.concatenate([force, np.cross(com, force)])
+        return _moderate(wrench, None)
 
 
 @dataclass(frozen=True)
@@ -175,6 +227,12 @@ class Question:
     load: Load = field(default_factory=Load)
     limits: Limits = field(default_factory=Limits)
     want: frozenset[Want] = frozenset()
+
+    def __post_init__(self) -> None:
+        if self.body_wrench is not None:
+            wrench = finite_vector(self.body_wrench, 6, "body_wrench")
+            _moderate(wrench, "body_wrench")
+            object.__setattr__(self, "body_wrench", wrench)
 
     def needed_wrench(self) -> Array:
         """Return the body wrench that is planned for, shape (6,) [N, N·m]."""

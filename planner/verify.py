@@ -132,16 +132,15 @@ def problems(
     allowed = BALANCE * max(float(np.linalg.norm(body_wrench)), 1.0)
     if not error <= allowed:
         found.append(f"balance is off by {error:.3g} of {np.linalg.norm(body_wrench):.3g}")
-    if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
-        found.append(f"utilisation is {worst:.8g}, not {utilisation:.8g}")
+    _compare(found, "plan", worst, utilisation)
     return found
 
 
 def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: HandPlan) -> float:
     """Check one hand; return its utilisation as recomputed."""
     limb = plan.limb
-    loads = [abs(v) for f in plan.fingers for t in f.tiles for v in (t.shear, t.normal)]
-    allowed = LOAD * max(1.0, *loads)
+    loads = [abs(v) for f in plan.fingers for t in f.tiles for v in (t.shear, t.normal, t.lateral)]
+    allowed = LOAD * max(1.0, *loads, *np.abs(plan.palm.force).tolist())
     maximum = hand.hand.maximum_tension
     if question.limits.tendon_tension is not None:
         maximum = min(maximum, question.limits.tendon_tension)
@@ -181,19 +180,27 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             if tile.contact == "none" and np.abs(tile.force).max() > 0.0:
                 found.append(f"{name} carries a load but touches nothing")
             wrench += np.concatenate([tile.force, np.cross(tile.position, tile.force)])
-            if tile.contact != "none":
-                used = _tile_utilisation(tile, t, n)
-                worst = max(worst, used)
-                if used <= 1.0 and not _inside_curve(hand, tile, t, n, allowed):
-                    found.append(f"{name} is beyond its limit curve")
-    worst = max(worst, _check_palm(found, hand, plan, allowed))
+            touches = tile.contact != "none"
+            used = _tile_utilisation(tile, t, n) if touches else 0.0
+            worst = max(worst, used)
+            _compare(found, name, used, tile.utilisation)
+            if touches and used <= 1.0 and not _inside_curve(hand, tile, t, n, allowed):
+                found.append(f"{name} is beyond its limit curve")
+    pressed = _check_palm(found, hand, plan, allowed)
+    _compare(found, f"{limb}: palm", pressed, plan.palm.utilisation)
+    worst = max(worst, pressed)
     force = plan.palm.force
     wrench += np.concatenate([force, plan.palm.moment + np.cross(plan.palm.position, force)])
     if not np.abs(wrench - plan.wrench).max() <= allowed:
         found.append(f"{limb}: the wrench is not the sum of its tiles' and palm's forces")
-    if not abs(worst - plan.utilisation) <= UTILISATION * max(1.0, worst):
-        found.append(f"{limb}: utilisation is {worst:.8g}, not {plan.utilisation:.8g}")
+    _compare(found, limb, worst, plan.utilisation)
     return worst
+
+
+def _compare(found: list[str], name: str, utilisation: float, planned: float) -> None:
+    utilisation = max(utilisation, 0.0)
+    if not abs(utilisation - planned) <= UTILISATION * max(1.0, utilisation):
+        found.append(f"{name}: utilisation is {utilisation:.8g}, not {planned:.8g}")
 
 
 def _tile_utilisation(tile: TileLoad, shear: float, normal: float) -> float:

@@ -154,7 +154,6 @@ def _price(price: Price) -> replies.Price:
 def _certificate(certificate: Certificate) -> replies.Certificate:
     return replies.Certificate(
         direction=_vector(certificate.direction),
-        scale=_vector(certificate.scale),
         supremum=float(certificate.supremum),
         needed=float(certificate.needed),
         shortfall=_vector(certificate.shortfall),

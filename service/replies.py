@@ -177,13 +177,12 @@ class Hand(Struct, kw_only=True):
 class Certificate(Struct, kw_only=True):
     """Why nothing balances the body.
 
-    Every body wrench w that the hands can supply has Σ direction · scale · w ≤ supremum, and the
-    one asked for has ``needed``, which is more. ``nearest`` can be supplied, ``shortfall`` is what
+    Every body wrench w that the hands can supply has direction · w ≤ supremum, and the one asked
+    for has ``needed``, which is more. ``nearest`` can be supplied, ``shortfall`` is what
     is missing.
     """
 
     direction: Vector
-    scale: Vector
     supremum: float
     needed: float
     shortfall: Vector

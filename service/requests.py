@@ -55,8 +55,8 @@ Wrench = Annotated[
     Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]"),
 ]
 Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
-Diameter = Annotated[float, Meta(ge=1e-3, le=1e3, description="[m]")]
-FilletRadius = Annotated[float, Meta(ge=1e-4, le=1e3, description="[m]")]
+Diameter = Annotated[float, Meta(ge=1e-3, le=100.0, description="[m]")]
+FilletRadius = Annotated[float, Meta(ge=1e-4, le=100.0, description="[m]")]
 EdgeAngle = Annotated[
     float, Meta(ge=1e-2, lt=math.pi, description="of the rock between the faces [rad]")
 ]

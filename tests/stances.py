@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hand_models.frames import Pose
+from hand_models.frames import Pose, wrench_transport
 from hand_models.hand import Grasp
 from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
 from hand_models.spines import Surface
-from planner.solve import hand_space
+from planner.plan import Plan
+from planner.program import WRENCH_UNIT, HandData, StanceData
+from planner.solve import hand_space, plan
 from planner.stance import HandOnHold, Load, Question, Stance
 
 PLACES = {
@@ -166,3 +169,21 @@ def random_question(seed: int, *want: str) -> Question:
     if rng.random() < 1.0 / 3.0:
         return Question(stance, want=frozenset(want))
     return Question(stance, body_wrench=attainable_wrench(stance, rng), want=frozenset(want))
+
+
+@cache
+def random_answer(seed: int) -> tuple[Question, Plan]:
+    """A random question with all extras and its plan, found once for all tests."""
+    question = random_question(seed, "load_factor", "prices")
+    return question, plan(question)
+
+
+def program_data(question: Question) -> StanceData:
+    """What the programs get of a question, tensions and palm loads weighed alike."""
+    body = question.stance.body.inverse()
+    hands = []
+    for hand in question.stance.hands:
+        _, space = hand_space(question.stance, hand.limb)
+        transport = wrench_transport(body @ hand.pose)
+        hands.append(HandData.of(space, transport, np.full(len(space.columns), 100.0)))
+    return StanceData(tuple(hands), question.needed_wrench() / WRENCH_UNIT)

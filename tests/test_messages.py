@@ -368,7 +368,7 @@ def test_an_infeasible_stance_comes_with_its_certificate() -> None:
     assert reply.hands is None
     assert reply.utilisation is None
     proof = reply.certificate
-    asked = np.dot(np.multiply(proof.direction, proof.scale), reply.body_wrench)
+    asked = np.dot(proof.direction, reply.body_wrench)
     assert proof.needed == pytest.approx(asked)
     assert proof.supremum < proof.needed
     np.testing.assert_allclose(np.add(proof.nearest, proof.shortfall), reply.body_wrench)

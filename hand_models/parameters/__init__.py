@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
 from hand_models.errors import InvalidInputError
 
@@ -61,13 +62,19 @@ class ParameterTable:
         Raises
         ------
         InvalidInputError
-            If the text is not TOML or an entry is not a quantity.
+            If the text is not TOML or an entry is not a quantity of finite numbers.
         """
         try:
             raw: dict[str, Any] = tomllib.loads(text)
-            return cls(msgspec.convert(raw, dict[str, dict[str, Quantity]]))
+            table = cls(msgspec.convert(raw, dict[str, dict[str, Quantity]]))
         except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
             raise InvalidInputError(str(error), field=origin) from None
+        for section, name, quantity in table:
+            if not np.isfinite(quantity.value).all():
+                raise InvalidInputError(
+                    f"{section}.{name} must be finite, got {quantity.value}", field=origin
+                )
+        return table
 
     @classmethod
     def load(cls, path: Path) -> ParameterTable:

@@ -1,0 +1,287 @@
+"""The fixed wrist: f_t(max) of Eq. 15, the parallelepiped of Eq. 16, and what each row says."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hands import HAND, ROCK, pinch, settled_at
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hand_models import (
+    FINGERS,
+    Cylinder,
+    EmptySetError,
+    Grasp,
+    Plane,
+    Pose,
+    tension_limits,
+    wrench_space,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def law(surface, shear, normal):
+    """Eq. 21 for a load in the finger plane: the force at which it lets go [N]."""
+    angle = math.atan2(-normal, shear)
+    if angle < 0.0:
+        slope = math.cos(angle) + surface.compression_gain * math.sin(angle)
+        return surface.shear_limit / slope if slope > 0.0 else math.inf
+    share = min(angle / surface.pull_off_angle, 1.0)
+    return surface.shear_limit - (surface.shear_limit - surface.pull_off_limit) * share
+
+
+def tile_load(settled, t, tension):
+    return settled.loads[t, :, 0] + settled.loads[t, :, 1] * tension
+
+
+def beyond(settled, t, tension):
+    load = tile_load(settled, t, tension)
+    return np.hypot(*load) > law(settled.surface, *load)
+
+
+def own_tiles(settled, i):
+    return np.flatnonzero((settled.finger_of == i) & settled.touching)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    start = settled.closing_tension
+    for i, limit in enumerate(tension_limits(settled)):
+        assert limit.finger == FINGERS[i]
+        tiles = own_tiles(settled, i)
+        if any(beyond(settled, t, start) for t in tiles):
+            assert limit.tension < start
+            continue
+        scan = np.geomspace(start, min(limit.tension * (1.0 - 1e-9), 7000.0), 300)
+        assert not any(beyond(settled, t, f) for f in scan for t in tiles)
+        assert (limit.phalanx is None) == math.isinf(limit.tension)
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds)
+def test_just_below_f_t_max_every_tile_holds_and_just_above_its_tile_lets_go(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    for i, limit in enumerate(tension_limits(settled)):
+        if not math.isfinite(limit.tension) or limit.tension == 0.0:
+            continue
+        (tile,) = (t for t in own_tiles(settled, i) if settled.tiles[t].phalanx == limit.phalanx)
+        assert beyond(settled, tile, limit.tension * (1.0 + 1e-6))
+        # the others are followed up from the closing tension only
+        holding = own_tiles(settled, i) if limit.tension > settled.closing_tension else [tile]
+        for t in holding:
+            assert not beyond(settled, t, limit.tension * (1.0 - 1e-6))
+
+
+@pytest.mark.parametrize("diameter", [0.2, 0.3, 0.7])
+@pytest.mark.parametrize("strength", [40.0, 60.0, 120.0])
+def test_the_papers_iteration_of_equation_15_ends_at_f_t_max(diameter, strength):
+    surface = ROCK.from_values({"shear_limit": strength})
+    settled = pinch(diameter, surface)
+    for i, limit in enumerate(tension_limits(settled)):
+        (tile,) = (t for t in own_tiles(settled, i) if settled.tiles[t].phalanx == limit.phalanx)
+        tension = settled.closing_tension
+        for _ in range(2000):
+            load = tile_load(settled, tile, tension)
+            # damped: with a shear that keeps an offset, loading angles do turn with tension
+            tension *= (law(surface, *load) / np.hypot(*load)) ** 0.25
+        assert tension == pytest.approx(limit.tension, rel=1e-6)
+
+
+def test_a_tile_beyond_its_law_by_closing_alone_is_safe_only_at_less_tension():
+    """Closing drags the distal tile with 8.05 N, and 20/21.5 N less for each newton less."""
+    settled = pinch(0.3, ROCK.from_values({"shear_limit": 7.5}))
+    for limit in tension_limits(settled)[1:3]:
+        assert limit.phalanx == "distal"
+        assert limit.tension == pytest.approx(37.0 - 0.55 * 21.5 / 20.0, abs=1e-5)
+    weaker = pinch(0.3, ROCK.from_values({"shear_limit": 1.0}))
+    assert [limit.tension for limit in tension_limits(weaker)] == [0.0] * 4
+
+
+def test_a_finger_in_the_air_never_lets_go():
+    settled = HAND.settle(Cylinder(0.3), ROCK, None, Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
+    assert tension_limits(settled) == tuple((finger, math.inf, None) for finger in FINGERS)
+    np.testing.assert_array_equal(wrench_space(settled).vertices(), np.zeros((1, 6)))
+
+
+def interval(settled, i, surface):
+    """Least and largest tension of a finger, from its tiles' own limits one by one."""
+    least, most = 0.0, HAND.maximum_tension
+    pieces = surface.pieces()
+    for t in own_tiles(settled, i):
+        (t0, t1), (n0, n1) = settled.loads[t]
+        least = max(least, -t0 / t1)
+        for p in pieces:
+            constant = p.capacity - p.a_shear * t0 - p.a_normal * n0
+            slope = p.a_shear * t1 + p.a_normal * n1
+            if slope > 0.0:
+                most = min(most, constant / slope)
+            elif slope < 0.0:
+                least = max(least, constant / slope)
+    return least, most
+
+
+@pytest.mark.parametrize("diameter", [0.3, 0.7])
+@pytest.mark.parametrize("rotation", [0.0, 0.5, math.pi])
+def test_without_palm_and_lateral_the_set_is_the_parallelepiped_of_equation_16(diameter, rotation):
+    """2^n corners o + Σ f_i v_i, each tension at its least or its largest."""
+    grasp = Grasp(outer_rotation=rotation, palm=False, lateral=False)
+    settled = HAND.settle(Cylinder(diameter), ROCK, grasp)
+    space = wrench_space(settled)
+    assert space.columns == tuple(f"{finger}/tension" for finger in FINGERS)
+    ends = [interval(settled, i, ROCK) for i in range(4)]
+    corners = np.array([space.wrench(f) for f in itertools.product(*ends)])
+    vertices = space.vertices()
+    assert len(vertices) == 2**4
+    gaps = np.linalg.norm(vertices[:, None] - corners, axis=2)
+    np.testing.assert_allclose(gaps.min(axis=1), 0.0, atol=1e-7)
+    np.testing.assert_allclose(gaps.min(axis=0), 0.0, atol=1e-7)
+
+
+def test_the_origin_is_c_sys_and_a_generator_is_c_act_of_equation_14():
+    settled = pinch(lateral=False)
+    space = wrench_space(settled)
+    units = np.concatenate(
+        [settled.axes, np.cross(settled.positions[:, None], settled.axes)], axis=2
+    )[:, :2]
+    c_sys = (settled.loads[:, :, :1] * units).sum(axis=(0, 1))
+    np.testing.assert_allclose(space.origin, c_sys, atol=1e-12)
+    for i in range(4):
+        mine = settled.finger_of == i
+        c_act = (settled.loads[mine][:, :, 1:] * units[mine]).sum(axis=(0, 1))
+        np.testing.assert_allclose(space.generators[:, i], c_act, atol=1e-12)
+
+
+@settings(max_examples=80, deadline=None)
+@given(seeds)
+def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    space = wrench_space(settled)
+    labels = [row.label for row in space.rows]
+    assert len(set(labels)) == len(labels) == len(space.A)
+    assert len(set(space.columns)) == len(space.columns)
+    kinds = [row.kind for row in space.rows]
+    assert kinds == ["limit"] * len(space.s) + ["hard"] * len(space.h)
+    assert (space.s > 0.0).all()
+    touching = {(t.finger, t.phalanx) for t in settled.tiles if t.contact != "none"}
+    named = {(r.finger, r.phalanx) for r in space.rows if r.limit in ("shear", "pull_off")}
+    assert named == touching
+
+
+@settings(max_examples=80, deadline=None)
+@given(seeds)
+def test_rows_say_what_tile_by_tile_reckoning_says(seed):
+    """Utilisation from each tile's own load, and hard rows from its shear and the stops."""
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    rng = np.random.default_rng(seed)
+    space = wrench_space(settled)
+    y = rng.uniform(-20.0, 120.0, len(space.columns))
+    value = dict(zip(space.columns, y, strict=True))
+    lateral = np.array([value.get(f"{finger}/lateral", 0.0) for finger in FINGERS])
+    loads = {
+        (tile.finger, tile.phalanx): load
+        for tile, load in zip(settled.tiles, settled.tile_loads(y[:4], lateral), strict=True)
+    }
+    used = space.utilisations(y)
+    worst: dict = {}
+    for row, u in zip(space.rows, used, strict=False):
+        worst[row.finger, row.phalanx, row.limit] = max(
+            u, worst.get((row.finger, row.phalanx, row.limit), -math.inf)
+        )
+    for (finger, phalanx, limit), u in worst.items():
+        if limit == "tendon_tension":
+            expected = value[f"{finger}/tension"] / 700.0
+        elif limit == "palm_shear":
+            expected = value["palm_shear"] / settled.palm.shear_limit
+        elif limit == "palm_pressing":
+            expected = value["palm_pressing"] / settled.palm.pressing_limit
+        else:
+            shear, normal, side = loads[finger, phalanx]
+            expected = max(
+                (p.a_shear * shear + p.a_normal * normal + p.a_lateral * abs(side)) / p.capacity
+                for p in settled.surface.pieces()
+                if p.limit == limit
+            )
+        assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    kept = dict(
+        zip(
+            (row.label for row in space.rows[len(used) :]),
+            space.h - space.H @ y >= -1e-9,
+            strict=True,
+        )
+    )
+    for finger in FINGERS:
+        assert kept[f"{finger}/slack_tendon"] == (value[f"{finger}/tension"] >= -1e-9)
+    for (finger, phalanx), (shear, _, _) in loads.items():
+        if f"{finger}/{phalanx}/dragged_backwards" in kept:
+            assert kept[f"{finger}/{phalanx}/dragged_backwards"] == (shear >= -1e-9)
+    for i, joint, torque in settled.stops:
+        label = f"{FINGERS[i]}/{('proximal', 'middle', 'distal')[joint]}/joint_stop"
+        holding = float(torque @ [1.0, y[i]])
+        if abs(holding) > 1e-7:
+            assert kept[label] == (holding > 0.0)
+
+
+def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_shear():
+    settled = pinch()
+    space = wrench_space(settled)
+    i = FINGERS.index("inner_left")
+    column = space.columns.index("inner_left/lateral")
+    np.testing.assert_allclose(settled.lateral_shares[own_tiles(settled, i)], 1.0 / 3.0, atol=1e-15)
+    # at 37 N: share/3 of Y beside (T, N) on each tile, on the tightest of its half-planes
+    reach = min(
+        3.0 * (p.capacity - p.a_shear * T - p.a_normal * N) / p.a_lateral
+        for p in ROCK.pieces()
+        for T, N in (tile_load(settled, t, 37.0) for t in own_tiles(settled, i))
+    )
+    y = np.zeros(len(space.columns))
+    y[:4] = 37.0
+    for sign in (1.0, -1.0):
+        y[column] = sign * reach
+        assert space.utilisations(y).max() == pytest.approx(1.0)
+
+
+def test_lateral_switched_off_leaves_no_lateral_column():
+    assert not any("lateral" in name for name in wrench_space(pinch(lateral=False)).columns)
+    assert sum("lateral" in name for name in wrench_space(pinch()).columns) == 4
+
+
+@pytest.mark.parametrize(("cap", "effective"), [(100.0, 100.0), (5000.0, 700.0), (None, 700.0)])
+def test_a_callers_cap_on_tension_counts_below_the_hands_own_maximum(cap, effective):
+    settled = HAND.settle(Plane(), ROCK.from_values({"shear_limit": 1e4}), Grasp(palm=False))
+    space = wrench_space(settled, cap)
+    names = [row.limit for row in space.rows[: len(space.s)]]
+    caps = space.s[[name == "tendon_tension" for name in names]]
+    np.testing.assert_array_equal(caps, effective)
+    along = space.support([-1.0, 0, 0, 0, 0, 0])
+    shear = -space.wrench([effective] * 4 + [0.0] * (len(space.columns) - 4))[0]
+    assert along == pytest.approx(shear)
+
+
+def test_the_palm_shears_along_minus_x_and_presses_along_z_at_its_centre():
+    settled = pinch()
+    space = wrench_space(settled)
+    shear, pressing = space.generators[:, -2], space.generators[:, -1]
+    x, y, z = settled.palm.centre
+    np.testing.assert_allclose(shear, [-1, 0, 0, *np.cross([x, y, z], [-1, 0, 0])])
+    np.testing.assert_allclose(pressing, [0, 0, 1, *np.cross([x, y, z], [0, 0, 1])])
+    assert space.columns[-2:] == ("palm_shear", "palm_pressing")
+    assert not any("palm" in name for name in wrench_space(pinch(palm=False)).columns)
+
+
+def test_closing_beyond_what_tiles_hold_leaves_no_wrench():
+    settled = pinch(0.3, ROCK.from_values({"shear_limit": 1.0}))
+    with pytest.raises(EmptySetError, match="contradict"):
+        wrench_space(settled).vertices()

@@ -1,0 +1,157 @@
+"""Every physical number has a unit and a source, and the loader refuses what is not a number."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hand_models import InvalidInputError, SpinyHand
+from hand_models.parameters import ParameterTable, hand_table, surface_table
+
+ENTRIES = [
+    (f"{file}:{section}.{name}", quantity)
+    for file, table in (("hand", hand_table()), ("surfaces", surface_table()))
+    for section, name, quantity in table
+]
+
+SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1"}
+
+PRINTED = {
+    # from the SpinyHand paper: mass and tension (Section 2), springs (3.2), palm (4), pulleys (4.2)
+    ("hand", "mass"): (2.6, "kg"),
+    ("tendon", "maximum_tension"): (700.0, "N"),
+    ("tendon", "closing_tension"): (37.0, "N"),
+    ("finger", "joint_stiffness"): ([0.05] * 3, "N·m/rad"),
+    ("tile", "spring_stiffness"): (11500.0, "N/m"),
+    ("tile", "pulley_ratio"): (2.0, "1"),
+    ("tile", "spine_travel"): (0.005, "m"),
+    ("palm", "length"): (0.11, "m"),
+    ("palm", "pulley_friction"): (0.34, "1"),
+}
+
+UNUSED = {("palm", "tile_size")}
+"""Known of the hand, but of no effect on any model."""
+
+
+def entry(text):
+    return ParameterTable.read(f"[a]\nb = {text}\n", "own.toml")
+
+
+@pytest.mark.parametrize(("name", "quantity"), ENTRIES, ids=[name for name, _ in ENTRIES])
+def test_every_entry_is_finite_in_an_si_unit(name, quantity):
+    assert np.isfinite(quantity.value).all(), name
+    assert quantity.unit in SI, name
+
+
+@pytest.mark.parametrize(("name", "quantity"), ENTRIES, ids=[name for name, _ in ENTRIES])
+def test_what_is_not_simply_measured_says_why(name, quantity):
+    if quantity.source != "measured":
+        assert len(quantity.note) >= len("Section 2"), name
+
+
+@pytest.mark.parametrize(("section", "name"), PRINTED)
+def test_printed_numbers_are_the_papers(section, name):
+    quantity = hand_table().quantity(section, name)
+    value, unit = PRINTED[section, name]
+    assert quantity.source == "paper"
+    assert quantity.value == value
+    assert quantity.unit == unit
+
+
+def test_shear_at_closing_is_that_of_figure_12():
+    shears = 37.0 * np.array(hand_table().vector("tile", "engagement"))
+    np.testing.assert_allclose(shears, [4.85, 6.95, 8.05], rtol=1e-9)
+
+
+def test_distal_pulley_is_not_larger_than_middle():
+    proximal, middle, distal = hand_table().vector("finger", "pulley_radii")
+    assert distal <= middle <= proximal == 0.0055
+
+
+@pytest.mark.parametrize(
+    ("section", "name"),
+    [(s, n) for s, n, _ in hand_table() if (s, n) not in UNUSED],
+)
+def test_the_hand_misses_any_number_by_name(section, name):
+    sections = {s: dict(entries) for s, entries in hand_table().sections.items()}
+    del sections[section][name]
+    with pytest.raises(InvalidInputError) as caught:
+        SpinyHand(ParameterTable(sections))
+    assert caught.value.field == f"{section}.{name}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{ value = 1.0, source = "paper" }',  # no unit
+        '{ value = 1.0, unit = "m" }',  # no source
+        '{ value = 1.0, unit = "m", source = "hearsay" }',
+        '{ value = "1.0", unit = "m", source = "paper" }',
+        '{ value = 1.0, unit = "m", source = "paper", remark = "x" }',
+        '{ value = nan, unit = "m", source = "paper" }',
+        '{ value = [1.0, inf], unit = "m", source = "paper" }',
+        "1.0",
+        "{ value = ",  # not TOML
+    ],
+)
+def test_a_malformed_entry_is_refused_with_its_file(text):
+    with pytest.raises(InvalidInputError) as caught:
+        entry(text)
+    assert caught.value.field == "own.toml"
+
+
+def test_a_list_is_not_a_scalar_nor_a_scalar_a_list():
+    one = entry('{ value = 1, unit = "m", source = "paper" }')
+    two = entry('{ value = [1, 2.5], unit = "m", source = "paper" }')
+    assert one.scalar("a", "b") == 1.0
+    assert two.vector("a", "b") == (1.0, 2.5)
+    with pytest.raises(InvalidInputError, match=r"a\.b.*list"):
+        one.vector("a", "b")
+    with pytest.raises(InvalidInputError, match=r"a\.b.*one number"):
+        two.scalar("a", "b")
+
+
+def test_a_callers_table_replaces_only_its_own_entries():
+    own = ParameterTable.read(
+        '[tendon]\nfriction = { value = 0.1, unit = "1", source = "assumed", note = "trial" }', "t"
+    )
+    table = hand_table().replaced(own)
+    assert table.scalar("tendon", "friction") == 0.1
+    assert hand_table().scalar("tendon", "friction") == 0.0
+    untouched = [(s, n, q) for s, n, q in hand_table() if (s, n) != ("tendon", "friction")]
+    assert [(s, n, q) for s, n, q in table if (s, n) != ("tendon", "friction")] == untouched
+
+
+def test_a_file_is_read_as_its_text(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text('[a]\nb = { value = 2.5, unit = "N·m", source = "measured" }', encoding="utf-8")
+    quantity = ParameterTable.load(path).quantity("a", "b")
+    assert (quantity.value, quantity.unit, quantity.note) == (2.5, "N·m", "")
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "value", "field"),
+    [
+        ("tendon", "friction", "1.0", "tendon.friction"),
+        ("tendon", "friction", "-0.1", "tendon.friction"),
+        ("tile", "contact_stiffness", "0.0", "tile.contact_stiffness"),
+        ("finger", "pulley_radii", "[0.005, 0.003]", "pulley_radii"),
+        ("finger", "joint_upper", "[1.0, 1.0, 1.0, 1.0]", "joint_upper"),
+        ("palm", "contact_stiffness", "[1e4, 1e4]", "palm.contact_stiffness"),
+    ],
+)
+def test_impossible_numbers_are_refused_by_field(section, name, value, field):
+    own = ParameterTable.read(
+        f'[{section}]\n{name} = {{ value = {value}, unit = "1", source = "assumed" }}', "own.toml"
+    )
+    with pytest.raises(InvalidInputError) as caught:
+        SpinyHand(hand_table().replaced(own))
+    assert caught.value.field == field
+
+
+def test_surface_strengths_lie_within_what_was_read_off_the_figures():
+    table = surface_table()
+    assert 21.0 <= table.scalar("sandpaper-36", "shear_limit") <= 23.0
+    assert abs(table.scalar("concrete-fine", "shear_limit") - 33.0) <= 8.5
+    assert abs(table.scalar("concrete-coarse", "shear_limit") - 49.5) <= 18.0
+    assert math.isclose(table.scalar("defaults", "pull_off_angle"), math.pi / 4, rel_tol=1e-9)

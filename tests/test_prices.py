@@ -1,0 +1,122 @@
+"""Prices: what one more unit of a limit takes off the utilisation, against HiGHS."""
+
+from dataclasses import replace
+
+import numpy as np
+import peer
+import pytest
+from stances import SANDPAPER, ask, on_wall, random_question
+
+from hand_models.holds import Cylinder, Plane
+from planner.plan import LimitName
+from planner.solve import plan
+from planner.stance import Limits, Load
+
+QUESTIONS = {
+    "pinches": ask(on_wall(), "prices"),
+    "sandpaper, own weight": ask(on_wall(surface=SANDPAPER), "prices", load=Load()),
+    "large cylinders": ask(on_wall(Cylinder(0.7)), "prices"),
+    "overhang": ask(on_wall(overhang=0.4), "prices"),
+    "slab": ask(on_wall(Plane(), overhang=-0.7, outer_rotation=0.0), "prices"),
+    "three hands": ask(on_wall(limbs=("front_left", "rear_left", "rear_right")), "prices"),
+}
+RANDOM_SEEDS = (0, 7, 9, 17, 22, 26)
+
+
+def names(question) -> list[list[LimitName]]:
+    """Name of each limit row of each hand."""
+    return [
+        [
+            LimitName(hand.limb, row.finger, row.phalanx, row.limit)
+            for row in space.rows[: len(space.s)]
+        ]
+        for hand, space in zip(question.stance.hands, peer.spaces(question), strict=True)
+    ]
+
+
+def utilisation_with(question, change) -> float:
+    """Least utilisation where ``change(name, capacity)`` is each limit's capacity."""
+    sets = [
+        replace(space, s=np.array([change(n, s) for n, s in zip(mine, space.s, strict=True)]))
+        for mine, space in zip(names(question), peer.spaces(question), strict=True)
+    ]
+    result = peer.least_utilisation(question, sets)
+    assert result.status == 0, result.message
+    return result.fun
+
+
+@pytest.mark.parametrize("question", QUESTIONS.values(), ids=QUESTIONS.keys())
+def test_price_lies_between_the_one_sided_differences(question):
+    answer = plan(question)
+    here = utilisation_with(question, lambda _, s: s)
+    assert answer.prices
+    for price in answer.prices[:8]:
+        step = 1e-3
+
+        def changed(by, named=price.name):
+            return utilisation_with(question, lambda n, s: s + by if n == named else s)
+
+        more, less = (here - changed(step)) / step, (changed(-step) - here) / step
+        slack = 2e-3 * max(more, less) + 1e-7
+        assert more - slack <= price.price <= less + slack
+
+
+@pytest.mark.parametrize("seed", RANDOM_SEEDS)
+def test_price_is_the_derivative_where_the_optimum_is_not_degenerate(seed):
+    question = random_question(seed, "prices")
+    answer = plan(question)
+    here = utilisation_with(question, lambda _, s: s)
+    smooth = 0
+    for price in answer.prices:
+        step = 1e-3
+
+        def changed(by, named=price.name):
+            return utilisation_with(question, lambda n, s: s + by if n == named else s)
+
+        more, less = (here - changed(step)) / step, (changed(-step) - here) / step
+        if less - more <= 5e-3 * less:
+            smooth += 1
+            assert price.price == pytest.approx(more, rel=1e-2, abs=1e-6)
+    assert smooth >= 1
+
+
+@pytest.mark.parametrize("question", QUESTIONS.values(), ids=QUESTIONS.keys())
+def test_limits_without_a_price_could_be_ten_times_as_much_and_nothing_would_change(question):
+    answer = plan(question)
+    priced = {price.name for price in answer.prices}
+    relaxed = utilisation_with(question, lambda n, s: s if n in priced else 10.0 * s)
+    assert relaxed == pytest.approx(answer.utilisation, rel=1e-5)
+
+
+@pytest.mark.parametrize("question", QUESTIONS.values(), ids=QUESTIONS.keys())
+def test_prices_times_capacities_add_up_to_the_utilisation(question):
+    """With every capacity one per cent up, the utilisation is one per cent down."""
+    answer = plan(question)
+    capacity = {
+        name: s
+        for mine, space in zip(names(question), peer.spaces(question), strict=True)
+        for name, s in zip(mine, space.s, strict=True)
+    }
+    total = sum(price.price * capacity[price.name] for price in answer.prices)
+    assert total == pytest.approx(answer.utilisation, rel=1e-4)
+
+
+def test_prices_come_in_order_each_limit_once():
+    for question in QUESTIONS.values():
+        prices = plan(question).prices
+        assert len({price.name for price in prices}) == len(prices)
+        values = [price.price for price in prices]
+        assert values == sorted(values, reverse=True)
+        assert min(values) > 0.0
+
+
+def test_a_tension_cap_that_binds_has_a_price():
+    question = ask(on_wall(), "prices", limits=Limits(tendon_tension=60.0))
+    answer = plan(question)
+    assert answer.limiting.limit == "tendon_tension"
+    assert {price.name.limit for price in answer.prices} >= {"tendon_tension"}
+
+
+def test_prices_are_given_only_where_they_are_wanted_and_there_is_a_plan():
+    assert plan(ask(on_wall())).prices is None
+    assert plan(ask(on_wall(Plane(), outer_rotation=0.0), "prices")).prices is None

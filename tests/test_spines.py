@@ -1,0 +1,202 @@
+"""What a tile holds: the linear law of Eq. 21, and half-planes that stay inside it."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hand_models import InvalidInputError, Surface
+from hand_models.spines import surface_names
+
+DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
+"""Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""
+
+
+def law(surface, angles):
+    """Eq. 21 and its extensions, written out anew: the force at which a tile lets go [N]."""
+    radii = []
+    for angle in angles:
+        if angle < 0.0:
+            along = math.cos(angle) + surface.compression_gain * math.sin(angle)
+            radii.append(surface.shear_limit / along if along > 0.0 else math.inf)
+        elif angle < surface.pull_off_angle:
+            slope = (surface.shear_limit - surface.pull_off_limit) / surface.pull_off_angle
+            radii.append(surface.shear_limit - slope * angle)
+        else:
+            radii.append(surface.pull_off_limit)
+    return np.array(radii)
+
+
+def reach(surface, angles):
+    """How far the half-planes let a force without lateral load go in each direction [N]."""
+    shear, normal = np.cos(angles), -np.sin(angles)
+    slopes = np.array([p.a_shear * shear + p.a_normal * normal for p in surface.pieces()])
+    capacities = np.array([p.capacity for p in surface.pieces()])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(slopes > 1e-15, capacities / slopes, np.inf).min(axis=0)
+
+
+def area_between(surface):
+    """Between the law and the half-planes, for 0 ≤ φ ≤ φ_max [N²]."""
+    angles = np.linspace(0.0, surface.pull_off_angle, 4001)
+    gap = law(surface, angles) ** 2 - reach(surface, angles) ** 2
+    return float(np.trapezoid(0.5 * gap, angles))
+
+
+@st.composite
+def surfaces(draw):
+    shear_limit = draw(st.floats(0.5, 500.0))
+    return Surface(
+        shear_limit=shear_limit,
+        pull_off_limit=shear_limit * draw(st.floats(0.02, 1.0)),
+        pull_off_angle=draw(st.floats(0.1, math.pi / 2)),
+        lateral_limit=shear_limit * draw(st.floats(0.1, 2.0)),
+        compression_gain=draw(st.sampled_from([0.0, 0.0, 0.3, 1.5])),
+        half_planes=draw(st.integers(1, 16)),
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(surfaces())
+def test_strength_is_the_linear_law_of_the_loading_angle(surface):
+    angles = DIRECTIONS[:: len(DIRECTIONS) // 200]
+    np.testing.assert_allclose(surface.strength(angles), law(surface, angles), rtol=1e-9)
+
+
+def test_strength_by_hand():
+    """60 N in shear, 20 N at 40°: 40 N half way, 20 N from there to pure pull-off."""
+    surface = Surface(60.0, 20.0, math.radians(40.0), 30.0, 0.5)
+    np.testing.assert_allclose(
+        surface.strength(np.radians([0.0, 20.0, 40.0, 60.0, 90.0])), [60, 40, 20, 20, 20]
+    )
+    # pressed at 45°: T = 60 + N/2 with N = T gives T = 120
+    assert surface.strength(-math.pi / 4) == pytest.approx(120.0 * math.sqrt(2.0))
+
+
+@settings(max_examples=150, deadline=None)
+@given(surfaces())
+def test_half_planes_stay_inside_the_law_in_every_direction(surface):
+    assert (reach(surface, DIRECTIONS) <= law(surface, DIRECTIONS) * (1.0 + 1e-9)).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(surfaces())
+def test_half_planes_meet_the_law_at_their_nodes(surface):
+    surface = replace(surface, compression_gain=0.0)
+    nodes = np.linspace(0.0, surface.pull_off_angle, surface.half_planes + 1)
+    np.testing.assert_allclose(reach(surface, nodes), law(surface, nodes), rtol=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(surfaces())
+def test_the_gap_closes_with_the_square_of_the_number_of_half_planes(surface):
+    surface = replace(surface, compression_gain=0.0)
+    gaps = [area_between(replace(surface, half_planes=k)) for k in (1, 2, 4, 8, 16)]
+    for coarse, fine in itertools.pairwise(gaps):
+        assert fine <= coarse * 0.35 + 1e-9 * surface.shear_limit**2
+
+
+@settings(max_examples=100, deadline=None)
+@given(surfaces())
+def test_one_half_plane_more_is_needed_only_where_the_last_leaves_the_curve(surface):
+    """Pure pull-off is capped at f_min: by the last chord, or by one more that closes it off."""
+    pull = reach(surface, np.array([math.pi / 2]))[0]
+    assert pull <= surface.pull_off_limit * (1.0 + 1e-9)
+    pieces = [p for p in surface.pieces() if p.limit == "pull_off"]
+    assert len(pieces) in (surface.half_planes, surface.half_planes + 1)
+    last_alone = [p.capacity / -p.a_normal for p in pieces[: surface.half_planes]]
+    closes = min(last_alone) > surface.pull_off_limit * (1.0 + 1e-9)
+    if surface.pull_off_angle < math.pi / 2 - 1e-6:
+        assert closes == (len(pieces) == surface.half_planes + 1)
+
+
+def test_the_closing_chord_by_hand():
+    """f_max = f_min = 10 N, φ_max = 45°: the curve is a circle; one chord alone leaves it."""
+    surface = Surface(10.0, 10.0, math.pi / 4, 5.0, 0.0)
+    shear, first, closing = surface.pieces()
+    assert shear.limit == "shear"
+    assert (first.limit, closing.limit) == ("pull_off", "pull_off")
+    assert first.a_shear / -first.a_normal == pytest.approx(
+        math.sin(math.pi / 4) / (1.0 - math.cos(math.pi / 4))
+    )
+    assert closing.capacity / -closing.a_normal == pytest.approx(10.0)
+
+
+def test_one_half_plane_is_the_papers_straight_line():
+    """T + 4 P = T_max through (T_max, 0): the fit to the extents of Fig. 13."""
+    _, line = Surface.named("sandpaper-36").pieces()
+    assert -line.a_normal / line.a_shear == pytest.approx(4.0, rel=1e-9)
+    assert line.capacity / line.a_shear == pytest.approx(21.0)
+    assert math.hypot(line.a_shear, line.a_normal) == pytest.approx(1.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(surfaces())
+def test_purely_sideways_every_piece_gives_the_lateral_limit(surface):
+    for piece in surface.pieces():
+        assert piece.capacity / piece.a_lateral == pytest.approx(surface.lateral_limit)
+        assert piece.a_lateral > 0.0
+
+
+def test_pressing_raises_the_shear_limit_by_the_compression_gain():
+    (shear, *_) = replace(Surface.named("rock"), compression_gain=0.2).pieces()
+    assert shear.capacity - shear.a_normal * 100.0 == pytest.approx(63.0 + 0.2 * 100.0)
+
+
+def test_presets_are_ordered_from_sandpaper_to_rock():
+    names = ["sandpaper-36", "concrete-fine", "concrete-coarse", "rock"]
+    assert sorted(surface_names()) == sorted(names)
+    limits = [Surface.named(name).shear_limit for name in names]
+    assert limits == sorted(limits)
+    assert len(set(limits)) == 4
+    # "The maximum force on rock is typically 2-5 times greater" (Section 6)
+    assert 2.0 <= limits[3] / limits[0] <= 5.0
+
+
+def test_an_unknown_preset_is_answered_with_the_known_ones():
+    with pytest.raises(InvalidInputError, match=r"granite.*sandpaper-36.*rock"):
+        Surface.named("granite")
+
+
+def test_own_values_follow_from_shear_alone_by_the_default_ratios():
+    own, preset = Surface.from_values({"shear_limit": 63.0}), Surface.named("rock")
+    assert own == preset
+    other = Surface.from_values({"shear_limit": 63.0, "lateral_limit": 7.0, "half_planes": 3})
+    assert other == replace(preset, lateral_limit=7.0, half_planes=3)
+
+
+@pytest.mark.parametrize(
+    ("values", "field"),
+    [
+        ({}, "shear_limit"),
+        ({"shear_limit": 0.0}, "shear_limit"),
+        ({"shear_limit": -1.0}, "shear_limit"),
+        ({"shear_limit": math.nan}, "shear_limit"),
+        ({"shear_limit": math.inf}, "shear_limit"),
+        ({"shear_limit": 60.0, "pull_off_limit": 61.0}, "pull_off_limit"),
+        ({"shear_limit": 60.0, "pull_off_limit": 0.0}, "pull_off_limit"),
+        ({"shear_limit": 60.0, "lateral_limit": 0.0}, "lateral_limit"),
+        ({"shear_limit": 60.0, "pull_off_angle": 0.0}, "pull_off_angle"),
+        ({"shear_limit": 60.0, "pull_off_angle": 1.6}, "pull_off_angle"),
+        ({"shear_limit": 60.0, "compression_gain": -0.1}, "compression_gain"),
+        ({"shear_limit": 60.0, "compression_gain": math.nan}, "compression_gain"),
+        ({"shear_limit": 60.0, "half_planes": 0}, "half_planes"),
+        ({"shear_limit": 60.0, "half_planes": 65}, "half_planes"),
+        ({"shear_limit": 60.0, "half_planes": 2.5}, "half_planes"),
+        ({"shear_limit": 60.0, "shear": 1.0}, "shear"),
+    ],
+)
+def test_impossible_surfaces_are_refused_by_field(values, field):
+    with pytest.raises(InvalidInputError) as caught:
+        Surface.from_values(values)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("count", [2, 2.0, 64])
+def test_a_whole_number_of_half_planes_is_used(count):
+    surface = Surface.from_values({"shear_limit": 60.0, "half_planes": count})
+    assert len([p for p in surface.pieces() if p.limit == "pull_off"]) >= count

@@ -1,0 +1,284 @@
+"""The check that every plan passes: it finds each number that is wrong, and a solver that is."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import peer
+import pytest
+from stances import CALIBRATION_LOAD, ask, on_wall, random_question
+
+from hand_models.holds import Cylinder, Edge, Plane
+from planner import program
+from planner.plan import Plan
+from planner.program import Outcome
+from planner.solve import hand_space, plan, settle
+from planner.stance import Question
+from planner.verify import equilibrium, problems
+
+QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
+HAND, FINGER = 2, 1
+"""rear_left, inner_left."""
+
+TILES = ("fingers", FINGER, "tiles")
+BASE = ("fingers", 0, "tiles", 0)
+PALM = ("palm",)
+
+
+@cache
+def honest() -> Plan:
+    return plan(QUESTION)
+
+
+def spoilt(thing, path, change):
+    """A copy of nested tuples and dataclasses with ``change`` made at the end of ``path``."""
+    head, *rest = path
+    part = thing[head] if isinstance(head, int) else getattr(thing, head)
+    part = spoilt(part, rest, change) if rest else change(part)
+    if isinstance(head, int):
+        return (*thing[:head], part, *thing[head + 1 :])
+    return replace(thing, **{head: part})
+
+
+def complaints(answer: Plan, question=QUESTION, wrench=None) -> list[str]:
+    return problems(
+        question,
+        [settle(hand, question.stance) for hand in question.stance.hands],
+        answer.hands,
+        answer.utilisation,
+        answer.body_wrench if wrench is None else wrench,
+    )
+
+
+def axis(index: int, by: float):
+    def change(vector):
+        vector = vector.copy()
+        vector[index] += by
+        return vector
+
+    return change
+
+
+def more(by: float):
+    return lambda value: value + by
+
+
+TAMPERED = {
+    "tension": (("fingers", FINGER, "tendon_tension"), more(0.01), "not what the plan says"),
+    "slack tendon": (("fingers", FINGER, "tendon_tension"), lambda f: -1.0, "tension of"),
+    "no tension": (("fingers", FINGER, "tendon_tension"), lambda f: float("nan"), "tension of"),
+    "infinite tension": (
+        ("fingers", FINGER, "tendon_tension"),
+        lambda f: float("inf"),
+        "tension of",
+    ),
+    "shear": ((*TILES, 1, "shear"), more(0.01), "not what the plan says"),
+    "shear of the base tile": ((*BASE, "shear"), more(0.01), "not what the plan says"),
+    "normal": ((*TILES, 2, "normal"), more(-0.01), "not what the plan says"),
+    "normal of the base tile": ((*BASE, "normal"), more(0.01), "not what the plan says"),
+    "lateral": ((*TILES, 1, "lateral"), more(0.01), "force and loads disagree"),
+    "no load": ((*TILES, 1, "shear"), lambda t: float("nan"), "not what the plan says"),
+    "shear axis": ((*TILES, 1, "shear_axis"), lambda a: -a, "force and loads disagree"),
+    "normal axis": ((*TILES, 1, "normal_axis"), axis(1, 0.01), "force and loads disagree"),
+    "force x": ((*TILES, 1, "force"), axis(0, 0.01), "force and loads disagree"),
+    "force y": ((*TILES, 1, "force"), axis(1, 0.01), "force and loads disagree"),
+    "force z": ((*TILES, 1, "force"), axis(2, 0.01), "force and loads disagree"),
+    "no force": ((*TILES, 1, "force"), axis(2, float("nan")), "force and loads disagree"),
+    "position": ((*TILES, 1, "position"), axis(1, 0.001), "not the sum"),
+    "utilisation of a tile": ((*TILES, 1, "utilisation"), more(-1e-4), "utilisation"),
+    "palm pulls": ((*PALM, "force"), lambda f: f * [1.0, 1.0, -1.0], "cannot exert"),
+    "palm pushes along x": ((*PALM, "force"), lambda f: f * [-1.0, 1.0, 1.0], "cannot exert"),
+    "palm sideways": ((*PALM, "force"), axis(1, 0.01), "cannot exert"),
+    "palm presses": ((*PALM, "force"), axis(2, 0.01), "not the sum"),
+    "palm position": ((*PALM, "position"), axis(1, 0.001), "not the sum"),
+    "palm moment": ((*PALM, "moment"), axis(0, 0.01), "not the sum"),
+    "palm utilisation": ((*PALM, "utilisation"), more(1e-4), "palm: utilisation"),
+    "palm without rock": ((*PALM, "engaged"), lambda e: (), "touches nothing"),
+    "wrench force": (("wrench",), axis(2, 0.01), "not the sum"),
+    "wrench moment": (("wrench",), axis(4, 0.01), "not the sum"),
+    "no wrench": (("wrench",), axis(0, float("nan")), "not the sum"),
+    "utilisation of a hand": (("utilisation",), more(-1e-4), "rear_left: utilisation"),
+    "no utilisation of a hand": (
+        ("utilisation",),
+        lambda u: float("nan"),
+        "rear_left: utilisation",
+    ),
+}
+
+
+def test_honest_plans_pass():
+    assert complaints(honest()) == []
+    for seed in range(12):
+        question = random_question(seed)
+        answer = plan(question)
+        if answer.hands is not None:
+            assert complaints(answer, question) == []
+
+
+def test_the_plan_that_is_tampered_with_loads_everything():
+    hand = honest().hands[HAND]
+    assert np.abs(hand.palm.force[[0, 2]]).min() > 1.0
+    for tile in hand.fingers[FINGER].tiles:
+        assert min(abs(tile.shear), abs(tile.normal)) > 1e-2
+
+
+@pytest.mark.parametrize(("path", "change", "words"), TAMPERED.values(), ids=TAMPERED.keys())
+def test_a_number_that_is_tampered_with_is_found(path, change, words):
+    found = complaints(spoilt(honest(), ("hands", HAND, *path), change))
+    assert any(words in each for each in found), found
+
+
+def test_a_wrong_utilisation_of_the_plan_is_found():
+    for wrong in (0.999 * honest().utilisation, 1.001 * honest().utilisation, float("nan"), 0.0):
+        assert complaints(replace(honest(), utilisation=wrong))
+
+
+@pytest.mark.parametrize("component", range(6))
+def test_balance_for_another_wrench_is_found(component):
+    size = np.linalg.norm(honest().body_wrench)
+    wrench = honest().body_wrench + 2e-6 * size * np.eye(6)[component]
+    assert any("balance" in each for each in complaints(honest(), wrench=wrench))
+
+
+def test_hands_that_changed_places_are_found():
+    hands = list(honest().hands)
+    hands[0], hands[1] = (replace(hands[b], limb=hands[a].limb) for a, b in ((0, 1), (1, 0)))
+    assert complaints(replace(honest(), hands=tuple(hands)))
+
+
+def test_equilibrium_is_the_affine_map_of_tension():
+    """Eq. 6 solved in full against Eq. 14, on several holds and tensions."""
+    for stance in (on_wall(), on_wall(Cylinder(0.7), closing_tension=50.0), on_wall(Plane())):
+        settled = settle(stance.hands[0], stance)
+        for i, finger in enumerate(settled.fingers):
+            tiles = np.flatnonzero(settled.finger_of == i)[-3:]
+            for tension in (0.0, 37.0, 90.0, 700.0):
+                outer = i in (0, 3)
+                shear, normal, _ = equilibrium(finger, tension, settled.closing_tension, outer)
+                loads = settled.loads[tiles, :, 0] + tension * settled.loads[tiles, :, 1]
+                np.testing.assert_allclose(shear, loads[:, 0], rtol=1e-9, atol=1e-9)
+                np.testing.assert_allclose(normal, loads[:, 1], rtol=1e-9, atol=1e-9)
+
+
+def honest_outcome() -> Outcome:
+    found = {}
+
+    def keep(data):
+        found["outcome"] = original(data)
+        return found["outcome"]
+
+    original, program.margin = program.margin, keep
+    try:
+        plan(QUESTION)
+    finally:
+        program.margin = original
+    return found["outcome"]
+
+
+LIES = {
+    "no loads at all": lambda o: replace(o, value=0.0, loads=tuple(0.0 * y for y in o.loads)),
+    "loads off by a part in ten thousand": lambda o: replace(
+        o, value=0.5 * o.value, loads=tuple(1.0001 * y for y in o.loads)
+    ),
+    "not a number": lambda o: replace(
+        o, value=0.5 * o.value, loads=tuple(y + float("nan") for y in o.loads)
+    ),
+    "enormous": lambda o: replace(o, value=0.5 * o.value, loads=tuple(1e9 * y for y in o.loads)),
+    "negative": lambda o: replace(o, value=0.5 * o.value, loads=tuple(-y for y in o.loads)),
+}
+
+
+@pytest.mark.parametrize("lie", LIES.values(), ids=LIES.keys())
+def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
+    outcome = lie(honest_outcome())
+    monkeypatch.setattr(program, "margin", lambda data: outcome)
+    answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
+    assert answer.status == "failed"
+    assert not answer.verified
+    for name in ("utilisation", "hands", "limiting", "prices", "certificate", "residual"):
+        assert getattr(answer, name) is None
+    assert "check" in answer.reason
+
+
+def gently(tension: float, hold, closing_tension: float) -> tuple[Question, tuple[np.ndarray, ...]]:
+    """A question and the loads that balance it: every tendon at one tension, and nothing else."""
+    stance = on_wall(hold, closing_tension=closing_tension, palm=False)
+    loads, total = [], np.zeros(6)
+    for i, hand in enumerate(stance.hands):
+        _, space = hand_space(stance, hand.limb)
+        y = np.where([name.endswith("/tension") for name in space.columns], tension, 0.0)
+        loads.append(y)
+        total += peer.reaction(ask(stance), i, space.wrench(y))
+    return ask(stance, body_wrench=total), tuple(loads)
+
+
+@pytest.mark.parametrize(
+    ("tension", "hold", "closing_tension", "words"),
+    [
+        (28.0, Cylinder(0.3), 37.0, "dragged backwards"),
+        (25.0, Edge(0.05, 1.8), 25.0, "leave its stop"),
+    ],
+)
+def test_a_solver_that_ignores_a_hard_row_gets_failed(
+    monkeypatch, tension, hold, closing_tension, words
+):
+    question, loads = gently(tension, hold, closing_tension)
+    lie = replace(honest_outcome(), value=-1.0, loads=loads)
+    monkeypatch.setattr(program, "margin", lambda data: lie)
+    answer = plan(question)
+    assert answer.status == "failed"
+    assert words in answer.reason
+
+
+@pytest.mark.parametrize("word", ["infeasible", "user_limit", "solver_error"])
+def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
+    nothing = Outcome(False, word, 0, float("nan"))
+    monkeypatch.setattr(program, "margin", lambda data: nothing)
+    answer = plan(QUESTION)
+    assert answer.status == "failed"
+    assert answer.certificate is None
+    assert not answer.verified
+    assert word in answer.reason
+    assert answer.solver.status == word
+
+
+def test_an_infeasible_stance_whose_distance_is_not_found_gets_failed(monkeypatch):
+    nothing = Outcome(False, "solver_error", 0, float("nan"))
+    monkeypatch.setattr(program, "nearest", lambda data: nothing)
+    answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
+    assert answer.status == "failed"
+    assert answer.certificate is None
+
+
+def test_a_distance_that_is_made_up_gets_no_certificate(monkeypatch):
+    """Both programs lie that a stance that can be balanced is infeasible."""
+    loads = tuple(0.0 * y for y in honest_outcome().loads)
+    far = Outcome(True, "optimal", 1, 3.0, loads=loads)
+    monkeypatch.setattr(program, "margin", lambda d: Outcome(False, "infeasible", 0, float("nan")))
+    monkeypatch.setattr(program, "nearest", lambda data: far)
+    answer = plan(QUESTION)
+    assert answer.status == "failed"
+    assert answer.certificate is None
+
+
+def test_a_tie_break_that_fails_or_lies_leaves_the_plan_of_least_utilisation(monkeypatch):
+    lies = (
+        Outcome(False, "solver_error", 0, float("nan")),
+        replace(honest_outcome(), loads=tuple(1.01 * y for y in honest_outcome().loads)),
+    )
+    for lie in lies:
+        monkeypatch.setattr(program, "effort", lambda data, cap, lie=lie: lie)
+        answer = plan(QUESTION)
+        assert answer.status == "optimal"
+        assert answer.verified
+        assert answer.utilisation == pytest.approx(honest().utilisation, abs=1e-5)
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, float("nan")])
+def test_a_load_factor_that_its_loads_do_not_give_is_left_out(monkeypatch, value):
+    lie = replace(honest_outcome(), value=value)
+    monkeypatch.setattr(program, "load_factor", lambda data: lie)
+    answer = plan(replace(QUESTION, want=frozenset({"load_factor"})))
+    assert answer.load_factor is None
+    assert not answer.load_factor_unbounded
+    assert answer.status == "optimal"
