@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.errors import SolverError
+from hand_models.errors import EmptySetError, SolverError
 from hand_models.frames import Array, Indices
 from hand_models.hand import FINGERS, SettledHand, Tile
 from hand_models.spines import HalfPlane
 from hand_models.wrench_space import Row, WrenchSpace
 
-__all__ = ["TensionLimit", "tension_limits", "wrench_space"]
+__all__ = ["TensionLimit", "parallelepiped", "tension_limits", "wrench_space"]
 
 PALM_SHEAR = "palm_shear"
 PALM_PRESSING = "palm_pressing"
@@ -225,6 +225,55 @@ def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:
                 best = TensionLimit(finger, tension, settled.tiles[t].phalanx)
         limits.append(best)
     return tuple(limits)
+
+
+def parallelepiped(settled: SettledHand) -> WrenchSpace:
+    """Return the paper's own fixed-wrist wrench space (Eq. 16): tensions alone, up to f_t(max).
+
+    No palm, no lateral reactions, and one limit for each finger, from the curve of Eq. 21 itself.
+    Tensions begin where no tile is dragged backwards, not at zero as in Eq. 16: a tile that has
+    caught the rock cannot push it.
+
+    Parameters
+    ----------
+    settled : SettledHand
+
+    Returns
+    -------
+    WrenchSpace
+        Columns: four tensions [N]; limit rows: f_t(max) of each finger, named after the phalanx
+        that lets go first, or the tendon's maximum if that is less.
+
+    Raises
+    ------
+    EmptySetError
+        If a finger's tiles are beyond their limits at every tension.
+    """
+    space = wrench_space(settled)
+    fingers = len(FINGERS)
+    limits, capacities = [], []
+    for limit in tension_limits(settled):
+        if limit.tension <= 0.0:
+            raise EmptySetError(
+                f"the {limit.phalanx} tile of {limit.finger} lets go at any tension"
+            )
+        by_tile = limit.tension < settled.hand.maximum_tension
+        name = "f_t_max" if by_tile else "tendon_tension"
+        phalanx = limit.phalanx if by_tile else None
+        limits.append(Row(limit.finger, phalanx, name, "limit", f"{limit.finger}/{name}"))
+        capacities.append(limit.tension if by_tile else settled.hand.maximum_tension)
+    hard = np.flatnonzero(np.abs(space.H[:, :fingers]).max(axis=1) > 0.0)
+    return WrenchSpace(
+        origin=space.origin,
+        generators=space.generators[:, :fingers],
+        columns=space.columns[:fingers],
+        rows=(*limits, *(space.rows[len(space.s) + i] for i in hard)),
+        L=np.eye(fingers),
+        l0=np.zeros(fingers),
+        s=np.array(capacities),
+        H=space.H[hard, :fingers],
+        h=space.h[hard],
+    )
 
 
 def _tile_tension_limit(settled: SettledHand, t: int) -> float:

@@ -361,7 +361,7 @@ class WrenchSpace:
     def volume(self) -> tuple[float, int]:
         """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.
 
-        Measured in scaled wrenches, so its unit is N^r, to about 1e-5 of it. Thousands of vertices
+        Measured in scaled wrenches, so its unit is N^r, to about 1e-4 of it. Thousands of vertices
         take seconds.
 
         Raises
