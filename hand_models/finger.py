@@ -50,6 +50,8 @@ class FingerModel:
         The same for the tile on a rotating base.
     shear_gain : float
         g = c_p k_c / (k_c + K_p), shear per newton of further tension.
+    spine_travel : float
+        How far spines reach [m].
     friction : float
         μ of M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
     """
@@ -66,6 +68,7 @@ class FingerModel:
     engagement: tuple[float, ...]
     base_engagement: float
     shear_gain: float
+    spine_travel: float
     friction: float
 
     @classmethod
@@ -92,6 +95,7 @@ class FingerModel:
             engagement=table.vector("tile", "engagement"),
             base_engagement=table.scalar("tile", "base_engagement"),
             shear_gain=table.scalar("tile", "pulley_ratio") * contact / (contact + spring),
+            spine_travel=table.scalar("tile", "spine_travel"),
             friction=table.scalar("tendon", "friction"),
         )
         for name in (
@@ -121,10 +125,11 @@ class FingerModel:
     def settle(self, section: Section | None, joint: tuple[float, float]) -> SettledFinger:
         """Close the finger on a section of rock, phalanx by phalanx from the base.
 
-        Each phalanx turns until its tile's face is tangent to the rock; where the tangent point
-        would lie off the tile, the tile's nearest edge touches instead; on flat rock the tile's
-        centre does. A phalanx that finds no rock within its joint's range stops at the upper limit
-        and carries nothing.
+        Each phalanx turns until its face is tangent to the rock. Where the tangent point lies off
+        the tile, the spines at the tile's nearest edge reach across the gap, if it is within their
+        travel. On flat rock the tile's centre touches. A phalanx that finds no rock within its
+        joint's range stops at the upper limit, one that has rock in its way at the lower one; both
+        carry nothing.
 
         Parameters
         ----------
@@ -149,20 +154,23 @@ class FingerModel:
         self, section: Section | None, joint: tuple[float, float], low: float, high: float
     ) -> Contact:
         nearest, farthest = self.tile_range
-        open_air = Contact(high, joint, self.tile_centre, "none")
         if section is None:
-            return open_air
+            return Contact(high, joint, self.tile_centre, "none")
         tangency = section.tangent(joint, self.tile_height, low, high)
-        if tangency is not None and nearest <= tangency.distance <= farthest:
-            return Contact(tangency.angle, joint, tangency.distance, "face")
         if tangency is not None:
-            along, kind = min(max(tangency.distance, nearest), farthest), "edge"
-        elif section.flat:
-            along, kind = self.tile_centre, "face"
-        else:
-            along, kind = nearest, "edge"
+            along = min(max(tangency.distance, nearest), farthest)
+            if along == tangency.distance:
+                return Contact(tangency.angle, joint, along, "face")
+            edge = Contact(tangency.angle, joint, along, "edge")
+            bridged = section.clearance(edge.point(self.tile_height)) <= self.spine_travel
+            return edge if bridged else replace(edge, kind="none")
+        along, kind = (self.tile_centre, "face") if section.flat else (nearest, "edge")
+        if section.clearance(Contact(low, joint, along, kind).point(self.tile_height)) <= 0.0:
+            return Contact(low, joint, along, "none")
         angle = section.touch(joint, along, self.tile_height, low, high)
-        return open_air if angle is None else Contact(angle, joint, along, kind)
+        if angle is None:
+            return Contact(high, joint, self.tile_centre, "none")
+        return Contact(angle, joint, along, kind)
 
 
 @dataclass(frozen=True)
@@ -185,6 +193,14 @@ class Contact:
     joint: tuple[float, float]
     along: float
     kind: str
+
+    def point(self, height: float) -> tuple[float, float]:
+        """Return the place (x, z) on a face that is ``height`` above the joint's axis [m]."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        return (
+            self.joint[0] + self.along * cosine - height * sine,
+            self.joint[1] + self.along * sine + height * cosine,
+        )
 
 
 @dataclass(frozen=True)
@@ -214,16 +230,7 @@ class SettledFinger:
     @cached_property
     def points(self) -> Array:
         """Contacts in (x, z) of F, shape (3, 2) [m]."""
-        h = self.model.tile_height
-        return np.array(
-            [
-                (
-                    c.joint[0] + c.along * math.cos(c.angle) - h * math.sin(c.angle),
-                    c.joint[1] + c.along * math.sin(c.angle) + h * math.cos(c.angle),
-                )
-                for c in self.contacts
-            ]
-        )
+        return np.array([contact.point(self.model.tile_height) for contact in self.contacts])
 
     @cached_property
     def directions(self) -> Array:

@@ -344,6 +344,11 @@ class SpinyHand:
         """
         grasp = grasp or Grasp()
         closing = self.closing_tension if grasp.closing_tension is None else grasp.closing_tension
+        if closing > self.maximum_tension:
+            raise InvalidInputError(
+                f"must be at most the tendon's {self.maximum_tension:g} N, got {closing:g}",
+                field="grasp.closing_tension",
+            )
         seating = self.seat(hold, grasp) if hold_in_hand is None else Seating(hold_in_hand, "given")
         hand_in_hold = seating.pose.inverse()
         into_rock = hand_in_hold.rotation[:, 2]

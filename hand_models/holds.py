@@ -36,6 +36,9 @@ Vector2 = tuple[float, float]
 PARALLEL: Final = 1e-3
 """Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
 
+LARGEST: Final = 1e6
+"""Size of a hold above which its curve is lost in rounding [m]."""
+
 SAMPLES: Final = 48
 """Angles tried to bracket a root where there is no closed form."""
 
@@ -77,6 +80,13 @@ class Section(ABC):
     ) -> float | None:
         """Return the first angle at which the point (along, height) of a phalanx is on the rock."""
 
+    @abstractmethod
+    def clearance(self, point: Vector2) -> float:
+        """Return about how far a point is from the rock, negative inside [m].
+
+        Exact on flat and round sections, and everywhere its sign is.
+        """
+
 
 def _within(angle: float, low: float, high: float) -> float | None:
     """Return ``angle`` plus the whole turns that bring it into [low, high], if any do."""
@@ -106,6 +116,9 @@ class FlatSection(Section):
         toward = math.atan2(self.normal[1], self.normal[0])
         angle = toward - math.acos(distance / radius) - math.atan2(height, along)
         return _within(angle, low, high)
+
+    def clearance(self, point: Vector2) -> float:
+        return self.offset - self.normal[0] * point[0] - self.normal[1] * point[1]
 
 
 @dataclass(frozen=True)
@@ -140,6 +153,10 @@ class RoundSection(Section):
         if abs(cosine) > 1.0:
             return None
         return _within(bearing - math.acos(cosine) - math.atan2(height, along), low, high)
+
+    def clearance(self, point: Vector2) -> float:
+        distance = math.hypot(point[0] - self.centre[0], point[1] - self.centre[1])
+        return distance - self.radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +218,10 @@ class ProfileSection(Section):
             return _profile_distance(self.M @ q + self.m[:, None], self.radius, self.faces)
 
         return _descent(clearance, low, high)
+
+    def clearance(self, point: Vector2) -> float:
+        q = self.M @ np.asarray(point) + self.m
+        return float(_profile_distance(q[:, None], self.radius, self.faces)[0])
 
 
 def _descent(function: Callable[[Array], Array], low: float, high: float) -> float | None:
@@ -307,8 +328,10 @@ class Hold(ABC):
 
 
 def _positive(value: float, field: str, unit: str = "m") -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InvalidInputError(f"must be above 0 {unit}, got {value:g}", field=field)
+    if not 0.0 < value <= LARGEST:
+        raise InvalidInputError(
+            f"must be above 0 and at most {LARGEST:g} {unit}, got {value:g}", field=field
+        )
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
@@ -26,7 +27,13 @@ from hand_models.frames import Array
 
 __all__ = ["PalmSharing", "share_load", "shear_capacity"]
 
-TOLERANCE = 1e-9
+TOLERANCE: Final = 1e-9
+
+COVERS: Final = 32
+"""Covering vectors tried before a problem is given up."""
+
+GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Spreads the covering vectors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +99,20 @@ def share_load(
         )
     if not 0.0 <= friction < 2.0:
         raise InvalidInputError(f"must be in [0, 2), got {friction:g}", field="friction")
+    try:
+        return _share(k, spring_stiffness, friction)
+    except SolverError:
+        # the same palm, its tendon threaded from the other end
+        mirrored = _share(k[::-1], spring_stiffness, friction)
+    return PalmSharing(
+        tile_stiffness=mirrored.tile_stiffness[::-1],
+        tile_travel=mirrored.tile_travel[::-1],
+        strand_stiffness=mirrored.strand_stiffness[::-1],
+        tendon_travel=-mirrored.tendon_travel[::-1],
+    )
 
+
+def _share(k: Array, spring_stiffness: float, friction: float) -> PalmSharing:
     n = len(k)
     rho = (1.0 - friction / 2.0) / (1.0 + friction / 2.0)
     # In units of k_mean·x. The unknowns are the strands' excesses α_i = F_i − ρ F_{i−1}: they give
@@ -123,14 +143,33 @@ def share_load(
 
 
 def _lemke(M: Array, q: Array) -> Array:
-    """Solve w = M z + q, w ≥ 0, z ≥ 0, w ⊥ z by Lemke's method with lexicographic pivots."""
+    """Solve w = M z + q, w ≥ 0, z ≥ 0, w ⊥ z by Lemke's method.
+
+    A path that ends on a ray says nothing of the problem, so it is tried with several covering
+    vectors; every solution is checked.
+    """
     n = len(q)
-    # columns: w (n), z (n), the covering variable, right-hand side
-    tableau = np.hstack([np.eye(n), -M, -np.ones((n, 1)), q[:, None]])
-    basis = list(range(n))
     if q.min() >= 0.0:
         return np.zeros(n)
-    entering, row = 2 * n, int(np.argmin(q))
+    size = 1.0 + float(np.abs(q).max())
+    for attempt in range(COVERS):
+        # the first is all ones; the others spread over the positive orthant
+        cover = 1.0 + attempt * np.modf(GOLDEN * np.arange(1, n + 1) * attempt)[0]
+        z = _lemke_path(M, q, cover)
+        if z is not None:
+            w = M @ z + q
+            if min(w.min(), z.min()) >= -1e-7 * size and np.abs(w * z).max() <= 1e-7 * size**2:
+                return z
+    raise SolverError("the palm's load sharing ended without a solution")
+
+
+def _lemke_path(M: Array, q: Array, cover: Array) -> Array | None:
+    """Follow Lemke's path with lexicographic pivots; None where it ends on a ray."""
+    n = len(q)
+    # columns: w (n), z (n), the covering variable, right-hand side
+    tableau = np.hstack([np.eye(n), -M, -cover[:, None], q[:, None]])
+    basis = list(range(n))
+    entering, row = 2 * n, int(np.argmin(q / cover))
     for _ in range(50 * n):
         tableau[row] /= tableau[row, entering]
         others = np.arange(n) != row
@@ -160,7 +199,7 @@ def _lemke(M: Array, q: Array) -> Array:
             ratios = tableau[rows, j] / column[rows]
             rows = rows[ratios <= ratios.min() + TOLERANCE]
         row = int(rows[0])
-    raise SolverError("the palm's load sharing ended without a solution")
+    return None
 
 
 @lru_cache(maxsize=4096)

@@ -203,15 +203,6 @@ def _preset(name: str) -> Surface:
 @lru_cache(maxsize=256)
 def _pieces(surface: Surface) -> tuple[HalfPlane, ...]:
     sideways = 1.0 / surface.lateral_limit
-    pieces = [
-        HalfPlane(
-            "shear",
-            1.0,
-            -surface.compression_gain,
-            surface.shear_limit * sideways,
-            surface.shear_limit,
-        )
-    ]
     angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
     radii = surface.strength(angles)
     # points (shear T, pull P) on the curve
@@ -221,6 +212,10 @@ def _pieces(surface: Surface) -> tuple[HalfPlane, ...]:
     last = _chord(nodes[-2], nodes[-1])
     if surface.pull_off_angle < math.pi / 2 and last[2] > last[1] * surface.pull_off_limit:
         nodes.append((0.0, surface.pull_off_limit))
+    # a gain steeper than the first chord would cut into the side of pull-off
+    shear, pull, _ = _chord(*nodes[:2])
+    gain = min(surface.compression_gain, pull / shear if shear > 0.0 else math.inf)
+    pieces = [HalfPlane("shear", 1.0, -gain, surface.shear_limit * sideways, surface.shear_limit)]
     for start, end in itertools.pairwise(nodes):
         shear, pull, capacity = _chord(start, end)
         pieces.append(HalfPlane("pull_off", shear, -pull, capacity * sideways, capacity))

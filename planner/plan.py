@@ -217,6 +217,8 @@ class Plan:
         Whether the independent check passed.
     reason : str
         One sentence that a climber understands.
+    warnings : tuple of str
+        What is odd about the stance: hands that touch nothing, or are out of reach.
     solver : SolverInfo
     time : Times
     """
@@ -233,5 +235,6 @@ class Plan:
     residual: Array | None
     verified: bool
     reason: str
+    warnings: tuple[str, ...]
     solver: SolverInfo
     time: Times

@@ -31,7 +31,7 @@ __all__ = ["plot_plan", "plot_route", "plot_wrench_space"]
 COLOURS: Final = LinearSegmentedColormap.from_list("load", ["#1a9850", "#e6a117", "#d73027"])
 UTILISATION: Final = Normalize(0.0, 1.0)
 PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
-ARROW: Final = 0.35
+ARROW: Final = 0.5
 """Length of the longest force arrow in a picture [m]."""
 
 
@@ -95,7 +95,8 @@ def _draw_view(
         return np.stack([sign * v[..., index], v[..., up]], axis=-1)
 
     hands = plan.hands or ()
-    longest = max([float(np.linalg.norm(hand.wrench[:3])) for hand in hands] + [1.0])
+    weight = float(np.linalg.norm(stance.gravity)) * stance.robot.mass
+    longest = max([float(np.linalg.norm(hand.wrench[:3])) for hand in hands] + [weight, 1.0])
     labels: dict[tuple[float, float], str] = {}
     for hand, place in zip(stance.hands, places, strict=True):
         settled = settle(hand, stance)
@@ -116,13 +117,16 @@ def _draw_view(
         force = -place.rotation @ hand_plan.wrench[:3]
         start, step = flat(place.position), flat(force) / longest * ARROW
         _arrow(axes, start, step, COLOURS(UTILISATION(hand_plan.utilisation)))
-        _write(axes, f"{np.linalg.norm(force):.0f} N", start + step, (0.0, 3.0), va="bottom")
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
+        size = f"{np.linalg.norm(force):.0f} N"
+        _write(axes, size, start + step, (0.0, 4.0), va="bottom", bbox=box)
     com = flat(stance.robot.com)
     axes.plot(*com, marker="o", color="tab:blue", markersize=8)
     gravity = flat(stance.body.rotation.T @ stance.gravity)
-    weight = gravity / max(float(np.linalg.norm(stance.gravity)), 1e-9) * ARROW
-    _arrow(axes, com, weight, "tab:blue")
-    _write(axes, "weight", com + weight / 2, (5.0, 0.0), color="tab:blue", ha="left")
+    pull = gravity * stance.robot.mass / longest * ARROW
+    _arrow(axes, com, pull, "tab:blue")
+    label = f"robot's weight\n{weight:.0f} N"
+    _write(axes, label, com + pull / 2, (5.0, 0.0), color="tab:blue", ha="left")
     axes.plot(*flat(np.zeros(3)), marker="+", color="black", markersize=10)
     _write(axes, "B", flat(np.zeros(3)), (-8.0, 4.0))
     axes.set_aspect("equal", adjustable="datalim")
@@ -312,6 +316,9 @@ def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
 
 # A climb ----------------------------------------------------------------------------------------
 
+CUT: Final = 2.0
+"""Largest utilisation that a route's picture shows in full."""
+
 PHASE_COLOURS: Final = {
     "start": "0.4",
     "shift": "tab:purple",
@@ -327,9 +334,12 @@ def plot_route(result: RouteResult, path: Path) -> None:
     index = np.arange(len(result.plans))
     used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
     cap = result.route.limits.utilisation
-    height = float(np.nanmax(np.append(used, cap))) * 1.1
+    # what is far beyond the limit is cut off and written in, so that the rest can be seen
+    height = min(float(np.nanmax(np.append(used, cap))), CUT) * 1.1
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(used), color=colours)
+    for i in np.flatnonzero(used > height):
+        upper.text(i, 0.9 * height, f"{used[i]:.1f}", ha="center", color="white", weight="bold")
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
         upper.text(i, height / 2, result.plans[i].status, rotation=90, ha="center", va="center")
@@ -340,7 +350,7 @@ def plot_route(result: RouteResult, path: Path) -> None:
     crux = result.crux
     upper.annotate(
         "crux",
-        (crux, height if np.isnan(used[crux]) else used[crux]),
+        (crux, height if np.isnan(used[crux]) else min(used[crux], height)),
         xytext=(0, 14),
         textcoords="offset points",
         ha="center",

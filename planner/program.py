@@ -74,6 +74,9 @@ SETTINGS: Final[dict[str, Any]] = {
 CAREFUL: Final[dict[str, Any]] = {"max_threads": 1, "warm_start": False}
 """The solver's own defaults, for a second try, on a new solver: an old one keeps its settings."""
 
+STATIONARY: Final = 1e-5
+"""How far multipliers may be from stationary, and below zero, to count as a bound."""
+
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
 
@@ -358,3 +361,23 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
     """Return the scaled body wrench of the hands' loads y [N], shape (6,)."""
     parts = [hand.G @ (y / LOAD_UNIT) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
     return np.asarray(sum(parts, start=np.zeros(6)))
+
+
+def least_bound(data: StanceData, outcome: Outcome) -> float:
+    """Return a lower bound of the least utilisation from the multipliers of `Margin`.
+
+    With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
+    u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
+    """
+    assert outcome.balance_dual is not None
+    nu = outcome.balance_dual
+    bound = -float(nu @ (data.wrench - sum(hand.g for hand in data.hands)))
+    leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
+    for hand, limit, hard in zip(data.hands, outcome.limit_duals, outcome.hard_duals, strict=True):
+        bound += float(limit @ hand.l0 - hard @ hand.h)
+        leak += float(np.abs(hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ nu).sum())
+        if min(limit.min(initial=0.0), hard.min(initial=0.0)) < -STATIONARY * max(
+            1.0, abs(outcome.value)
+        ):
+            return -np.inf
+    return bound if leak <= STATIONARY * max(1.0, abs(outcome.value)) else -np.inf

@@ -20,7 +20,7 @@ from typing import Final, Literal
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose
 from planner.plan import Plan
-from planner.solve import plan
+from planner.solve import plan, settle
 from planner.stance import HandOnHold, Limits, Load, Question, Stance
 
 __all__ = ["Move", "Route", "RouteResult", "Stage", "evaluate"]
@@ -223,7 +223,18 @@ def _in_processes(todo: Sequence[Stage], workers: int, done: Callable[[Stage, Pl
 
 def _plan_stage(stage: Stage) -> Plan:
     try:
+        if stage.phase == "place":
+            _must_touch(stage)
         return plan(stage.question)
     except InvalidInputError as error:
         place = "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
         raise error.within(place) from None
+
+
+def _must_touch(stage: Stage) -> None:
+    """Refuse a move that ends in the air."""
+    stance = stage.question.stance
+    hand = next(hand for hand in stance.hands if hand.limb == stage.limb)
+    settled = settle(hand, stance)
+    if not (settled.touching.any() or settled.palm.engaged):
+        raise InvalidInputError(f"{hand.limb} touches nothing there", field="hold")

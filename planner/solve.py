@@ -16,6 +16,7 @@ from hand_models.frames import Array, wrench_transport
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
+from planner.explain import limit_sentence, shortfall_sentence, warnings
 from planner.plan import (
     Certificate,
     FingerPlan,
@@ -37,6 +38,9 @@ __all__ = ["hand_space", "plan"]
 
 SLACK: Final = 1e-6
 """What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+
+OPTIMAL: Final = 1e-5
+"""How far, relatively, the utilisation may be above its proven lower bound."""
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
@@ -276,6 +280,7 @@ class _Answer:
             hands = self._hands(self.loads)
             utilisation = max(hand.utilisation for hand in hands)
             wrong = problems(self.question, self.settled, hands, utilisation, self.wrench)
+            wrong = wrong or self._not_least(utilisation)
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
                 hands = utilisation = None
@@ -284,11 +289,12 @@ class _Answer:
                 cap = self.question.limits.utilisation
                 status = "optimal" if utilisation <= cap + SLACK else "overloaded"
                 residual = self._residual(hands)
-                limiting, reason = self._explain(utilisation, status)
+                limiting, reason = self._explain(hands, utilisation, status)
         elif self.certificate is not None:
             status = "infeasible"
             verified = True
-            reason = _explain_shortfall(self.certificate)
+            touching = any(h.touching.any() or h.palm.engaged for h in self.settled)
+            reason = shortfall_sentence(self.certificate, touching)
         else:
             reason = f"the solver gave no usable answer ({self.outcome.status})"
         prices = None
@@ -307,9 +313,17 @@ class _Answer:
             residual=residual,
             verified=verified,
             reason=reason,
+            warnings=warnings(self.question.stance, self.settled),
             solver=SolverInfo(SOLVER, self.outcome.status, self.outcome.iterations),
             time=Times(times.model, times.solve, time.perf_counter() - start),
         )
+
+    def _not_least(self, utilisation: float) -> list[str]:
+        """Return what is wrong if the multipliers do not prove the utilisation the least."""
+        bound = program.least_bound(self.data, self.outcome)
+        if utilisation - bound <= OPTIMAL * max(1.0, utilisation):
+            return []
+        return [f"utilisation {utilisation:.6g} is only proven to be above {bound:.6g}"]
 
     def _residual(self, hands: Sequence[HandPlan]) -> Array:
         body = self.question.stance.body.inverse()
@@ -318,27 +332,31 @@ class _Answer:
             total = total - wrench_transport(body @ place.pose) @ hand.wrench
         return np.asarray(total)
 
-    def _explain(self, utilisation: float, status: Status) -> tuple[LimitName | None, str]:
-        """Return the limit with the largest utilisation, and a sentence about it."""
-        best: tuple[float, LimitName, float, float] | None = None
-        for place, space, y in zip(
-            self.question.stance.hands, self.spaces, self.loads, strict=True
-        ):
-            used = space.utilisations(y)
-            if len(used) and (best is None or used.max() > best[0]):
-                row = int(used.argmax())
-                load = float(space.L[row] @ y + space.l0[row])
-                name = _name(place.limb, space.rows[row])
-                best = (float(used[row]), name, load, float(space.s[row]))
-        if best is None:
-            return None, "nothing limits this stance"
-        _, name, load, capacity = best
-        verb = "carries" if utilisation <= 1.0 + SLACK else "would carry"
-        sentence = f"{_spoken(name)} {verb} {_newtons(load)} of {_newtons(capacity)}{_manner(name)}"
-        if status == "overloaded" and utilisation <= 1.0 + SLACK:
+    def _explain(
+        self, hands: Sequence[HandPlan], utilisation: float, status: Status
+    ) -> tuple[LimitName | None, str]:
+        """Return the limit with the largest utilisation, and a sentence about it.
+
+        Of limits that tie, the one with the highest price: the others only follow it.
+        """
+        close = utilisation - 2.0 * SLACK * max(1.0, utilisation)
+        prices = {price.name: price.price for price in self._prices()}
+        best: tuple[bool, float, float] | None = None
+        limiting: LimitName | None = None
+        sentence = "nothing limits this stance"
+        held = utilisation <= 1.0 + SLACK
+        for hand, space, y in zip(hands, self.spaces, self.loads, strict=True):
+            for row, used in enumerate(space.utilisations(y)):
+                name = _name(hand.limb, space.rows[row])
+                rank = (bool(used >= close), prices.get(name, 0.0), float(used))
+                if best is None or rank > best:
+                    best, limiting = rank, name
+                    load, capacity = float(used * space.s[row]), float(space.s[row])
+                    sentence = limit_sentence(name, load, capacity, hand, held=held)
+        if status == "overloaded" and held:
             cap = self.question.limits.utilisation
             sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
-        return name, sentence
+        return limiting, sentence
 
     def _prices(self) -> tuple[Price, ...]:
         """Return the price of each limit that binds; rows of one name are one limit."""
@@ -462,43 +480,3 @@ def _read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) ->
 
 def _name(limb: str, row: Row) -> LimitName:
     return LimitName(limb, row.finger, row.phalanx, row.limit)
-
-
-def _spoken(name: LimitName) -> str:
-    """Say whose limit it is: ``front_left: proximal tile of inner_right``."""
-    if name.phalanx is not None:
-        return f"{name.limb}: {name.phalanx} tile of {name.finger}"
-    if name.finger is not None:
-        return f"{name.limb}: tendon of {name.finger}"
-    return f"{name.limb}: palm"
-
-
-def _newtons(force: float) -> str:
-    return f"{force:.0f} N" if abs(force) >= 10.0 else f"{force:.2g} N"
-
-
-MANNERS: Final = {
-    "shear": " in shear",
-    "pull_off": " toward pull-off",
-    "palm_shear": " in shear",
-    "palm_pressing": " in pressing",
-}
-
-
-def _manner(name: LimitName) -> str:
-    return MANNERS.get(name.limit, "")
-
-
-def _explain_shortfall(certificate: Certificate) -> str:
-    axes = ("fx", "fy", "fz", "mx", "my", "mz")
-    units = ("N",) * 3 + ("N·m",) * 3
-    worst = int(np.argmax(np.abs(certificate.shortfall / WRENCH_UNIT)))
-    missing = float(certificate.shortfall[worst])
-    sentence = (
-        f"no plan balances the body at any utilisation: {missing:+.3g} {units[worst]} of "
-        f"{axes[worst]} (in B) is missing"
-    )
-    if certificate.blocking:
-        first = certificate.blocking[0]
-        sentence += f"; {first.limit.replace('_', ' ')} of {_spoken(first)} is in the way"
-    return sentence

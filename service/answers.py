@@ -37,6 +37,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         id=identifier,
         status=answer.status,
         reason=answer.reason,
+        warnings=list(answer.warnings),
         body_wrench=_vector(answer.body_wrench),
         utilisation=_number(answer.utilisation),
         load_factor=_number(answer.load_factor),

@@ -10,7 +10,8 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -107,19 +108,42 @@ def crux() -> None:
 
 @crux.command()
 @click.argument("stance")
+@click.option(
+    "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
+)
 @json_option
-def plan(stance: str, as_json: bool) -> int:
+def plan(stance: str, picture: Path | None, as_json: bool) -> int:
     """Make one plan, without the network."""
     from service import dispatch
 
     request = _with_extras(read_request(stance))
     reply = dispatch.plan(request)
+    if picture is not None:
+        _draw_plan(request, picture)
     bare = dispatch.plan(_without_palms(request))
     if as_json:
         _say(msgspec.to_builtins(reply) | {"load_factor_without_palm": bare.load_factor})
     else:
         print_plan(reply, console(), without_palm=bare)
     return EXIT_STATUS.get(reply.status, FAILED)
+
+
+def _draw_plan(request: PlanRequest, picture: Path) -> None:
+    from planner import plots, solve
+    from service import questions
+
+    question = questions.question(request)
+    with _writing(picture):
+        plots.plot_plan(solve.plan(question), question.stance, picture)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Turn what goes wrong in writing a picture into one line about the option."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"cannot write {path}: {error}", field="--plot") from None
 
 
 def _with_extras(request: PlanRequest) -> PlanRequest:
@@ -156,7 +180,8 @@ def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) ->
         from planner import plots
 
         settled, space = solve.hand_space(questions.stance(request.stance), limb)
-        plots.plot_wrench_space(settled, space, picture, f"{limb} of {stance}")
+        with _writing(picture):
+            plots.plot_wrench_space(settled, space, picture, f"{limb} of {stance}")
     if as_json:
         _say(reply)
     else:
@@ -250,8 +275,6 @@ def _show(reply: PlanReply, as_json: bool) -> int:
 @json_option
 def demo(picture: Path, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer."""
-    from planner import plots, solve
-    from service import questions
     from service.server import PlanService
 
     request = _with_extras(read_request(DEMO_STANCE))
@@ -259,8 +282,7 @@ def demo(picture: Path, as_json: bool) -> int:
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with open_session(config) as session, PlanService(session):
         reply = CruxClient(session).plan(request)
-    question = questions.question(request)
-    plots.plot_plan(solve.plan(question), question.stance, picture)
+    _draw_plan(request, picture)
     status = _show(reply, as_json)
     if not as_json:
         console().print(f"picture: {picture}", markup=False)
@@ -295,7 +317,8 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
     from service.climb import print_route
 
     climb = questions.route(read_route(route))
-    with Progress(console=console(stderr=True), transient=True, disable=as_json) as bar:
+    screen = console(stderr=True)
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(f"planning {climb.name}", total=None)
         result = evaluate(
             climb, workers, lambda done, total: bar.update(task, completed=done, total=total)

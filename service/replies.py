@@ -226,6 +226,7 @@ class PlanReply(Reply, kw_only=True):
     verified: bool
     solver: Solver
     time: Time
+    warnings: list[str] = []
 
 
 class Contact(Struct, kw_only=True):

@@ -7,6 +7,7 @@ from typing import Final
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from service.replies import AXES, Finger, Hand, PlanReply, Price, Tile, WrenchSpaceReply
@@ -39,6 +40,8 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     parts.append(f"{1e3 * reply.time.total:.0f} ms")
     out.print("   ".join(parts))
     out.print(reply.reason, markup=False)
+    for warning in reply.warnings:
+        out.print(f"[bold]warning:[/bold] {escape(warning)}")
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if reply.hands is not None:

@@ -304,3 +304,16 @@ def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
     out = capfd.readouterr().out
     for name in command.crux.commands:
         assert f"  {name} " in out
+
+
+def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
+    stance, tmp_path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "plan.png"
+    assert run(["plan", stance(wall_request()), "--plot", str(picture), "--json"]) == DONE
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    result(capfd)
+    assert run(["plan", stance(wall_request()), "--plot", str(tmp_path / "a.nothing")]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.startswith("crux: --plot: cannot write ")
+    assert len(error.splitlines()) == 1

@@ -1,5 +1,6 @@
 """The fixed wrist: f_t(max) of Eq. 15, the parallelepiped of Eq. 16, and what each row says."""
 
+import dataclasses
 import itertools
 import math
 
@@ -16,6 +17,7 @@ from hand_models import (
     Grasp,
     Plane,
     Pose,
+    Surface,
     tension_limits,
     wrench_space,
 )
@@ -104,6 +106,24 @@ def test_a_tile_beyond_its_law_by_closing_alone_is_safe_only_at_less_tension():
         assert limit.tension == pytest.approx(37.0 - 0.55 * 21.5 / 20.0, abs=1e-5)
     weaker = pinch(0.3, ROCK.from_values({"shear_limit": 1.0}))
     assert [limit.tension for limit in tension_limits(weaker)] == [0.0] * 4
+
+
+def test_a_load_that_cuts_the_notch_of_the_curve_lets_go_there():
+    """Pulled off with 4 N while shear grows from 7 N, past the kink at 10 N and 0.4 rad.
+
+    Out of the arc of 10 N at T = √(10² − 4²) N, back inside the linear part before 10 N, and out
+    again for good near 31 N: the first is what counts.
+    """
+    surface = Surface(40.0, 10.0, 0.4, 20.0, 0.0)
+    settled = pinch(surface=surface)
+    loads = np.zeros_like(settled.loads)
+    tile = own_tiles(settled, 1)[0]
+    loads[tile] = [[-30.0, 1.0], [-4.0, 0.0]]
+    limits = tension_limits(dataclasses.replace(settled, loads=loads))
+    back_inside = np.array([10.0, -4.0])
+    assert np.hypot(*back_inside) < law(surface, *back_inside)
+    assert limits[1].tension == pytest.approx(30.0 + math.sqrt(84.0), rel=1e-9)
+    assert limits[0].tension == math.inf
 
 
 def test_a_finger_in_the_air_never_lets_go():

@@ -167,7 +167,7 @@ def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
         else:
             changed = [a.finger for a, b in zip(one.tiles, other.tiles, strict=True) if a != b]
             assert all(finger.startswith("outer") for finger in changed)
-    assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 12
+    assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 20
 
 
 @settings(max_examples=100, deadline=None)
@@ -178,7 +178,11 @@ def test_tiles_said_to_touch_are_on_the_rock(seed):
         return
     on = settled.touching
     clearance = in_hand(settled.hold, settled.seating.pose, settled.positions)
-    np.testing.assert_allclose(clearance[on], 0.0, atol=1e-9)
+    faces = np.array([tile.contact == "face" for tile in settled.tiles])
+    np.testing.assert_allclose(clearance[faces], 0.0, atol=1e-9)
+    # at an edge, spines reach across the gap
+    assert (clearance[on] > -1e-9).all()
+    assert (clearance[on] < HAND.spine_travel + 1e-9).all()
     for tile, place in zip(settled.tiles, settled.positions, strict=True):
         if tile.phalanx == "base" and tile.contact != "none":
             assert abs(place[2]) <= 0.005 + 1e-12

@@ -1,5 +1,7 @@
 """What the tiles of a hand carry: every force of every finger, and their sum."""
 
+import math
+
 import numpy as np
 from hands import HAND, pinch, settled_at
 from hypothesis import given, settings
@@ -88,21 +90,45 @@ def test_the_hands_wrench_is_the_sum_of_its_tiles_and_palms_forces(seed):
     np.testing.assert_allclose(space.wrench(y), expected, rtol=1e-9, atol=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds)
-def test_every_finger_that_touches_has_a_tension_that_keeps_it_there(seed):
-    settled = settled_at(seed)
-    if settled is None:
-        return
-    for i in range(4):
-        mine = np.flatnonzero((settled.finger_of == i) & settled.touching)
-        rows = [settled.loads[t, 0] for t in mine if settled.tiles[t].phalanx != "base"]
-        rows += [torque for finger, _, torque in settled.stops if finger == i]
-        crossings = [-c / s for c, s in rows if s != 0.0]
-        tensions = np.array([f for f in (0.0, *crossings, 1e5) if f >= 0.0])
-        if rows:
-            constant, slope = np.array(rows).T
-            held = (constant[:, None] + slope[:, None] * tensions >= -1e-9).all(axis=0)
-            assert held.any()
-        else:
-            assert i not in [finger for finger, _, _ in settled.stops]
+def tension_range(rows):
+    """Least and largest tension at which constant + slope f ≥ 0 for every row."""
+    least, most = 0.0, math.inf
+    for constant, slope in rows:
+        if slope > 0.0:
+            least = max(least, -constant / slope)
+        elif slope < 0.0:
+            most = min(most, -constant / slope)
+        elif constant < 0.0:
+            most = -math.inf
+    return least, most
+
+
+def test_a_finger_stays_closed_exactly_where_some_tension_keeps_it():
+    """Its tiles dragged forward and its joints' stops pushing; else it is released."""
+    released = 0
+    for seed in range(60):
+        settled = settled_at(seed)
+        if settled is None:
+            continue
+        hand_in_hold = settled.seating.pose.inverse()
+        turn = hand_in_hold.rotation
+        frames = HAND.frames(settled.grasp.outer_rotation)
+        for i, (name, frame) in enumerate(zip(FINGERS, frames, strict=True)):
+            section = settled.hold.section(
+                hand_in_hold.apply(frame.joint), turn @ frame.along, turn[:, 2]
+            )
+            closed = HAND.finger.settle(section, (0.0, 0.0))
+            outer = name.startswith("outer")
+            shears = closed.shears(settled.closing_tension, outer)
+            stops = closed.stop_torques(shears, closed.normals(shears, outer), outer)
+            least, most = tension_range([*shears, *stops])
+            stays = any(closed.touching) and least <= most
+            assert any(settled.fingers[i].touching) == stays
+            held = [torque for finger, _, torque in settled.stops if finger == i]
+            assert len(held) == (closed.touching.count(False) if stays else 0)
+            if not stays:
+                tiles = np.flatnonzero(settled.finger_of == i)[-3:]
+                assert not settled.touching[tiles].any()
+                np.testing.assert_array_equal(settled.loads[tiles], 0.0)
+                released += any(closed.touching)
+    assert released >= 3

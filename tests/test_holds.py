@@ -132,12 +132,14 @@ def test_oblique_sections_go_over_into_square_ones(oblique):
 
 
 @pytest.mark.parametrize("hold", [Cylinder(0.3), Edge(0.1, 1.2)])
-def test_a_finger_along_the_axis_lies_on_straight_rock(hold):
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_finger_along_the_axis_lies_on_straight_rock(hold, way):
     origin = np.array([0.05, 0.0, -0.02])
-    cut = Cut(hold, origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    cut = Cut(hold, origin, np.array([0.0, way, 0.0]), np.array([0.0, 0.0, 1.0]))
     assert isinstance(cut.section, FlatSection)
     assert cut.section.tangent(JOINT, HEIGHT, LOW, HIGH) is None
     angle = cut.section.touch(JOINT, 0.04, 0.0, LOW, HIGH)
+    assert 0.0 < angle < math.pi / 2
     assert abs(cut.distance(tile_point(angle, 0.04, 0.0))) < 1e-12
     # and beside the axis by more than the radius there is no rock
     assert hold.section([0.5, 0.0, -0.02], cut.s, cut.t) is None or isinstance(hold, Edge)

@@ -150,7 +150,7 @@ def test_a_hold_inside_the_palm_names_its_move(route, workers: int):
     broken = replace(route, moves=(*route.moves[:2], replace(move, hand=into_palm)))
     with pytest.raises(InvalidInputError, match="inside the palm") as caught:
         evaluate(broken, workers=workers)
-    assert caught.value.field == "moves[2] (place).stance.hands[0].hold"
+    assert caught.value.field == "moves[2] (place).hold"
 
 
 def test_a_limb_that_holds_nothing_cannot_move(route):
@@ -249,3 +249,11 @@ def read_text(name: str) -> bytes:
 
     folder = Path(service.__file__).parent / "examples" / "routes"
     return (folder / f"{name}.json").read_bytes()
+
+
+def test_a_move_that_ends_in_the_air_is_refused(route):
+    move = route.moves[0]
+    away = replace(move.hand, hold_in_hand=Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
+    with pytest.raises(InvalidInputError, match="touches nothing") as caught:
+        evaluate(replace(route, moves=(replace(move, hand=away),)))
+    assert caught.value.field == "moves[0] (place).hold"

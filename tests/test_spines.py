@@ -200,3 +200,10 @@ def test_impossible_surfaces_are_refused_by_field(values, field):
 def test_a_whole_number_of_half_planes_is_used(count):
     surface = Surface.from_values({"shear_limit": 60.0, "half_planes": count})
     assert len([p for p in surface.pieces() if p.limit == "pull_off"]) >= count
+
+
+def test_more_strength_under_pressing_never_costs_strength_under_pull_off():
+    plain = Surface.from_values({"shear_limit": 60.0})
+    for gain in (0.5, 3.9, 4.1, 20.0):
+        gained = replace(plain, compression_gain=gain)
+        assert (reach(gained, DIRECTIONS) >= reach(plain, DIRECTIONS) * (1.0 - 1e-12)).all()

@@ -1,0 +1,78 @@
+"""How long a plan takes, and its solver against its peers on the same data.
+
+``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+"""
+
+import peer
+import pytest
+from stances import PLACES, ask, on_wall, program_data
+
+from hand_models.holds import Cylinder
+from planner import program
+from planner.solve import plan
+
+LIMBS = tuple(PLACES)
+HOLDS = {"held": Cylinder(0.3), "overloaded": Cylinder(0.7)}
+
+
+def question_of(hands: int = 4, *want: str, hold=HOLDS["held"]):
+    return ask(on_wall(hold, limbs=LIMBS[:hands]), *want)
+
+
+@pytest.mark.benchmark(group="plan, from holds to a verified plan")
+@pytest.mark.parametrize("hands", [1, 2, 3, 4])
+def test_plan(benchmark, hands):
+    answer = benchmark(plan, question_of(hands))
+    assert len(answer.hands) == hands
+    assert answer.verified
+
+
+@pytest.mark.benchmark(group="plan, from holds to a verified plan")
+def test_plan_with_load_factor_and_prices(benchmark):
+    answer = benchmark(plan, question_of(4, "load_factor", "prices"))
+    assert answer.load_factor > 1.0
+    assert answer.prices
+
+
+@pytest.mark.benchmark(group="least utilisation of four hands")
+@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
+def test_margin_with_new_data(benchmark, hold):
+    question = question_of(hold=hold)
+    outcome = benchmark(program.margin, program_data(question))
+    assert outcome.value == pytest.approx(peer.least_utilisation(question).fun, rel=1e-6)
+
+
+@pytest.mark.benchmark(group="least utilisation of four hands")
+@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
+def test_margin_by_highs(benchmark, hold):
+    question = question_of(hold=hold)
+    result = benchmark(peer.solve, *peer.margin_program(question))
+    assert result.fun == pytest.approx(plan(question).utilisation, rel=1e-5)
+
+
+@pytest.mark.benchmark(group="least utilisation of four hands")
+@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
+def test_margin_by_a_program_built_for_each_query(benchmark, hold):
+    question = question_of(hold=hold)
+    data = program_data(question)
+    outcome = benchmark(lambda: program.Margin(data.shape).solve(data))
+    assert outcome.value == pytest.approx(plan(question).utilisation, rel=1e-5)
+
+
+@pytest.mark.benchmark(group="other programs of four hands")
+def test_tie_break(benchmark):
+    data = program_data(question_of())
+    least = program.margin(data).value
+    assert benchmark(program.effort, data, least + 1e-6).solved
+
+
+@pytest.mark.benchmark(group="other programs of four hands")
+def test_load_factor(benchmark):
+    assert benchmark(program.load_factor, program_data(question_of())).value > 1.0
+
+
+@pytest.mark.benchmark(group="other programs of four hands")
+def test_certificate(benchmark):
+    """A whole plan that ends as infeasible, the certificate included."""
+    answer = benchmark(plan, ask(on_wall(palm=False)))
+    assert answer.status == "infeasible"

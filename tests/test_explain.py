@@ -1,0 +1,82 @@
+"""What a plan says in words: the limit that counts, what is missing, and what is odd."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from stances import ask, on_wall
+
+from hand_models.frames import Pose
+from hand_models.holds import Plane
+from planner.solve import plan, settle
+from planner.stance import Question
+from service import questions
+from service.stances import read_request
+
+
+def bundled(name: str) -> Question:
+    question = questions.question(read_request(name))
+    return replace(question, want=frozenset({"prices", "load_factor"}))
+
+
+@pytest.mark.parametrize("name", ["wall-300", "overhang", "slab"])
+def test_of_limits_that_tie_the_dearest_is_named(name: str):
+    answer = plan(bundled(name))
+    dearest = answer.prices[0].price
+    named = next(p.price for p in answer.prices if p.name == answer.limiting)
+    assert named == pytest.approx(dearest, rel=1e-3)
+
+
+def test_a_tiles_force_is_told_with_what_it_holds_in_that_direction():
+    answer = plan(bundled("wall-700"))
+    name = answer.limiting
+    hand = next(h for h in answer.hands if h.limb == name.limb)
+    finger = next(f for f in hand.fingers if f.name == name.finger)
+    tile = next(t for t in finger.tiles if t.phalanx == name.phalanx)
+    force = float(np.linalg.norm(tile.force))
+    assert answer.status == "overloaded"
+    assert f"would carry {force:.0f} N of {force / tile.utilisation:.0f} N" in answer.reason
+
+
+def test_what_is_missing_begins_with_the_largest_part():
+    answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
+    assert answer.status == "infeasible"
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    size = np.abs(answer.certificate.shortfall) / np.array([300.0] * 3 + [30.0] * 3)
+    assert f"missing {axes[int(size.argmax())]} " in answer.reason
+    assert "palm cannot pull" in answer.reason or "cannot be dragged" in answer.reason
+
+
+def test_a_stance_in_the_air_says_so():
+    away = Pose(np.array([0.0, 0.0, 0.5]), np.eye(3))
+    stance = on_wall()
+    stance = replace(stance, hands=tuple(replace(h, hold_in_hand=away) for h in stance.hands))
+    answer = plan(ask(stance))
+    assert answer.status == "infeasible"
+    assert "no hand touches rock" in answer.reason
+    assert len(answer.warnings) == len(stance.hands)
+    assert all("touches nothing" in warning for warning in answer.warnings)
+
+
+def test_a_hand_out_of_reach_is_warned_of_and_one_within_is_not():
+    stance = on_wall()
+    assert plan(ask(stance)).warnings == ()
+    hand = stance.hands[0]
+    up = stance.body.rotation[:, 0]
+    far = replace(hand, pose=Pose(hand.pose.position + 2.0 * up, hand.pose.rotation))
+    answer = plan(ask(replace(stance, hands=(far, *stance.hands[1:]))))
+    assert len(answer.warnings) == 1
+    assert answer.warnings[0].startswith(f"{hand.limb}: out of reach")
+
+
+def test_no_tile_of_a_bundled_hand_is_inside_its_rock():
+    for name in ("wall", "wall-300", "wall-700", "overhang", "slab"):
+        stance = bundled(name).stance
+        for place in stance.hands:
+            hand = settle(place, stance)
+            into_rock = hand.seating.pose.inverse()
+            for point in hand.positions:
+                depth = hand.hold.entry(into_rock.apply(point), into_rock.rotation[:, 2])
+                assert depth > -1e-4
