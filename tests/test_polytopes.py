@@ -1,0 +1,281 @@
+"""The views of a WrenchSpace on sets made to be known, thin, flat, unbounded or empty."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.linalg import block_diag
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from hand_models import EmptySetError, InvalidInputError, WrenchSpace
+from hand_models.errors import SolverError, UnsupportedError
+from hand_models.wrench_space import SCALE, Row
+
+seeds = st.integers(0, 2**32 - 1)
+
+BOX = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+INTERVAL = np.array([[1.0], [-1.0]])
+
+
+def space(A, b, V, origin=None):
+    """{ o + V y : A y ≤ b } with V in scaled wrenches [N] and every row hard."""
+    A, V = np.asarray(A, dtype=float), np.asarray(V, dtype=float)
+    m = V.shape[1]
+    return WrenchSpace(
+        origin=np.zeros(6) if origin is None else np.asarray(origin, dtype=float),
+        generators=V / SCALE[:, None],
+        columns=tuple(f"y{i}" for i in range(m)),
+        rows=tuple(Row(None, None, "made", "hard", f"row {i}") for i in range(len(b))),
+        L=np.zeros((0, m)),
+        l0=np.zeros(0),
+        s=np.zeros(0),
+        H=A.reshape(len(b), m),
+        h=np.asarray(b, dtype=float),
+    )
+
+
+def polygon(rng, k):
+    """Rows of a bounded polygon with up to k sides about the origin."""
+    turns = np.append(rng.uniform(0.0, math.tau, k), rng.uniform(0.0, 0.1) + np.arange(3) * 2.1)
+    return np.column_stack([np.cos(turns), np.sin(turns)]), rng.uniform(0.5, 2.0, k + 3)
+
+
+def random_sum(seed, thinness=0.0):
+    """Segments and polygons in random planes, thin by 10^−thinness in some directions.
+
+    Returns the set, every sum of the parts' corners in scaled wrenches, and the generator.
+    """
+    rng = np.random.default_rng(seed)
+    A, b, corners = [], [], []
+    for _ in range(rng.integers(2, 6)):
+        a, h = polygon(rng, 4) if rng.random() < 0.5 else (INTERVAL, rng.uniform(0.1, 1.0, 2))
+        A.append(a)
+        b.append(h * 10.0 ** rng.uniform(0.0, 2.0))
+        if a.shape[1] == 1:
+            corners.append(b[-1][:, None] * INTERVAL)
+        else:
+            cut = HalfspaceIntersection(np.column_stack([a, -b[-1]]), np.zeros(2))
+            corners.append(cut.intersections)
+    A, b = block_diag(*A), np.concatenate(b)
+    thick = np.where(rng.permutation(6) < rng.integers(1, 4), 10.0**-thinness, 1.0)
+    turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    V = turn @ (thick[:, None] * rng.normal(size=(6, A.shape[1])))
+    sums = np.array([np.concatenate(y) for y in itertools.product(*corners)]) @ V.T
+    return space(A, b, V), sums, rng
+
+
+def highest(made, direction):
+    slopes = made.generators.T @ direction
+    return -linprog(-slopes, made.A, made.b, bounds=(None, None)).fun + direction @ made.origin
+
+
+def test_a_box_in_six_dimensions():
+    A = np.vstack([np.eye(6), -np.eye(6)])
+    made = space(A, np.ones(12), np.diag([1.0, 2, 3, 4, 5, 6]), origin=[1, 1, 1, 0, 0, 0])
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6))) * [1, 2, 3, 4, 5, 6] / SCALE
+    got = made.vertices() - made.origin
+    assert sorted(map(tuple, got.round(9))) == sorted(map(tuple, corners.round(9)))
+    faces = made.half_spaces()
+    assert faces.normals.shape == (12, 6)
+    assert faces.equation_normals.shape == (0, 6)
+    assert made.volume() == (pytest.approx(2.0**6 * 720.0), 6)
+
+
+def test_orthogonal_blocks_have_the_product_of_their_areas():
+    rng = np.random.default_rng(1)
+    (A1, b1), (A2, b2) = polygon(rng, 5), polygon(rng, 3)
+    made = space(block_diag(A1, A2, INTERVAL, INTERVAL), [*b1, *b2, 1.0, 2.0, 3.0, 4.0], np.eye(6))
+    areas = [
+        ConvexHull(HalfspaceIntersection(np.column_stack([A, -b]), np.zeros(2)).intersections)
+        for A, b in ((A1, b1), (A2, b2))
+    ]
+    volume, r = made.volume()
+    assert r == 6
+    assert volume == pytest.approx(areas[0].volume * areas[1].volume * 3.0 * 7.0)
+    assert len(made.vertices()) == math.prod(len(hull.vertices) for hull in areas) * 4
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.integers(3, 6))
+def test_one_block_of_many_columns_is_the_polytope_of_its_rows(seed, d):
+    rng = np.random.default_rng(seed)
+    A = np.vstack([rng.normal(size=(d, d)), np.eye(d), -np.eye(d)])
+    b = rng.uniform(0.3, 2.0, len(A))
+    V = np.linalg.qr(rng.normal(size=(6, 6)))[0][:, :d]
+    made = space(A, b, V)
+    expected = HalfspaceIntersection(np.column_stack([A, -b]), np.zeros(d)).intersections @ V.T
+    got = made.vertices() * SCALE
+    gaps = np.linalg.norm(got[:, None] - expected, axis=2)
+    assert gaps.min(axis=1).max() < 1e-7
+    assert gaps.min(axis=0).max() < 1e-7
+    assert made.dimension == d
+    norms = np.linalg.norm(A, axis=1)
+    faces = made.half_spaces()
+    for normal, offset in zip(faces.normals / SCALE, faces.offsets, strict=True):
+        off = np.abs(A @ V.T / norms[:, None] - normal).max(axis=1) + np.abs(b / norms - offset)
+        assert off.min() < 1e-7
+    hull = ConvexHull(expected @ V, qhull_options="QJ")
+    assert made.volume()[0] == pytest.approx(hull.volume, rel=2e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.sampled_from([0.0, 2.0, 4.0, 5.5]))
+@example(112974, 5.5)
+def test_thin_sets_have_all_their_faces_and_vertices(seed, thinness):
+    made, _, rng = random_sum(seed, thinness)
+    vertices, faces = made.vertices() * SCALE, made.half_spaces()
+    size = 1.0 + np.abs(vertices).max()
+    slack = faces.offsets - vertices @ (faces.normals / SCALE).T
+    assert slack.min() > -1e-7 * size
+    for _ in range(4):
+        direction = rng.normal(size=6)
+        direction /= np.linalg.norm(direction)
+        expected = highest(made, direction * SCALE)
+        assert (vertices @ direction).max() == pytest.approx(expected, abs=1e-7 * size)
+    # the faces alone bound it: from one vertex toward any other and on, they end it there
+    start, others = vertices[0], vertices[1:]
+    for other in others[rng.choice(len(others), min(len(others), 5), replace=False)]:
+        way = 2.0 * (other - start)
+        assert not made.contains((start + way) / SCALE, 1e-9 * size)
+        assert made.contains(other / SCALE, 1e-7 * size)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_faces_and_vertices_both_reach_as_far_as_all_sums_of_the_parts_corners(seed):
+    made, sums, rng = random_sum(seed)
+    faces, vertices = made.half_spaces(), made.vertices() * SCALE
+    exact = 1e-8 * (1.0 + np.abs(sums).max())
+    normals = faces.normals / SCALE
+    np.testing.assert_allclose((sums @ normals.T).max(axis=0), faces.offsets, atol=exact)
+    directions = rng.normal(size=(6, 300))
+    reach = (sums @ directions).max(axis=0)
+    np.testing.assert_allclose((vertices @ directions).max(axis=0), reach, atol=10.0 * exact)
+    for direction, expected in zip(directions.T[:4], reach, strict=False):
+        equations = (faces.equation_normals / SCALE, faces.equation_offsets)
+        bounded_by_faces = linprog(
+            -direction, normals, faces.offsets, *equations, bounds=(None, None)
+        )
+        assert -bounded_by_faces.fun == pytest.approx(expected, rel=1e-6)
+
+
+def test_parallel_segments_add_up_to_one():
+    V = np.outer([1.0, 2.0, 2.0, 0, 0, 0], [1.0, -2.0, 3.0])
+    made = space(block_diag(*[INTERVAL] * 3), np.ones(6), V)
+    assert made.dimension == 1
+    np.testing.assert_allclose(sorted(made.vertices()[:, 0]), [-6.0, 6.0])
+    assert made.volume() == (pytest.approx(12.0 * 3.0), 1)
+    assert len(made.half_spaces().equation_normals) == 5
+
+
+def test_a_polygon_in_space_is_flat():
+    V = np.zeros((6, 2))
+    V[0, 0], V[4, 1] = 1.0, 2.0
+    made = space(BOX, [1.0, 1.0, 3.0, 3.0], V, origin=[0, 7, 0, 0, 0, 0])
+    assert len(made.vertices()) == 4
+    assert made.volume() == (pytest.approx(2.0 * 12.0), 2)
+    faces = made.half_spaces()
+    assert (len(faces.normals), len(faces.equation_normals)) == (4, 4)
+    assert made.contains([0.5, 7, 0, 0, 0.5, 0])
+    assert not made.contains([0.5, 7.001, 0, 0, 0.5, 0])
+    assert not made.contains([1.001, 7, 0, 0, 0.5, 0])
+
+
+@pytest.mark.parametrize(
+    ("A", "b", "V", "shift"),
+    [
+        (np.zeros((0, 0)), [], np.zeros((6, 0)), [0, 0, 0]),
+        (INTERVAL, [2.0, -2.0], np.eye(6)[:, :1], [2, 0, 0]),  # an interval of no length
+        (INTERVAL, [1.0, 1.0], np.zeros((6, 1)), [0, 0, 0]),  # a generator that does nothing
+        (BOX, [2.0, -2.0, 1.0, -1.0], np.eye(6)[:, :2], [2, 1, 0]),
+    ],
+)
+def test_a_point(A, b, V, shift):
+    made = space(A, b, V, origin=[1, 2, 3, 4, 5, 6])
+    where = np.add([1.0, 2, 3, 4, 5, 6], [*shift, 0, 0, 0])
+    np.testing.assert_allclose(made.vertices(), [where])
+    assert (made.dimension, made.volume()) == (0, (0.0, 0))
+    faces = made.half_spaces()
+    assert (len(faces.normals), len(faces.equation_normals)) == (0, 6)
+    assert made.contains(where)
+    assert not made.contains(np.add(where, [0, 0, 1e-4, 0, 0, 0]))
+    assert made.support([0, 0, 1, 0, 0, 0]) == pytest.approx(where[2])
+
+
+def test_a_row_that_never_matters_does_not_loosen_the_others():
+    """y ≤ 1 and y ≥ −1, and 1e-12 y ≤ 1, whose bound is a thousand thousand million away."""
+    A = [[1.0], [-1.0], [1e-12], [-1e-13]]
+    made = space(A, np.ones(4), np.eye(6)[:, :1])
+    np.testing.assert_allclose(sorted(made.vertices()[:, 0]), [-1.0, 1.0])
+    # and in a square of side 2 with one corner cut off
+    cut = np.vstack([BOX, [[1.0, 1.0], [1e-12, 1e-13]]])
+    made = space(cut, [1.0, 1.0, 1.0, 1.0, 1.5, 1.0], np.eye(6)[:, :2])
+    assert len(made.vertices()) == 5
+    assert made.volume() == (pytest.approx(4.0 - 0.125), 2)
+
+
+@pytest.mark.parametrize(
+    ("A", "b"),
+    [
+        (INTERVAL, [-1.0, -1.0]),
+        (np.vstack([BOX, [[1.0, 1.0]]]), [1.0, 1.0, 1.0, 1.0, -2.1]),
+        (np.vstack([np.eye(3), -np.eye(3), np.ones((1, 3))]), [1, 1, 1, 1, 1, 1, -3.1]),
+        (np.vstack([INTERVAL, [[0.0]]]), [1.0, 1.0, -1.0]),  # a row of zeros: 0 ≤ −1
+    ],
+)
+def test_contradictory_rows_leave_an_empty_set(A, b):
+    made = space(A, b, np.eye(6)[:, : A.shape[1]])
+    for view in (made.vertices, made.half_spaces, made.volume):
+        with pytest.raises(EmptySetError):
+            view()
+    with pytest.raises(EmptySetError):
+        made.support(np.ones(6))
+    assert made.capability(np.eye(6)[0]) is None
+
+
+@pytest.mark.parametrize(
+    "A", [[[1.0]], [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], np.vstack([np.eye(3), -np.eye(3)[:2]])]
+)
+def test_an_unbounded_block_is_an_error_and_not_a_number(A):
+    made = space(A, np.ones(len(A)), np.eye(6)[:, : np.shape(A)[1]])
+    with pytest.raises(SolverError, match="bounded"):
+        made.vertices()
+
+
+def test_too_many_candidates_are_refused_before_they_fill_the_memory():
+    turns = np.arange(130) * math.tau / 130
+    A = np.column_stack([np.cos(turns), np.sin(turns)])
+    made = space(block_diag(A, A, A), np.ones(390), np.random.default_rng(0).normal(size=(6, 6)))
+    with pytest.raises(UnsupportedError, match="half_planes"):
+        made.half_spaces()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("origin", np.zeros(5), "origin"),
+        ("generators", np.zeros((6, 2)), "generators"),
+        ("h", np.zeros(3), "H"),
+        ("rows", (), "rows"),
+    ],
+)
+def test_parts_that_do_not_fit_are_refused_by_name(name, value, message):
+    made = space(INTERVAL, [1.0, 1.0], np.eye(6)[:, :1])
+    parts = {field: getattr(made, field) for field in made.__dataclass_fields__}
+    with pytest.raises(InvalidInputError) as caught:
+        WrenchSpace(**{**parts, name: value})
+    assert caught.value.field == message
+
+
+@pytest.mark.parametrize("capacity", [0.0, -1.0, math.nan])
+def test_a_limit_needs_a_capacity_above_zero(capacity):
+    row = Row(None, None, "made", "limit", "made")
+    with pytest.raises(InvalidInputError, match="above zero"):
+        WrenchSpace(
+            np.zeros(6), np.ones((6, 1)), ("y",), (row,), np.ones((1, 1)), np.zeros(1),
+            np.array([capacity]), np.zeros((0, 1)), np.zeros(0),
+        )  # fmt: skip
