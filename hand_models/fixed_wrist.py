@@ -13,8 +13,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from hand_models.errors import EmptySetError, SolverError
+from hand_models.errors import EmptySetError
 from hand_models.frames import Array, Indices
 from hand_models.hand import FINGERS, SettledHand, Tile
 from hand_models.spines import HalfPlane
@@ -307,12 +308,4 @@ def _tile_tension_limit(settled: SettledHand, t: int) -> float:
     else:
         first = beyond[0]
     low, high = tensions[first - 1], tensions[first]
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        if excess(np.array([middle]))[0] > 0.0:
-            high = middle
-        else:
-            low = middle
-    if not high - low <= 1e-9 * high:
-        raise SolverError("f_t(max) was not bracketed")
-    return float(low)
+    return float(brentq(lambda f: float(excess(np.array([f]))[0]), low, high, xtol=1e-12))

@@ -483,9 +483,10 @@ def _sum_normals(parts: list[_Summand], r: int, rounding: float) -> Array:
     for k, part in enumerate(parts):
         if part.dimension == 2:
             one_edge = np.flatnonzero(chosen[:, k] >= 0)
-            heights = normals[one_edge] @ part.points.T
-            here = heights[np.arange(len(one_edge)), chosen[one_edge, k]]
-            top = heights.max(axis=1)
+            # thin products: a threaded BLAS would spend more on waking its threads
+            heights = np.einsum("nr,pr->pn", normals[one_edge], part.points)
+            here = heights[chosen[one_edge, k], np.arange(len(one_edge))]
+            top = heights.max(axis=0)
             keep[one_edge] &= here >= top - rounding * (1.0 + np.abs(top))
     normals = normals[keep]
     _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
@@ -562,17 +563,17 @@ def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array, roundin
     chosen = []
     for start in range(0, len(sums), chunk):
         piece = sums[start : start + chunk]
-        active = (piece @ normals.T >= offsets - 10.0 * rounding * size).astype(float)
-        outward = active @ normals
-        keep = active.any(axis=1)
+        active = piece @ normals.T >= offsets - 10.0 * rounding * size
+        outer = np.flatnonzero(active.any(axis=1))
+        piece, mine = piece[outer], choice[:, start + outer]
+        outward = active[outer].astype(float) @ normals
+        keep = np.ones(len(piece), dtype=bool)
         for k, part in enumerate(parts):
-            heights = outward @ part.points.T
+            heights = np.einsum("pr,nr->pn", part.points, outward)
             index = np.arange(len(piece))
-            mine = choice[k, start : start + chunk]
-            here = heights[index, mine]
-            heights[index, mine] = -np.inf
-            others = heights.max(axis=1)
-            keep &= here > others + 1e-9 * size
+            here = heights[mine[k], index]
+            heights[mine[k], index] = -np.inf
+            keep &= here > heights.max(axis=0) + 1e-9 * size
         chosen.append(piece[keep])
     return np.vstack(chosen)
 

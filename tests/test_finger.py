@@ -87,21 +87,31 @@ def test_contacts_lie_on_the_rock_and_tangent_faces_do_not_cut_it(seed):
             assert clearance(face).min() > -1e-9
 
 
-@pytest.mark.parametrize(
-    ("stand_off", "edge"), [(0.02, MODEL.tile_range[1]), (0.003, MODEL.tile_range[0])]
-)
-def test_off_its_tangent_point_a_tile_touches_with_its_nearer_edge_and_does_not_cut(
-    stand_off, edge
-):
-    """A joint far off the rock reaches it with the far edge, one close to it with the near edge."""
-    radius, near = 0.3, MODEL.tile_range[0]
-    centre = np.array([0.0, stand_off + radius])
-    contact = MODEL.settle(RoundSection((0.0, float(centre[1])), radius), (0.0, 0.0)).contacts[0]
-    assert contact.kind == "edge"
-    assert contact.along == edge
-    u = np.array([math.cos(contact.angle), math.sin(contact.angle)])
-    face = np.linspace(near, MODEL.tile_range[1], 50)[:, None] * u + H * np.array([-u[1], u[0]])
-    assert np.linalg.norm(face - centre, axis=1).min() == pytest.approx(radius, abs=1e-9)
+def test_a_tile_whose_phalanx_touches_beyond_it_reaches_across_with_its_edge_if_spines_can():
+    """On a disc of 600 mm, from joints farther and farther off it."""
+    radius, far = 0.3, MODEL.tile_range[1]
+    for stand_off, kind in ((0.006, "face"), (0.012, "edge"), (0.02, "none")):
+        centre = np.array([0.0, stand_off + radius])
+        section = RoundSection((0.0, float(centre[1])), radius)
+        contact = MODEL.settle(section, (0.0, 0.0)).contacts[0]
+        # the phalanx itself is tangent, at the length of the tangent from its joint
+        tangent = math.sqrt((radius + stand_off) ** 2 - (radius + H) ** 2)
+        bearing = math.pi / 2 - math.asin((radius + H) / (radius + stand_off))
+        gap = math.hypot(radius, max(tangent - far, 0.0)) - radius
+        assert contact.kind == kind
+        assert contact.angle == pytest.approx(bearing, abs=1e-9)
+        assert (gap > 0.0, gap > 0.005) == (kind != "face", kind == "none")
+        if kind != "none":
+            assert contact.along == pytest.approx(min(tangent, far), abs=1e-9)
+            off = np.hypot(*(contact.point(H) - centre)) - radius
+            assert off == pytest.approx(gap, abs=1e-9)
+
+
+def test_from_a_joint_close_to_the_rock_a_tile_touches_with_its_near_edge():
+    section = RoundSection((0.0, 0.303), 0.3)
+    contact = MODEL.settle(section, (0.0, 0.0)).contacts[0]
+    assert (contact.kind, contact.along) == ("edge", MODEL.tile_range[0])
+    assert np.hypot(*(contact.point(H) - np.array([0.0, 0.303]))) == pytest.approx(0.3, abs=1e-9)
 
 
 @settings(max_examples=200, deadline=None)
