@@ -1,0 +1,49 @@
+"""What the README shows is what happens."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from service.command import run
+from service.stances import bundled
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_example_stance_is_answered(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    (text,) = blocks("json")
+    file = tmp_path / "stance.json"
+    file.write_text(text, encoding="utf-8")
+    assert run(["plan", str(file), "--json"]) == 3
+    reply = json.loads(capfd.readouterr().out)
+    assert reply["verified"] is True
+    assert reply["status"] == "overloaded"
+
+
+def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.CaptureFixture[str]):
+    exec(compile(blocks("python")[0], "README.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("optimal 0.71")
+    assert "carries" in lines[1]
+    assert len(json.loads(lines[2])) == 4
+
+
+def test_every_command_line_uses_a_bundled_name_that_exists():
+    lines = [line for block in blocks("") for line in block.splitlines()]
+    named = {m[1] for line in lines if (m := re.match(r"crux (?:plan|query) (\S+)", line))}
+    assert named
+    assert named <= set(bundled())
+
+
+def test_the_two_commands_are_each_on_one_line():
+    lines = [block.strip() for block in blocks("") if block.startswith("python3 -m venv")]
+    assert [line.split()[-1] for line in lines] == ["demo", "pytest"]
+    assert all("\n" not in line for line in lines)
