@@ -286,10 +286,10 @@ class SettledFinger:
         return _upper_solve(normal_arms, rest)
 
     def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:
-        """Return the torque of each joint's upper stop, affine in tension, shape (3, 2) [N·m].
+        """Return what holds each joint without contact, affine in tension, shape (3, 2) [N·m].
 
-        It is zero at a joint that is free, and must not be negative at one that stands at its
-        limit: a stop pushes only.
+        That is its stop, or rock that its frame rests on. Either only pushes against the tendon's
+        closing, so the torque must not be negative; it is zero at a joint that is free.
         """
         normal_arms, rest = self._joint_balance(shears, base_tile)
         return np.where(np.array(self.touching)[:, None], 0.0, rest - normal_arms @ normals)

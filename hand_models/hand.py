@@ -251,6 +251,7 @@ class SpinyHand:
                 for y in table.vector("palm", "tile_y")
             ]
         )
+        self.palm_tile_size = np.array(table.vector("palm", "tile_size"))
         self.palm_length = table.scalar("palm", "length")
         self.palm_friction = table.scalar("palm", "pulley_friction")
         self.palm_spring = table.scalar("palm", "spring_stiffness")

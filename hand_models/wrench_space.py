@@ -493,7 +493,7 @@ def _sum_normals(parts: list[_Summand], r: int, rounding: float) -> Array:
     return np.asarray(normals[np.sort(first)])
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=16)
 def _choices(shapes: tuple[tuple[int, int], ...], total: int) -> tuple[Indices, Indices]:
     """List every choice of ``total`` edges from parts of given (edges, dimension).
 

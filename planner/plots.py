@@ -154,7 +154,8 @@ def _write(
 
 
 def _palm_outline(settled: SettledHand) -> Array:
-    half = np.abs(settled.hand.palm_tiles[:, :2]).max(axis=0) + 0.012
+    hand = settled.hand
+    half = np.abs(hand.palm_tiles[:, :2]).max(axis=0) + hand.palm_tile_size / 2.0
     x, y = half
     return np.array([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
 
@@ -251,26 +252,22 @@ def plot_wrench_space(settled: SettledHand, space: WrenchSpace, path: Path, titl
 
 
 def _draw_section(axes: Axes, settled: SettledHand) -> None:
-    """Draw the inner left and outer left fingers, and the rock under the inner one, in x-z of H."""
-    offset = float(settled.hand.inner_joint[1])
-    hand_in_hold = settled.seating.pose.inverse()
-    hold = settled.hold
+    """Draw the left fingers and the rock under each of them, in x-z of H."""
+    shown = {"inner_left": "tab:blue", "outer_left": "tab:green"}
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
     xs = np.linspace(-0.22, 0.24, 600)
-    depths = np.array(
-        [hold.entry(hand_in_hold.apply((x, offset, 0.0)), hand_in_hold.rotation[:, 2]) for x in xs]
-    )
-    depths[~np.isfinite(depths)] = np.nan
-    axes.fill_between(1e3 * xs, 1e3 * depths, 400.0, color="0.88", label="rock")
-    axes.plot(1e3 * xs, 1e3 * depths, color="0.4")
-    palm = settled.hand.palm_tiles
-    axes.plot(
-        1e3 * np.array([palm[:, 0].min() - 0.011, palm[:, 0].max() + 0.011]), [0.0, 0.0],
-        color="tab:brown", linewidth=4, label="palm",
-    )  # fmt: skip
+    for name, colour in shown.items():
+        depths = _depths(settled, xs, float(frames[FINGERS.index(name)].joint[1]))
+        if name == "inner_left":
+            axes.fill_between(1e3 * xs, 1e3 * depths, 400.0, color="0.9")
+        label = f"rock under {name.replace('_', ' ')}"
+        axes.plot(1e3 * xs, 1e3 * depths, "--", color=colour, linewidth=1.0, label=label)
+    ends = 1e3 * _palm_outline(settled)[[0, 2], 0]
+    axes.plot(ends, [0.0, 0.0], color="tab:brown", linewidth=4, label="palm")
     chains = _finger_chains(settled)
     loads = settled.tile_loads(np.full(len(FINGERS), settled.closing_tension))
     largest = max(float(np.abs(loads[:, :2]).max()), 1e-9)
-    for name, colour in (("outer_left", "tab:green"), ("inner_left", "tab:blue")):
+    for name, colour in shown.items():
         i = FINGERS.index(name)
         axes.plot(
             1e3 * chains[i][:, 0], 1e3 * chains[i][:, 2], "o-", color=colour, markersize=5,
@@ -293,6 +290,17 @@ def _draw_section(axes: Axes, settled: SettledHand) -> None:
     axes.set_ylim(high, low)
     axes.set_aspect("equal", adjustable="box")
     axes.legend(loc="lower center", ncols=2, fontsize=8)
+
+
+def _depths(settled: SettledHand, xs: Array, offset: float) -> Array:
+    """Return z of H at which the rock begins over x, at y = ``offset``; NaN where there is none."""
+    hand_in_hold = settled.seating.pose.inverse()
+    into_rock = hand_in_hold.rotation[:, 2]
+    depths = np.array(
+        [settled.hold.entry(hand_in_hold.apply((x, offset, 0.0)), into_rock) for x in xs]
+    )
+    depths[~np.isfinite(depths)] = np.nan
+    return depths
 
 
 def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
