@@ -62,7 +62,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         status = crux.main(args=arguments, prog_name="crux", standalone_mode=False)
         return status if isinstance(status, int) else DONE
     except click.ClickException as error:
-        return _complain(error.format_message(), BAD_INPUT)
+        hint = "; see crux --help" if isinstance(error, click.UsageError) else ""
+        return _complain(error.format_message().rstrip(".") + hint, BAD_INPUT)
     except CruxError as error:
         bad = isinstance(error, InvalidInputError) or error.kind in REQUEST_KINDS
         return _complain(str(error), BAD_INPUT if bad else FAILED)
@@ -102,7 +103,11 @@ def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
     STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance.
+    bundled stance: overhang, slab, wall, wall-300, wall-700. ROUTE is the same of a climb; bundled
+    is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
+
+    Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
+    standard error names the field), 1 anything else.
     """
 
 

@@ -317,3 +317,9 @@ def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
     error = capfd.readouterr().err
     assert error.startswith("crux: --plot: cannot write ")
     assert len(error.splitlines()) == 1
+
+
+def test_help_names_every_bundled_stance(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == DONE
+    out = capfd.readouterr().out
+    assert all(name in out for name in bundled())
