@@ -12,10 +12,9 @@ are divided by `MOMENT_ARM`, so that all six components are newtons.
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -23,10 +22,20 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from hand_models.errors import EmptySetError, InvalidInputError, SolverError, UnsupportedError
 from hand_models.frames import Array, Indices, finite_vector
+from hand_models.polytopes import (
+    TOLERANCE,
+    Summand,
+    extreme_points,
+    hull,
+    hull_facets,
+    polytope_vertices,
+    sum_normals,
+    sum_vertices,
+    sums,
+)
 
 __all__ = ["MOMENT_ARM", "SCALE", "HalfSpaces", "Row", "WrenchSpace"]
 
@@ -35,9 +44,6 @@ MOMENT_ARM: Final = 0.1
 
 SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
 """From a wrench to a scaled wrench [N]."""
-
-TOLERANCE: Final = 1e-9
-"""Relative tolerance of the geometry in this module."""
 
 FLATNESS: Final = 1e-9
 """A set is flat in a direction in which it reaches less than this times its longest reach."""
@@ -77,13 +83,6 @@ class HalfSpaces(NamedTuple):
     offsets: Array
     equation_normals: Array
     equation_offsets: Array
-
-
-class _Summand(NamedTuple):
-    """Extreme points (n, 6) of one block's image in scaled wrenches; polygons are in order."""
-
-    points: Array
-    dimension: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +171,7 @@ class WrenchSpace:
         for label in range(labels.max() + 1):
             columns: Indices = np.flatnonzero(labels == label)
             mine = used[:, columns].any(axis=1)
-            vertices = _polytope_vertices(A[np.ix_(mine, columns)], b[mine])
+            vertices = polytope_vertices(A[np.ix_(mine, columns)], b[mine])
             if not len(vertices):
                 raise self._empty(columns)
             blocks.append((columns, vertices))
@@ -185,12 +184,12 @@ class WrenchSpace:
         )
 
     @cached_property
-    def _summands(self) -> tuple[_Summand, ...]:
+    def _summands(self) -> tuple[Summand, ...]:
         """The blocks' images that are more than a point, about `_base`."""
         summands = []
         for columns, vertices in self._blocks:
             image = (vertices @ self.generators[:, columns].T) * SCALE
-            summands.append(_extreme_points(image))
+            summands.append(extreme_points(image))
         return tuple(summands)
 
     @cached_property
@@ -214,7 +213,7 @@ class WrenchSpace:
         return directions[:rank], reach[:rank]
 
     @cached_property
-    def _parts(self) -> list[_Summand]:
+    def _parts(self) -> list[Summand]:
         """The summands that are more than a point, about `_base`, in the coordinates of `_axes`."""
         directions, reach = self._axes
         summands = [s for s in self._summands if s.dimension]
@@ -225,7 +224,7 @@ class WrenchSpace:
                 "use fewer half_planes, or leave lateral out"
             )
         return [
-            _Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
+            Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
         ]
 
     @property
@@ -246,13 +245,13 @@ class WrenchSpace:
         if r == 0:
             return np.zeros((0, 0)), np.zeros(0)
         if all(part.dimension <= 2 for part in parts):
-            normals = _sum_normals(parts, r, self._rounding)
+            normals = sum_normals(parts, r, self._rounding)
             offsets = sum(
                 ((part.points @ normals.T).max(axis=0) for part in parts),
                 start=np.zeros(len(normals)),
             )
             return normals, np.asarray(offsets)
-        return _hull_facets(_sums(parts))
+        return hull_facets(sums(parts))
 
     def half_spaces(self) -> HalfSpaces:
         """Return the set at u = 1 as inequalities and, where it is flat, equations.
@@ -292,7 +291,7 @@ class WrenchSpace:
         """Vertices (n, r) in the coordinates of `_axes`, about `_base`."""
         if not self._parts:
             return np.zeros((1, 0))
-        return _sum_vertices(self._parts, *self._facets, self._rounding)
+        return sum_vertices(self._parts, *self._facets, self._rounding)
 
     def support(self, direction: ArrayLike) -> float:
         """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
@@ -378,228 +377,4 @@ class WrenchSpace:
         if r == 1:
             return float(np.ptp(self._vertices)) * stretch, 1
         # joggled: merged facets may be so wide in a set of fine facets that volume is lost
-        return float(_hull(self._vertices, "QJ").volume) * stretch, r
-
-
-def _polytope_vertices(A: Array, b: Array) -> Array:
-    """Return the vertices (n, d) of { y : A y ≤ b }, bounded; none if it is empty."""
-    d = A.shape[1]
-    norms = np.linalg.norm(A, axis=1)
-    A, b = A / norms[:, None], b / norms
-    unbounded = SolverError(f"a block of {d} columns is not bounded")
-    if d == 1:
-        if (A > 0.0).all() or (A < 0.0).all():
-            raise unbounded
-        upper = b[A[:, 0] > 0.0].min()
-        lower = -b[A[:, 0] < 0.0].min()
-        slack = TOLERANCE * (1.0 + abs(lower) + abs(upper))
-        if lower > upper + slack:
-            return np.zeros((0, 1))
-        return np.array([[lower], [upper]]) if upper > lower + slack else np.array([[lower]])
-    if d == 2:
-        turns = np.sort(np.arctan2(A[:, 1], A[:, 0]))
-        if np.diff(turns, append=turns[0] + math.tau).max() >= math.pi:
-            raise unbounded
-        first, second = np.triu_indices(len(b), 1)
-        det = A[first, 0] * A[second, 1] - A[first, 1] * A[second, 0]
-        crossing = np.abs(det) > TOLERANCE
-        first, second, det = first[crossing], second[crossing], det[crossing]
-        points = np.column_stack(
-            [
-                (b[first] * A[second, 1] - b[second] * A[first, 1]) / det,
-                (A[first, 0] * b[second] - A[second, 0] * b[first]) / det,
-            ]
-        )
-        # each row by its own size: one that is far away must not loosen the others
-        points = points[(points @ A.T <= b + TOLERANCE * (1.0 + np.abs(b))).all(axis=1)]
-        return _distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
-    slack = TOLERANCE * (1.0 + float(np.abs(b).max()))
-    # the centre of the largest ball inside
-    cost = np.zeros(d + 1)
-    cost[-1] = -1.0
-    ball = linprog(
-        cost,
-        A_ub=np.column_stack([A, np.ones(len(b))]),
-        b_ub=b,
-        bounds=[(None, None)] * d + [(0.0, None)],
-        method="highs",
-    )
-    if ball.status == 2:
-        return np.zeros((0, d))
-    if ball.status != 0 or ball.x is None:
-        raise SolverError(f"a block of {d} columns is not bounded: {ball.message}")
-    if ball.x[-1] <= slack:
-        raise SolverError(f"a block of {d} columns has no interior")
-    cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
-    return _distinct(cut.intersections, slack)
-
-
-def _distinct(points: Array, slack: float) -> Array:
-    """Return the points that differ by more than ``slack`` in some coordinate."""
-    if len(points) < 2:
-        return points
-    close = (np.abs(points[:, None, :] - points[None, :, :]) <= 10.0 * slack).all(axis=2)
-    return points[~np.triu(close, 1).any(axis=0)]
-
-
-def _extreme_points(image: Array) -> _Summand:
-    """Return the extreme points of a few points (n, 6), in order around a polygon."""
-    centred = image - image.mean(axis=0)
-    _, values, basis = np.linalg.svd(centred, full_matrices=False)
-    size = 1.0 + float(np.abs(image).max())
-    rank = int((values > TOLERANCE * size).sum())
-    if rank == 0:
-        return _Summand(image[:1], 0)
-    flat = centred @ basis[:rank].T
-    if rank == 1:
-        return _Summand(image[[flat[:, 0].argmin(), flat[:, 0].argmax()]], 1)
-    hull = _hull(flat)
-    return _Summand(image[hull.vertices], rank)
-
-
-def _sum_normals(parts: list[_Summand], r: int, rounding: float) -> Array:
-    """Return the unit facet normals (k, r) of a sum of segments and polygons.
-
-    A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
-    plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon.
-    """
-    if r == 1:
-        return np.array([[1.0], [-1.0]])
-    edges = []
-    for part in parts:
-        around = np.diff(np.vstack([part.points, part.points[:1]]), axis=0)
-        edges.append(around[:1] if part.dimension == 1 else around)
-    shapes = tuple((len(e), part.dimension) for e, part in zip(edges, parts, strict=True))
-    spanning, chosen = _choices(shapes, r - 1)
-    directions = np.vstack(edges)
-    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    normals = _cross(directions[spanning])
-    lengths = np.linalg.norm(normals, axis=1)
-    independent = lengths > 1e-8
-    normals = normals[independent] / lengths[independent, None]
-    normals = np.vstack([normals, -normals])
-    chosen = np.vstack([chosen[independent]] * 2)
-    keep = np.ones(len(normals), dtype=bool)
-    for k, part in enumerate(parts):
-        if part.dimension == 2:
-            one_edge = np.flatnonzero(chosen[:, k] >= 0)
-            # thin products: a threaded BLAS would spend more on waking its threads
-            heights = np.einsum("nr,pr->pn", normals[one_edge], part.points)
-            here = heights[chosen[one_edge, k], np.arange(len(one_edge))]
-            top = heights.max(axis=0)
-            keep[one_edge] &= here >= top - rounding * (1.0 + np.abs(top))
-    normals = normals[keep]
-    _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
-    return np.asarray(normals[np.sort(first)])
-
-
-@lru_cache(maxsize=16)
-def _choices(shapes: tuple[tuple[int, int], ...], total: int) -> tuple[Indices, Indices]:
-    """List every choice of ``total`` edges from parts of given (edges, dimension).
-
-    Returns
-    -------
-    spanning : ndarray of int, shape (n, total)
-        Into all parts' edges, one after another.
-    chosen : ndarray of int, shape (n, parts)
-        Which edge of a part is used alone; −1 where none, or its whole plane, is.
-    """
-    firsts = np.cumsum([0, *(count for count, _ in shapes)])
-    spanning, chosen = [], []
-    for use in itertools.product(*(range(dimension + 1) for _, dimension in shapes)):
-        if sum(use) != total:
-            continue
-        options = [
-            range(count) if u == 1 else (-1,) for u, (count, _) in zip(use, shapes, strict=True)
-        ]
-        picks = np.array(list(itertools.product(*options)))
-        columns = []
-        for k, u in enumerate(use):
-            if u == 1:
-                columns.append(firsts[k] + picks[:, k])
-            elif u == 2:
-                columns += [np.full(len(picks), firsts[k] + i) for i in range(2)]
-        spanning.append(np.column_stack(columns))
-        chosen.append(picks)
-    return np.vstack(spanning), np.vstack(chosen)
-
-
-def _cross(spans: Array) -> Array:
-    """Return the vectors (n, r) orthogonal to stacks (n, r − 1, r), by Laplace expansion."""
-    count, rows, r = spans.shape
-    minors: dict[tuple[int, ...], Array] = {(j,): spans[:, 0, j] for j in range(r)}
-    for row in range(1, rows):
-        grown: dict[tuple[int, ...], Array] = {}
-        for columns in itertools.combinations(range(r), row + 1):
-            total = np.zeros(count)
-            for place, j in enumerate(columns):
-                rest = columns[:place] + columns[place + 1 :]
-                total += (-1.0) ** (row + place) * spans[:, row, j] * minors[rest]
-            grown[columns] = total
-        minors = grown
-    return np.column_stack(
-        [(-1.0) ** j * minors[tuple(i for i in range(r) if i != j)] for j in range(r)]
-    )
-
-
-def _sums(parts: list[_Summand]) -> Array:
-    """Return every sum of one point of each part, shape (n, r)."""
-    total = np.zeros((1, parts[0].points.shape[1]))
-    for part in parts:
-        total = (total[:, None, :] + part.points[None, :, :]).reshape(-1, total.shape[1])
-    return total
-
-
-def _sum_vertices(parts: list[_Summand], normals: Array, offsets: Array, rounding: float) -> Array:
-    """Return the vertices (n, r) of a sum, given its facets.
-
-    A sum of points is a vertex if the mean normal of the facets it lies on makes each of them the
-    only highest point of its part.
-    """
-    sums = _sums(parts)
-    choice = np.indices([len(part.points) for part in parts]).reshape(len(parts), -1)
-    size = 1.0 + float(np.abs(offsets).max())
-    chunk = max(1, 2_000_000 // max(1, len(normals)))
-    chosen = []
-    for start in range(0, len(sums), chunk):
-        piece = sums[start : start + chunk]
-        active = piece @ normals.T >= offsets - 10.0 * rounding * size
-        outer = np.flatnonzero(active.any(axis=1))
-        piece, mine = piece[outer], choice[:, start + outer]
-        outward = active[outer].astype(float) @ normals
-        keep = np.ones(len(piece), dtype=bool)
-        for k, part in enumerate(parts):
-            heights = np.einsum("pr,nr->pn", part.points, outward)
-            index = np.arange(len(piece))
-            here = heights[mine[k], index]
-            heights[mine[k], index] = -np.inf
-            keep &= here > heights.max(axis=0) + 1e-9 * size
-        chosen.append(piece[keep])
-    return np.vstack(chosen)
-
-
-def _hull(points: Array, options: str | None = None) -> ConvexHull:
-    """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
-
-    Raises
-    ------
-    SolverError
-        If that fails as well.
-    """
-    try:
-        return ConvexHull(points, qhull_options=options)
-    except QhullError:
-        try:
-            return ConvexHull(points, qhull_options="QJ")
-        except QhullError as error:
-            raise SolverError(f"convex hull: {str(error).splitlines()[0]}") from None
-
-
-def _hull_facets(points: Array) -> tuple[Array, Array]:
-    """Return unit normals and offsets of the hull of points (n, r)."""
-    if points.shape[1] == 1:
-        return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
-    equations = _hull(points).equations
-    _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
-    equations = equations[np.sort(first)]
-    return equations[:, :-1], -equations[:, -1]
+        return float(hull(self._vertices, "QJ").volume) * stretch, r
