@@ -152,7 +152,7 @@ class Certificate:
         d in B [1/N, 1/(N·m)], of unit length in the program's units of 300 N and 30 N·m: every body
         wrench w that the hands can give has ``d · w ≤ supremum``.
     supremum : float
-        Of ``d · w`` over all plans at any utilisation.
+        Of ``d · w`` over all loads up to 10⁶ N, at any utilisation.
     needed : float
         ``d · W`` of the body wrench W asked for; larger than ``supremum``.
     shortfall : ndarray, shape (6,)

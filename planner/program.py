@@ -11,7 +11,7 @@ Four programs share these rows:
 `Margin`       min u                              least utilisation; its duals are the prices
 `Effort`       min Σ (tension / maximum)²         the tie-break, at the least utilisation
 `LoadFactor`   max s with s W in place of W       at utilisation 1
-`Nearest`      min ‖S (W − Σ …)‖                  hard rows alone: is there any balance at all?
+`Nearest`      min ‖S (W − Σ …)‖                  hard rows alone, loads up to `UNLIMITED`
 =============  =============================================================================
 
 Everything is nondimensional: loads over `LOAD_UNIT`, body wrenches over `WRENCH_UNIT`, limit rows
@@ -56,6 +56,9 @@ LOAD_UNIT: Final = 100.0
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
+
+UNLIMITED: Final = 1e4
+"""Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
 
 SECONDARY: Final = 1e-4
 """Weight in the tie-break of loads that are not tensions: enough to make them unique."""
@@ -310,12 +313,13 @@ class LoadFactor(_Program):
 
 
 class Nearest(_Program):
-    """min ‖W − w‖ over all body wrenches w that any plan gives, at whatever utilisation."""
+    """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give."""
 
     def define(self) -> cp.Problem:
         self.shortfall = cp.Variable(6)
         self.balance = self.reaction + self.shortfall == self.offset
-        return cp.Problem(cp.Minimize(cp.norm(self.shortfall)), [self.balance, *self.hard])
+        box = [cp.abs(z) <= UNLIMITED for z in self.z]
+        return cp.Problem(cp.Minimize(cp.norm(self.shortfall)), [self.balance, *self.hard, *box])
 
     def solve(self, data: StanceData) -> Outcome:
         """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""

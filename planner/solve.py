@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -30,7 +31,7 @@ from planner.plan import (
     TileLoad,
     Times,
 )
-from planner.program import LOAD_UNIT, SOLVER, WRENCH_UNIT, HandData, Outcome, StanceData
+from planner.program import LOAD_UNIT, SOLVER, UNLIMITED, WRENCH_UNIT, HandData, Outcome, StanceData
 from planner.stance import HandOnHold, Question, Stance
 from planner.verify import problems
 
@@ -53,9 +54,6 @@ BLOCKING: Final = 1e-6
 
 CLOSE: Final = 0.1
 """What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
-
-UNLIMITED: Final = 1e4
-"""Box, in `LOAD_UNIT`, over which a certificate must hold: far beyond any strength."""
 
 
 def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
@@ -165,16 +163,21 @@ class _Answer:
     def solve(self) -> None:
         """Find the loads, or the certificate that there are none."""
         self.outcome = program.margin(self.data)
-        if not self.outcome.solved:
+        self._settle_tie()
+        if not self.outcome.solved or self._problems(self.loads):
             self._look_again()
-        if self.outcome.solved:
-            cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
-            tidy = program.effort(self.data, cap)
-            self.loads = tidy.loads if tidy.solved else self.outcome.loads
-            if self._problems(self.loads):
-                self.loads = self.outcome.loads
         if "load_factor" in self.question.want:
             self._find_load_factor()
+
+    def _settle_tie(self) -> None:
+        """Take the plan of least effort among those of least utilisation."""
+        if not self.outcome.solved:
+            return
+        cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
+        tidy = program.effort(self.data, cap)
+        self.loads = tidy.loads if tidy.solved else self.outcome.loads
+        if self._problems(self.loads):
+            self.loads = self.outcome.loads
 
     def _look_again(self) -> None:
         """Tell no balance at all from a solver that failed."""
@@ -183,10 +186,13 @@ class _Answer:
             return
         if nearest.value > BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench))):
             self.certificate = self._certify(nearest)
-            return
-        # rounding put the wrench a hair outside: plan for the nearest that can be had
-        inside = program.body_wrench(self.data, nearest.loads)
-        self.outcome = program.margin(StanceData(self.data.hands, inside))
+            if self.certificate is not None:
+                self.outcome = replace(self.outcome, solved=False)
+        elif not self.outcome.solved:
+            # rounding put the wrench a hair outside: plan for the nearest that can be had
+            inside = program.body_wrench(self.data, nearest.loads)
+            self.outcome = program.margin(StanceData(self.data.hands, inside))
+            self._settle_tie()
 
     def _certify(self, nearest: Outcome) -> Certificate | None:
         """Return a checked proof that no loads at any utilisation give the body wrench.
@@ -195,7 +201,7 @@ class _Answer:
 
             d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h
 
-        over the box |z| ≤ X. The bound must be below d · W.
+        over the box |z| ≤ X of `UNLIMITED`. The bound must be below d · W.
         """
         hands = self.data.hands
         reached = program.body_wrench(self.data, nearest.loads)
@@ -374,24 +380,26 @@ class _Answer:
 
 
 def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tuple[Array, Array]:
-    """Return a unit d near that of ``missing``, and λ ≥ 0 with Gᵀd = Hᵀλ, that prove the most.
+    """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
 
-    An interior-point solution leaves an error that a box as large as `UNLIMITED` would magnify; the
-    vertex of a linear program does not: max d·(W − g) − λ·h, less `CLOSE` for turning d away.
+    A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error
+    of an interior-point solution would be magnified by a box as large as X.
     """
     rows, size = H.shape
     length = float(np.linalg.norm(missing))
     near = missing / length
-    # variables: d (6), t ≥ |d − near| (6), λ (rows)
-    one = np.eye(6)
-    none = np.zeros((6, rows))
+    # variables: d (6), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
+    one, none = np.eye(6), np.zeros((6, rows + 2 * size))
+    leak = np.eye(size)
     result = linprog(
-        np.concatenate([-offset / length, np.full(6, CLOSE), h / length]),
+        np.concatenate(
+            [-offset / length, np.full(6, CLOSE), h / length, np.full(2 * size, UNLIMITED / length)]
+        ),
         A_ub=np.vstack([np.hstack([one, -one, none]), np.hstack([-one, -one, none])]),
         b_ub=np.concatenate([near, -near]),
-        A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T]),
+        A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T, -leak, leak]),
         b_eq=np.zeros(size),
-        bounds=[(-1.0, 1.0)] * 6 + [(0.0, None)] * (6 + rows),
+        bounds=[(-1.0, 1.0)] * 6 + [(0.0, None)] * (6 + rows + 2 * size),
         method="highs-ds",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
@@ -400,7 +408,7 @@ def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tupl
     length = float(np.linalg.norm(result.x[:6]))
     if length < BLOCKING:
         return near, np.zeros(rows)
-    return result.x[:6] / length, np.maximum(result.x[12:], 0.0) / length
+    return result.x[:6] / length, np.maximum(result.x[12 : 12 + rows], 0.0) / length
 
 
 def _read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:

@@ -81,6 +81,12 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
     question, loads = gently(tension, hold, closing_tension)
     lie = replace(honest_outcome(), value=-1.0, loads=loads)
     monkeypatch.setattr(program, "margin", lambda data: lie)
+    # the second look finds the truth, with a proof; without it, the lie is all there is
+    truth = plan(question)
+    assert truth.status == "infeasible"
+    assert truth.certificate.supremum < truth.certificate.needed
+    gave_up = Outcome(False, "solver_error", 0, float("nan"))
+    monkeypatch.setattr(program, "nearest", lambda data: gave_up)
     answer = plan(question)
     assert answer.status == "failed"
     assert words in answer.reason
