@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -154,6 +155,9 @@ class _Answer:
         self.wrench = wrench
         self.outcome: Outcome
         self.loads: tuple[Array, ...] = ()
+        self.hands: tuple[HandPlan, ...] = ()
+        self.utilisation = math.inf
+        self.wrong: list[str] = []
         self.certificate: Certificate | None = None
         self.load_factor: float | None = None
         self.unbounded = False
@@ -164,7 +168,7 @@ class _Answer:
         """Find the loads, or the certificate that there are none."""
         self.outcome = program.margin(self.data)
         self._settle_tie()
-        if not self.outcome.solved or self._problems(self.loads):
+        if not self.outcome.solved or self.wrong:
             self._look_again()
         if "load_factor" in self.question.want:
             self._find_load_factor()
@@ -175,9 +179,24 @@ class _Answer:
             return
         cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
         tidy = program.effort(self.data, cap)
-        self.loads = tidy.loads if tidy.solved else self.outcome.loads
-        if self._problems(self.loads):
-            self.loads = self.outcome.loads
+        if tidy.solved:
+            self._take(tidy.loads)
+        if not tidy.solved or self.wrong:
+            self._take(self.outcome.loads)
+
+    def _take(self, loads: tuple[Array, ...]) -> None:
+        """Read these loads, and check them."""
+        self.loads = loads
+        self.hands = tuple(
+            _read_hand(place.limb, settled, space, y)
+            for place, settled, space, y in zip(
+                self.question.stance.hands, self.settled, self.spaces, loads, strict=True
+            )
+        )
+        self.utilisation = max(hand.utilisation for hand in self.hands)
+        self.wrong = problems(
+            self.question, self.settled, self.hands, self.utilisation, self.wrench
+        )
 
     def _look_again(self) -> None:
         """Tell no balance at all from a solver that failed."""
@@ -261,19 +280,6 @@ class _Answer:
 
     # Reading ------------------------------------------------------------------------------------
 
-    def _hands(self, loads: Sequence[Array]) -> tuple[HandPlan, ...]:
-        return tuple(
-            _read_hand(place.limb, settled, space, y)
-            for place, settled, space, y in zip(
-                self.question.stance.hands, self.settled, self.spaces, loads, strict=True
-            )
-        )
-
-    def _problems(self, loads: Sequence[Array]) -> list[str]:
-        hands = self._hands(loads)
-        used = max(hand.utilisation for hand in hands)
-        return problems(self.question, self.settled, hands, used, self.wrench)
-
     def read(self, times: Times, start: float) -> Plan:
         """Return the plan, verified."""
         hands: tuple[HandPlan, ...] | None = None
@@ -283,10 +289,8 @@ class _Answer:
         verified = False
         status: Status = "failed"
         if self.outcome.solved:
-            hands = self._hands(self.loads)
-            utilisation = max(hand.utilisation for hand in hands)
-            wrong = problems(self.question, self.settled, hands, utilisation, self.wrench)
-            wrong = wrong or self._not_least(utilisation)
+            hands, utilisation = self.hands, self.utilisation
+            wrong = self.wrong or self._not_least(utilisation)
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
                 hands = utilisation = None
