@@ -265,7 +265,18 @@ class SpinyHand:
 
     def frames(self, outer_rotation: float) -> tuple[_Frame, ...]:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""
-        return _frames(self, outer_rotation)
+        frames = []
+        for name in FINGERS:
+            side = 1.0 if name.endswith("left") else -1.0
+            mirror = np.array([1.0, side, 1.0])
+            if name.startswith("inner"):
+                joint, along = self.inner_joint * mirror, np.array([1.0, 0.0, 0.0])
+            else:
+                along = np.array([math.cos(outer_rotation), side * math.sin(outer_rotation), 0.0])
+                joint = self.outer_axis * mirror + self.outer_reach * along
+            across = np.array([-along[1], along[0], 0.0])
+            frames.append(_Frame(joint, along, across))
+        return tuple(frames)
 
     def seat(self, hold: Hold, grasp: Grasp) -> Seating:
         """Seat the hand on a hold that was given no place (axes parallel to H's).
@@ -465,21 +476,6 @@ def _close(
     if any(finger.touching) and least > most:
         return _close(finger.released(), closing_tension, outer)
     return finger, shears, normals, torques
-
-
-def _frames(hand: SpinyHand, outer_rotation: float) -> tuple[_Frame, ...]:
-    frames = []
-    for name in FINGERS:
-        side = 1.0 if name.endswith("left") else -1.0
-        mirror = np.array([1.0, side, 1.0])
-        if name.startswith("inner"):
-            joint, along = hand.inner_joint * mirror, np.array([1.0, 0.0, 0.0])
-        else:
-            along = np.array([math.cos(outer_rotation), side * math.sin(outer_rotation), 0.0])
-            joint = hand.outer_axis * mirror + hand.outer_reach * along
-        across = np.array([-along[1], along[0], 0.0])
-        frames.append(_Frame(joint, along, across))
-    return tuple(frames)
 
 
 @cache

@@ -472,7 +472,7 @@ def test_a_bad_flag_is_named(flags: dict, field: str) -> None:
     with pytest.raises(InvalidInputError) as caught:
         zenoh_config(**flags)
     assert caught.value.field == field
-    assert "/root/" not in caught.value.message
+    assert ".rs:" not in caught.value.message
 
 
 def test_a_channel_that_is_full_makes_its_client_wait(alone: zenoh.Session) -> None:
