@@ -8,7 +8,7 @@ from hand_models.errors import CruxError, EmptySetError, InvalidInputError
 from hand_models.fixed_wrist import tension_limits, wrench_space
 from hand_models.frames import Pose
 from hand_models.hand import FINGERS, Grasp, SettledHand, SpinyHand, spiny_hand
-from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
+from hand_models.holds import Cylinder, Edge, Ellipsoid, Hold, Plane, Sphere
 from hand_models.spines import Surface
 from hand_models.wrench_space import WrenchSpace
 
@@ -17,6 +17,7 @@ __all__ = [
     "CruxError",
     "Cylinder",
     "Edge",
+    "Ellipsoid",
     "EmptySetError",
     "Grasp",
     "Hold",

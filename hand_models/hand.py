@@ -18,9 +18,10 @@ from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hand_models.errors import InvalidInputError
-from hand_models.finger import PHALANGES, FingerModel, SettledFinger
+from hand_models.finger import PHALANGES, Contact, FingerModel, SettledFinger
 from hand_models.frames import Array, Indices, Pose
 from hand_models.holds import Hold, Plane
 from hand_models.palm import shear_capacity
@@ -287,35 +288,67 @@ class SpinyHand:
         cannot be had, the palm rests on the rock with the crest under its centre. On a plane the
         finger tiles lie flat, and the palm stands off by their height, within the spines' travel.
         """
-        height = self.finger.tile_height
         x, y, z = (float(v) for v in self.inner_joint)
         if isinstance(hold, Plane):
+            height = self.finger.tile_height
             return Seating(Pose(np.array([0.0, 0.0, z + height]), np.eye(3)), "flat")
         centred = Seating(Pose.identity(), "palm_on_rock_centred")
+        opposed = float(self.outer_axis[0]) - self.outer_reach
+        crest = 0.5 * (x + opposed) if grasp.pinch else None
         circle = hold.crest_circle(y)
-        if circle is None:
+        place = (
+            self._seat_smooth(hold, crest) if circle is None else self._seat_round(*circle, crest)
+        )
+        if place is None:
             return centred
-        depth, radius = circle
-        reach = (radius + height) ** 2 + self.seated_contact**2
+        pose = Pose(np.array([place[0], 0.0, place[1]]), np.eye(3))
         if grasp.pinch:
-            opposed = float(self.outer_axis[0]) - self.outer_reach
-            crest = 0.5 * (x + opposed)
-            rise = reach - (x - crest) ** 2
-            if rise <= 0.0:
-                return centred
-            seating = Seating(
-                Pose(np.array([crest, 0.0, z + math.sqrt(rise) - depth]), np.eye(3)), "pinch"
-            )
-            possible = seating.pose.position[2] >= 0.0
+            seating, possible = Seating(pose, "pinch"), place[1] >= 0.0
         else:
-            run = reach - (depth - z) ** 2
-            if run <= 0.0:
-                return centred
-            seating = Seating(
-                Pose(np.array([x - math.sqrt(run), 0.0, 0.0]), np.eye(3)), "palm_on_rock"
-            )
-            possible = abs(seating.pose.position[0]) <= 0.5 * self.palm_length
+            seating = Seating(pose, "palm_on_rock")
+            possible = abs(place[0]) <= 0.5 * self.palm_length
         return seating if possible and self._seated(hold, grasp, seating) else centred
+
+    def _seat_round(
+        self, depth: float, radius: float, crest: float | None
+    ) -> tuple[float, float] | None:
+        """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
+        x, _, z = (float(v) for v in self.inner_joint)
+        reach = (radius + self.finger.tile_height) ** 2 + self.seated_contact**2
+        if crest is not None:
+            rise = reach - (x - crest) ** 2
+            return None if rise <= 0.0 else (crest, z + math.sqrt(rise) - depth)
+        run = reach - (depth - z) ** 2
+        return None if run <= 0.0 else (x - math.sqrt(run), 0.0)
+
+    def _seat_smooth(self, hold: Hold, crest: float | None) -> tuple[float, float] | None:
+        """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
+        x, y, z = (float(v) for v in self.inner_joint)
+
+        def place(angle: float) -> tuple[float, float] | None:
+            point = hold.tangent_point(y, angle)
+            if point is None:
+                return None
+            tile = Contact(angle, (x, z), self.seated_contact, "face").point(
+                self.finger.tile_height
+            )
+            return tile[0] - point[0], tile[1] - point[1]
+
+        def miss(angle: float) -> float:
+            there = place(angle)
+            assert there is not None
+            return there[0] - crest if crest is not None else there[1]
+
+        if place(0.0) is None:
+            return None
+        angles = np.linspace(0.0, self.finger.joint_upper[0], 64)
+        misses = np.array([miss(float(angle)) for angle in angles])
+        turns = np.flatnonzero(np.sign(misses[:-1]) * np.sign(misses[1:]) <= 0.0)
+        if not len(turns):
+            return None
+        first = int(turns[0])
+        root = brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
+        return place(float(root))
 
     def _seated(self, hold: Hold, grasp: Grasp, seating: Seating) -> bool:
         """Whether the inner fingers' proximal tiles do touch where seating meant them to."""

@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
 
-__all__ = ["Cylinder", "Edge", "Hold", "Plane", "Section", "Sphere", "Tangency"]
+__all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere", "Tangency"]
 
 Vector2 = tuple[float, float]
 
@@ -326,6 +326,13 @@ class Hold(ABC):
         None where the plane at that offset meets nothing round.
         """
 
+    def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
+        """Return the point (x, z) at y = ``offset`` where rock runs at an angle from x toward z.
+
+        Only of a hold that is smooth but not round there; None elsewhere.
+        """
+        return None
+
 
 def _positive(value: float, field: str, unit: str = "m") -> None:
     if not 0.0 < value <= LARGEST:
@@ -508,3 +515,61 @@ class Sphere(Hold):
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
         radius = self.diameter / 2.0
         return (radius, math.sqrt(radius**2 - offset**2)) if abs(offset) < radius else None
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Hold):
+    """A rounded boulder.
+
+    Attributes
+    ----------
+    semi_axes : tuple of float
+        Along x, y and z of the hold's frame; the crest is an end of the last [m].
+    """
+
+    semi_axes: tuple[float, float, float]
+    shape = "ellipsoid"
+
+    def __post_init__(self) -> None:
+        if len(self.semi_axes) != 3:
+            raise InvalidInputError(
+                f"three numbers are needed, got {len(self.semi_axes)}", field="semi_axes"
+            )
+        for i, value in enumerate(self.semi_axes):
+            _positive(value, f"semi_axes[{i}]")
+
+    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        scale = 1.0 / np.asarray(self.semi_axes)
+        start = scale * (np.asarray(origin, dtype=float) - np.array([0.0, 0.0, self.semi_axes[2]]))
+        span = scale[:, None] * np.column_stack([s_axis, t_axis])
+        # |start + span q| = 1 is |R (q − q0)| = rho
+        R = np.linalg.cholesky(span.T @ span).T
+        q0 = -np.linalg.lstsq(span, start, rcond=None)[0]
+        left = 1.0 - float(np.sum((start + span @ q0) ** 2))
+        if left <= 0.0:
+            return None
+        rho = math.sqrt(left)
+        # in metres again, so that the profile's disc is as large as the section
+        size = 1.0 / math.sqrt(float(np.linalg.det(R)))
+        M = R * size
+        return ProfileSection(M, np.array([0.0, rho * size]) - M @ q0, rho * size, np.zeros((0, 2)))
+
+    def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
+        scale = 1.0 / np.asarray(self.semi_axes)
+        p = scale * (np.asarray(point, dtype=float) - np.array([0.0, 0.0, self.semi_axes[2]]))
+        d = scale * np.asarray(direction, dtype=float)
+        a, b = float(d @ d), float(p @ d)
+        discriminant = b**2 - a * (float(p @ p) - 1.0)
+        return (-b - math.sqrt(discriminant)) / a if discriminant >= 0.0 else math.inf
+
+    def crest_circle(self, offset: float) -> tuple[float, float] | None:
+        return None
+
+    def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
+        a, b, c = self.semi_axes
+        if abs(offset) >= b:
+            return None
+        shrink = math.sqrt(1.0 - (offset / b) ** 2)
+        x, z = a * shrink * math.sin(angle), -c * shrink * math.cos(angle)
+        length = math.hypot(x, z)
+        return a * shrink * x / length, c + c * shrink * z / length

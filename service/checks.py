@@ -24,7 +24,7 @@ class _Later(NamedTuple):
 
 
 _OMIT = "leave it out"
-_SHAPES = "valid shapes are plane, cylinder, sphere and edge"
+_SHAPES = "valid shapes are plane, cylinder, sphere, ellipsoid and edge"
 
 LATER: Final[dict[type, dict[str, _Later]]] = {
     requests.PlanRequest: {
@@ -46,7 +46,7 @@ LATER: Final[dict[type, dict[str, _Later]]] = {
 }
 """By message and field, what this version supports of the fields that later versions will."""
 
-LATER_HOLDS: Final = (requests.Ellipsoid, requests.Profile, requests.Mesh)
+LATER_HOLDS: Final = (requests.Profile, requests.Mesh)
 
 
 def check(value: object, path: str = "") -> None:

@@ -150,6 +150,8 @@ def _hold(message: requests.Hold) -> holds.Hold:
             return holds.Cylinder(message.diameter)
         case requests.Sphere():
             return holds.Sphere(message.diameter)
+        case requests.Ellipsoid():
+            return holds.Ellipsoid(message.semi_axes)
         case requests.Edge():
             return holds.Edge(message.fillet_radius, message.angle)
         case _:

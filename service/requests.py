@@ -56,6 +56,7 @@ Wrench = Annotated[
 ]
 Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
 Diameter = Annotated[float, Meta(ge=1e-3, le=100.0, description="[m]")]
+SemiAxis = Annotated[float, Meta(ge=5e-4, le=50.0)]
 FilletRadius = Annotated[float, Meta(ge=1e-4, le=100.0, description="[m]")]
 EdgeAngle = Annotated[
     float, Meta(ge=1e-2, lt=math.pi, description="of the rock between the faces [rad]")
@@ -113,8 +114,12 @@ class Edge(Placed, frozen=True, kw_only=True, tag="edge"):
     angle: EdgeAngle
 
 
-class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid", forbid_unknown_fields=False):
-    """Not supported in this version."""
+class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
+    """A rounded boulder; the crest is an end of its last semi-axis."""
+
+    semi_axes: Annotated[
+        tuple[SemiAxis, SemiAxis, SemiAxis], Meta(description="along x, y, z of its frame [m]")
+    ]
 
 
 class Profile(Placed, frozen=True, kw_only=True, tag="profile", forbid_unknown_fields=False):
