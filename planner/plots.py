@@ -363,6 +363,7 @@ def plot_route(result: RouteResult, path: Path) -> None:
         textcoords="offset points",
         ha="center",
         weight="bold",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
         arrowprops={"arrowstyle": "-|>"},
     )
     upper.set(
