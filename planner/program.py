@@ -27,7 +27,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Self
 
 import cvxpy as cp
 import numpy as np
@@ -208,6 +208,13 @@ class _Program(ABC):
     def define(self) -> cp.Problem:
         """Return the problem, with `limits` and `balance` set."""
 
+    @classmethod
+    def built(cls, shape: Shape) -> Self:
+        """Return the program for a shape, built on first use and kept."""
+        program = _built(cls, shape)
+        assert isinstance(program, cls)
+        return program
+
     def utilisations(self) -> list[cp.Expression]:
         """Return each hand's limit rows as load over capacity."""
         return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
@@ -335,30 +342,22 @@ def _built(kind: type[_Program], shape: Shape) -> _Program:
 
 def margin(data: StanceData) -> Outcome:
     """Solve `Margin`, built once for each shape."""
-    program = _built(Margin, data.shape)
-    assert isinstance(program, Margin)
-    return program.solve(data)
+    return Margin.built(data.shape).solve(data)
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
     """Solve `Effort`, built once for each shape."""
-    program = _built(Effort, data.shape)
-    assert isinstance(program, Effort)
-    return program.solve(data, cap)
+    return Effort.built(data.shape).solve(data, cap)
 
 
 def load_factor(data: StanceData) -> Outcome:
     """Solve `LoadFactor`, built once for each shape."""
-    program = _built(LoadFactor, data.shape)
-    assert isinstance(program, LoadFactor)
-    return program.solve(data)
+    return LoadFactor.built(data.shape).solve(data)
 
 
 def nearest(data: StanceData) -> Outcome:
     """Solve `Nearest`, built once for each shape."""
-    program = _built(Nearest, data.shape)
-    assert isinstance(program, Nearest)
-    return program.solve(data)
+    return Nearest.built(data.shape).solve(data)
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:

@@ -62,6 +62,14 @@ def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
     return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
 
 
+def _settle_at(stance: Stance, index: int) -> SettledHand:
+    """Close the hand of that index; an error's field is relative to the question."""
+    try:
+        return settle(stance.hands[index], stance)
+    except InvalidInputError as error:
+        raise error.within(f"stance.hands[{index}]") from None
+
+
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     """Return one hand of a stance on its hold, and what it can carry.
 
@@ -72,10 +80,7 @@ def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     """
     for i, hand in enumerate(stance.hands):
         if hand.limb == limb:
-            try:
-                settled = settle(hand, stance)
-            except InvalidInputError as error:
-                raise error.within(f"stance.hands[{i}]") from None
+            settled = _settle_at(stance, i)
             return settled, wrench_space(settled)
     limbs = ", ".join(hand.limb for hand in stance.hands)
     raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")
@@ -103,12 +108,7 @@ def plan(question: Question) -> Plan:
         wrench = question.needed_wrench()
     except InvalidInputError as error:
         raise error.within("load") from None
-    settled: list[SettledHand] = []
-    for i, hand in enumerate(stance.hands):
-        try:
-            settled.append(settle(hand, stance))
-        except InvalidInputError as error:
-            raise error.within(f"stance.hands[{i}]") from None
+    settled = [_settle_at(stance, i) for i in range(len(stance.hands))]
     spaces = [wrench_space(hand, question.limits.tendon_tension) for hand in settled]
     body = stance.body.inverse()
     data = StanceData(
@@ -286,6 +286,7 @@ class _Answer:
         utilisation: float | None = None
         limiting: LimitName | None = None
         residual: Array | None = None
+        prices: tuple[Price, ...] | None = None
         verified = False
         status: Status = "failed"
         if self.outcome.solved:
@@ -299,7 +300,9 @@ class _Answer:
                 cap = self.question.limits.utilisation
                 status = "optimal" if utilisation <= cap + SLACK else "overloaded"
                 residual = self._residual(hands)
-                limiting, reason = self._explain(hands, utilisation, status)
+                dear = self._prices()
+                limiting, reason = self._explain(hands, utilisation, status, dear)
+                prices = dear if "prices" in self.question.want else None
         elif self.certificate is not None:
             status = "infeasible"
             verified = True
@@ -307,9 +310,6 @@ class _Answer:
             reason = shortfall_sentence(self.certificate, touching)
         else:
             reason = f"the solver gave no usable answer ({self.outcome.status})"
-        prices = None
-        if "prices" in self.question.want and verified and self.outcome.solved:
-            prices = self._prices()
         return Plan(
             status=status,
             body_wrench=self.wrench,
@@ -343,14 +343,18 @@ class _Answer:
         return np.asarray(total)
 
     def _explain(
-        self, hands: Sequence[HandPlan], utilisation: float, status: Status
+        self,
+        hands: Sequence[HandPlan],
+        utilisation: float,
+        status: Status,
+        dear: Sequence[Price],
     ) -> tuple[LimitName | None, str]:
         """Return the limit with the largest utilisation, and a sentence about it.
 
         Of limits that tie, the one with the highest price: the others only follow it.
         """
         close = utilisation - 2.0 * SLACK * max(1.0, utilisation)
-        prices = {price.name: price.price for price in self._prices()}
+        prices = {price.name: price.price for price in dear}
         best: tuple[bool, float, float] | None = None
         limiting: LimitName | None = None
         sentence = "nothing limits this stance"
