@@ -1,16 +1,23 @@
-"""What one spine tile can hold: the linear law of the loading angle, and half-planes inside it.
+"""What one spine tile can hold: a limit surface over the direction of its load.
 
-A tile loaded at the angle φ from pure shear toward pull-off lets go at the force (Eq. 21)
+A tile loaded in the finger plane at the angle φ from pure shear toward pull-off lets go at (Eq. 21)
 
     f_s(φ) = f_max − (f_max − f_min) φ / φ_max,        0 ≤ φ ≤ φ_max,
 
-and at f_min beyond φ_max (``assumed``: nothing is published there). Pressed into the rock it holds
-the shear ``f_max + γ N``, with γ the compression gain.
+and at f_min beyond φ_max (``assumed``: nothing is published there). Out of the finger plane, at the
+azimuth θ in the tile's plane from the drag, it holds
+
+    F(φ, θ) = f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)],
+
+a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines hold
+less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
+times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
+pull-off, where it has no meaning. Pressed into the rock, a tile holds F(0, θ) + γ N in its plane,
+with γ the compression gain. Half-planes inside and outside the surface are in ``limit_pieces.py``.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -21,30 +28,10 @@ from numpy.typing import ArrayLike
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
+from hand_models.limit_pieces import HalfPlane, inner_pieces, outer_pieces
 from hand_models.parameters import surface_table
 
 __all__ = ["HalfPlane", "Surface", "surface_names"]
-
-
-@dataclass(frozen=True)
-class HalfPlane:
-    """A limit ``a_shear T + a_normal N + a_lateral |Y| ≤ capacity`` of one tile.
-
-    Attributes
-    ----------
-    limit : str
-        ``shear`` for the side that pressing governs, ``pull_off`` for the others.
-    a_shear, a_normal, a_lateral : float
-        Coefficients of the tile's shear T, normal N (> 0 pressing) and lateral load Y.
-    capacity : float
-        Right-hand side [N].
-    """
-
-    limit: str
-    a_shear: float
-    a_normal: float
-    a_lateral: float
-    capacity: float
 
 
 @dataclass(frozen=True)
@@ -60,12 +47,16 @@ class Surface:
     pull_off_angle : float
         φ_max, at most π/2 [rad].
     lateral_limit : float
-        Its strength sideways, out of the finger plane [N].
+        Its strength in its own plane straight sideways [N].
     compression_gain : float
         γ, shear strength gained per newton of pressing.
     half_planes : int
         How many straight pieces stand for the curve from pure shear to φ_max; one is the paper's
         straight line, more come closer to the curve from inside.
+    lateral_pull_off_ratio : float
+        What is left at ``pull_off_angle`` of the share λ that holds sideways; above 0, at most 1.
+    shear_scatter : float
+        Standard deviation of ``shear_limit`` from place to place [N].
     """
 
     shear_limit: float
@@ -74,6 +65,8 @@ class Surface:
     lateral_limit: float
     compression_gain: float
     half_planes: int = 1
+    lateral_pull_off_ratio: float = 1.0
+    shear_scatter: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -95,9 +88,15 @@ class Surface:
             raise InvalidInputError(
                 f"must be in (0, pi/2] rad, got {self.pull_off_angle:g}", field="pull_off_angle"
             )
-        if self.compression_gain < 0.0:
+        for name in ("compression_gain", "shear_scatter"):
+            if getattr(self, name) < 0.0:
+                raise InvalidInputError(
+                    f"must not be negative, got {getattr(self, name):g}", field=name
+                )
+        if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
             raise InvalidInputError(
-                f"must not be negative, got {self.compression_gain:g}", field="compression_gain"
+                f"must be in (0, 1], got {self.lateral_pull_off_ratio:g}",
+                field="lateral_pull_off_ratio",
             )
         if not (1 <= self.half_planes <= 64 and self.half_planes == int(self.half_planes)):
             raise InvalidInputError(
@@ -142,13 +141,16 @@ class Surface:
         base = _from_ratios(values["shear_limit"], "defaults")
         return replace(base, **values)  # type: ignore[arg-type]
 
-    def strength(self, angle: ArrayLike) -> Array:
-        """Return the force at which a tile lets go, f_s(φ) of Eq. 21.
+    def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
+        """Return the force at which a tile lets go, F(φ, θ); f_s(φ) of Eq. 21 in the finger plane.
 
         Parameters
         ----------
         angle : array_like
-            φ from pure shear toward pull-off, in (−π/2, π/2]; negative is pressing [rad].
+            φ from the tile's plane toward pull-off, in (−π/2, π/2]; negative is pressing [rad].
+        azimuth : array_like
+            θ in the tile's plane from the drag to either side; broadcast with ``angle``. Beyond
+            π/2 a tile is dragged backwards, and the strength straight sideways is returned [rad].
 
         Returns
         -------
@@ -158,20 +160,23 @@ class Surface:
         phi = np.asarray(angle, dtype=float)
         ratio = np.clip(phi / self.pull_off_angle, 0.0, 1.0)
         pulling = self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
-        # T ≤ f_max + γ N along the direction φ < 0
+        kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
+        share = self.lateral_limit / self.shear_limit * kept
+        sideways = 1.0 - np.maximum(np.cos(azimuth), 0.0)
+        pulling = pulling * (1.0 - (1.0 - share) * np.cos(np.maximum(phi, 0.0)) * sideways)
+        # in the tile's plane ≤ F(0, θ) + γ N along the direction φ < 0
         slope = np.cos(phi) + self.compression_gain * np.sin(phi)
         with np.errstate(divide="ignore"):
-            pressing = np.where(slope > 0.0, self.shear_limit / np.maximum(slope, 0.0), np.inf)
+            pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
         return np.where(phi >= 0.0, pulling, pressing)
 
     def pieces(self) -> tuple[HalfPlane, ...]:
-        """Return the inner approximation of the limit curve for shear T ≥ 0.
+        """Return half-planes inside the limit surface, for shear T ≥ 0."""
+        return inner_pieces(self)
 
-        The curve of Eq. 21 bends outward, so chords between points on it lie inside. The last
-        chord runs on beyond φ_max; where it would leave the curve there (which stays at f_min), one
-        more chord, down to pure pull-off, closes the region.
-        """
-        return _pieces(self)
+    def outer_pieces(self) -> tuple[HalfPlane, ...]:
+        """Return half-planes around the limit surface, for shear T ≥ 0."""
+        return outer_pieces(self)
 
 
 def _from_ratios(shear_limit: float, section: str) -> Surface:
@@ -187,6 +192,8 @@ def _from_ratios(shear_limit: float, section: str) -> Surface:
         pull_off_angle=ratio("pull_off_angle"),
         lateral_limit=shear_limit * ratio("lateral_ratio"),
         compression_gain=ratio("compression_gain"),
+        lateral_pull_off_ratio=ratio("lateral_pull_off_ratio"),
+        shear_scatter=shear_limit * ratio("scatter_ratio"),
     )
 
 
@@ -198,34 +205,3 @@ def surface_names() -> tuple[str, ...]:
 @lru_cache(maxsize=64)
 def _preset(name: str) -> Surface:
     return _from_ratios(surface_table().scalar(name, "shear_limit"), name)
-
-
-@lru_cache(maxsize=256)
-def _pieces(surface: Surface) -> tuple[HalfPlane, ...]:
-    sideways = 1.0 / surface.lateral_limit
-    angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
-    radii = surface.strength(angles)
-    # points (shear T, pull P) on the curve
-    nodes = [
-        (float(r * np.cos(a)), float(r * np.sin(a))) for a, r in zip(angles, radii, strict=True)
-    ]
-    last = _chord(nodes[-2], nodes[-1])
-    if surface.pull_off_angle < math.pi / 2 and last[2] > last[1] * surface.pull_off_limit:
-        nodes.append((0.0, surface.pull_off_limit))
-    # a gain steeper than the first chord would cut into the side of pull-off
-    shear, pull, _ = _chord(*nodes[:2])
-    gain = min(surface.compression_gain, pull / shear if shear > 0.0 else math.inf)
-    pieces = [HalfPlane("shear", 1.0, -gain, surface.shear_limit * sideways, surface.shear_limit)]
-    for start, end in itertools.pairwise(nodes):
-        shear, pull, capacity = _chord(start, end)
-        pieces.append(HalfPlane("pull_off", shear, -pull, capacity * sideways, capacity))
-    return tuple(pieces)
-
-
-def _chord(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float, float]:
-    """Return (a, b, c) of the line ``a T + b P = c`` through two points, with a² + b² = 1."""
-    a = end[1] - start[1]
-    b = start[0] - end[0]
-    scale = math.hypot(a, b)
-    a, b = a / scale, b / scale
-    return a, b, a * start[0] + b * start[1]

@@ -1,4 +1,4 @@
-"""What a tile holds: the linear law of Eq. 21, and half-planes that stay inside it."""
+"""What a tile holds: the limit surface over Eq. 21, and half-planes inside and outside it."""
 
 import itertools
 import math
@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hand_models import InvalidInputError, Surface
+from hand_models.limit_pieces import bounds_gap
+from hand_models.limit_pieces import reach as reach_of
 from hand_models.spines import surface_names
 
 DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
@@ -40,6 +42,49 @@ def reach(surface, angles):
         return np.where(slopes > 1e-15, capacities / slopes, np.inf).min(axis=0)
 
 
+def boat(surface, directions):
+    """The limit surface of the module's first lines, written out anew, along (T, N, Y) [N]."""
+    shear, normal, lateral = directions.T
+    in_plane = np.hypot(shear, lateral)
+    aside = np.where(in_plane > 0.0, in_plane - shear, 0.0)  # cos φ (1 − cos θ)
+    angle = np.arcsin(np.clip(-normal, -1.0, 1.0))
+    share = surface.lateral_limit / surface.shear_limit
+    used = np.clip(angle / surface.pull_off_angle, 0.0, 1.0)
+    share = share * (1.0 - used * (1.0 - surface.lateral_pull_off_ratio))
+    pulling = law(surface, np.maximum(angle, 0.0)) * (1.0 - (1.0 - share) * aside)
+    # pressed: in the plane up to F(0, θ) and γ for each newton
+    lost = 1.0 - surface.lateral_limit / surface.shear_limit
+    flat = surface.shear_limit * (1.0 - lost * aside / np.maximum(in_plane, 1e-300))
+    left = in_plane - surface.compression_gain * normal
+    with np.errstate(divide="ignore"):
+        pressing = np.where(left > 0.0, flat / np.maximum(left, 0.0), np.inf)
+    return np.where(normal <= 0.0, pulling, pressing)
+
+
+def random_directions(count, seed=0):
+    """Evenly spread over the half space of shear ≥ 0."""
+    directions = np.random.default_rng(seed).normal(size=(count, 3))
+    directions[:, 0] = np.abs(directions[:, 0])
+    return directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+def edge_directions(surface, count=400):
+    """Where a half-plane would leave the surface first: along φ_max, T = 0, N = 0 and the nodes."""
+    turn = np.linspace(0.0, np.pi / 2, count)
+    cone = np.full(count, surface.pull_off_angle)
+    places = [(cone, turn), (turn, np.full(count, np.pi / 2)), (0.0 * turn, turn)]
+    for node in np.linspace(0.0, surface.pull_off_angle, surface.half_planes + 1):
+        # seen from the side at the angle of a node
+        out = turn[:-1]
+        pull, shear = np.cos(out) * np.sin(node), np.cos(out) * np.cos(node)
+        places.append((np.arcsin(pull), np.arctan2(np.sin(out), shear)))
+    found = [
+        np.column_stack([np.cos(a) * np.cos(t), -np.sin(a), np.cos(a) * np.sin(t)])
+        for a, t in places
+    ]
+    return np.abs(np.concatenate(found)) * (1.0, -1.0, 1.0)
+
+
 def area_between(surface):
     """Between the law and the half-planes, for 0 ≤ φ ≤ φ_max [N²]."""
     angles = np.linspace(0.0, surface.pull_off_angle, 4001)
@@ -57,6 +102,7 @@ def surfaces(draw):
         lateral_limit=shear_limit * draw(st.floats(0.1, 2.0)),
         compression_gain=draw(st.sampled_from([0.0, 0.0, 0.3, 1.5])),
         half_planes=draw(st.integers(1, 16)),
+        lateral_pull_off_ratio=draw(st.one_of(st.just(1.0), st.floats(0.02, 1.0))),
     )
 
 
@@ -134,12 +180,108 @@ def test_one_half_plane_is_the_papers_straight_line():
     assert math.hypot(line.a_shear, line.a_normal) == pytest.approx(1.0)
 
 
+# Out of the finger plane -------------------------------------------------------------------------
+
+
+def test_strength_out_of_the_finger_plane_by_hand():
+    """60 N along, 30 N sideways; at φ_max = 60°, 20 N along and a share of ½ · 0.4 sideways."""
+    surface = Surface(60.0, 20.0, math.radians(60.0), 30.0, 0.0, lateral_pull_off_ratio=0.4)
+    flat = surface.strength(0.0, np.radians([0.0, 60.0, 90.0, -60.0, 120.0]))
+    np.testing.assert_allclose(flat, [60.0, 45.0, 30.0, 45.0, 30.0])
+    # 1 − (1 − 0.2) cos 60° = 0.6; half way in φ: 40 N, 1 − (1 − 0.35) cos 30°
+    sideways = surface.strength(np.radians([60.0, 30.0, 90.0]), math.pi / 2)
+    half_way = 40.0 * (1.0 - 0.65 * math.sqrt(0.75))
+    np.testing.assert_allclose(sideways, [12.0, half_way, 20.0], atol=1e-12)
+    # pressed at 45° with a gain of ½: Y = 30 + N / 2 and N = Y
+    pressed = replace(surface, compression_gain=0.5).strength(-math.pi / 4, math.pi / 2)
+    assert pressed == pytest.approx(60.0 * math.sqrt(2.0))
+
+
+@settings(max_examples=60, deadline=None)
+@given(surfaces())
+def test_strength_is_the_boat_shaped_surface(surface):
+    directions = random_directions(500)
+    angle = np.arcsin(-directions[:, 1])
+    azimuth = np.arctan2(directions[:, 2], directions[:, 0])
+    np.testing.assert_allclose(
+        surface.strength(angle, azimuth),
+        boat(surface, directions),
+        rtol=1e-9,
+    )
+
+
+@pytest.mark.parametrize("name", surface_names())
+@pytest.mark.parametrize("count", [1, 2, 4, 8])
+def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(name, count):
+    surface = replace(Surface.named(name), half_planes=count)
+    directions = random_directions(100_000)
+    exact = boat(surface, directions)
+    assert (reach_of(surface.pieces(), directions) <= exact).all()
+    assert (reach_of(surface.outer_pieces(), directions) >= exact).all()
+
+
+@settings(max_examples=150, deadline=None)
+@given(surfaces(), st.integers(0, 1000))
+def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
+    directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
+    exact = boat(surface, directions)
+    assert (reach_of(surface.pieces(), directions) <= exact * (1.0 + 1e-9)).all()
+    assert (reach_of(surface.outer_pieces(), directions) >= exact * (1.0 - 1e-9)).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(surfaces())
+def test_no_bound_could_be_nearer_to_the_surface(surface):
+    """Every lateral coefficient and every outer capacity is as good as its normal allows."""
+    directions = np.concatenate([random_directions(4000), edge_directions(surface)])
+    directions = directions[(directions[:, 1] <= 0.0) & (np.abs(directions[:, 2]) > 1e-3)]
+    points = boat(surface, directions)[:, None] * np.abs(directions)
+    for piece in surface.outer_pieces():
+        loads = points @ [piece.a_shear, -piece.a_normal, piece.a_lateral]
+        assert loads.max() >= piece.capacity * 0.97
+    inner = reach_of(surface.pieces(), directions)
+    slack = inner / np.linalg.norm(points, axis=1)
+    assert slack.max() >= 0.97
+
+
+GAPS = {1: (0.086, 3.77), 2: (0.295, 1.68), 4: (0.489, 1.46), 8: (0.496, 1.41)}
+"""Volumes within the inner and the outer half-planes, over that within the surface, rounded."""
+
+
+@pytest.mark.parametrize("count", GAPS)
+def test_the_gap_between_the_bounds_is_as_stated(count):
+    directions = np.abs(random_directions(100_000)) * [1.0, -1.0, 1.0]
+    gap = bounds_gap(replace(Surface.named("rock"), half_planes=count), directions)
+    assert (gap.inner_volume, gap.outer_volume) == pytest.approx(GAPS[count], rel=0.01)
+    assert gap.inner_worst < gap.inner_volume ** (1.0 / 3.0) < 1.0
+    assert gap.outer_worst > gap.outer_volume ** (1.0 / 3.0) > 1.0
+
+
+def test_the_gap_around_a_ball_by_hand():
+    """Without pull-off or lateral loss the surface is a sphere of 10 N, of π / 6 in the octant."""
+    surface = Surface(10.0, 10.0, math.pi / 2, 10.0, 0.0)
+    directions = np.abs(random_directions(100_000)) * [1.0, -1.0, 1.0]
+    gap = bounds_gap(surface, directions)
+    # inside, the octahedron T + P + |Y| ≤ 10; outside, its faces √3 times as far
+    assert gap.inner_volume == pytest.approx((1.0 / 6.0) / (math.pi / 6.0), rel=0.01)
+    assert gap.inner_worst == pytest.approx(1.0 / math.sqrt(3.0), rel=0.01)
+    assert gap.outer_worst == pytest.approx(math.sqrt(3.0), rel=0.02)
+
+
+def test_what_one_straight_line_costs_sideways():
+    """Straight sideways, rock holds 0.87 of its shear; convex pieces keep 0.23 to 0.87 of it."""
+    rock = Surface.named("rock")
+    sideways = np.array([[0.0, 0.0, 1.0]])
+    reaches = [reach_of(replace(rock, half_planes=k).pieces(), sideways)[0] for k in (1, 2, 4, 8)]
+    assert np.array(reaches) / 63.0 == pytest.approx([0.227, 0.363, 0.843, 0.866], abs=2e-3)
+    assert rock.strength(0.0, math.pi / 2) == pytest.approx(rock.lateral_limit)
+
+
 @settings(max_examples=50, deadline=None)
 @given(surfaces())
-def test_purely_sideways_every_piece_gives_the_lateral_limit(surface):
+def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
     for piece in surface.pieces():
-        assert piece.capacity / piece.a_lateral == pytest.approx(surface.lateral_limit)
-        assert piece.a_lateral > 0.0
+        assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)
 
 
 def test_pressing_raises_the_shear_limit_by_the_compression_gain():
@@ -155,6 +297,14 @@ def test_presets_are_ordered_from_sandpaper_to_rock():
     assert len(set(limits)) == 4
     # "The maximum force on rock is typically 2-5 times greater" (Section 6)
     assert 2.0 <= limits[3] / limits[0] <= 5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "scatter"),
+    [("concrete-fine", 8.5), ("concrete-coarse", 18.0), ("sandpaper-36", 5.4), ("rock", 22.9)],
+)
+def test_presets_carry_their_scatter(name, scatter):
+    assert Surface.named(name).shear_scatter == pytest.approx(scatter, rel=0.005)
 
 
 def test_an_unknown_preset_is_answered_with_the_known_ones():
@@ -184,6 +334,9 @@ def test_own_values_follow_from_shear_alone_by_the_default_ratios():
         ({"shear_limit": 60.0, "pull_off_angle": 1.6}, "pull_off_angle"),
         ({"shear_limit": 60.0, "compression_gain": -0.1}, "compression_gain"),
         ({"shear_limit": 60.0, "compression_gain": math.nan}, "compression_gain"),
+        ({"shear_limit": 60.0, "shear_scatter": -1.0}, "shear_scatter"),
+        ({"shear_limit": 60.0, "lateral_pull_off_ratio": 0.0}, "lateral_pull_off_ratio"),
+        ({"shear_limit": 60.0, "lateral_pull_off_ratio": 1.1}, "lateral_pull_off_ratio"),
         ({"shear_limit": 60.0, "half_planes": 0}, "half_planes"),
         ({"shear_limit": 60.0, "half_planes": 65}, "half_planes"),
         ({"shear_limit": 60.0, "half_planes": 2.5}, "half_planes"),

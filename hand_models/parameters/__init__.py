@@ -1,7 +1,9 @@
 """Parameter files: every physical number with its unit and its source.
 
-The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, beside this file. A
-caller's own file in the same form may replace some or all of them.
+The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those of a tile's
+spines in ``spines.toml``, those of reading scanned rock in ``scan.toml``, those of the paper's
+experiments in ``experiments.toml``, beside this file. A caller's own file in the same form may
+replace some or all of them.
 """
 
 from __future__ import annotations
@@ -18,7 +20,15 @@ import numpy as np
 
 from hand_models.errors import InvalidInputError
 
-__all__ = ["ParameterTable", "Quantity", "hand_table", "surface_table"]
+__all__ = [
+    "ParameterTable",
+    "Quantity",
+    "experiment_table",
+    "hand_table",
+    "scan_table",
+    "spine_table",
+    "surface_table",
+]
 
 Source = Literal["paper", "measured", "calibrated", "assumed"]
 
@@ -136,3 +146,21 @@ def hand_table() -> ParameterTable:
 def surface_table() -> ParameterTable:
     """Return the numbers of the surfaces, ``surfaces.toml``."""
     return _bundled("surfaces.toml")
+
+
+@cache
+def experiment_table() -> ParameterTable:
+    """Return the numbers of the paper's experiments, ``experiments.toml``."""
+    return _bundled("experiments.toml")
+
+
+@cache
+def scan_table() -> ParameterTable:
+    """Return the numbers of scanned rock, ``scan.toml``."""
+    return _bundled("scan.toml")
+
+
+@cache
+def spine_table() -> ParameterTable:
+    """Return the numbers of a tile's spines and of the rock's asperities, ``spines.toml``."""
+    return _bundled("spines.toml")
