@@ -9,6 +9,8 @@ from hand_models.fixed_wrist import tension_limits, wrench_space
 from hand_models.frames import Pose
 from hand_models.hand import FINGERS, Grasp, SettledHand, SpinyHand, spiny_hand
 from hand_models.holds import Cylinder, Edge, Ellipsoid, Hold, Plane, Sphere
+from hand_models.mesh import Mesh
+from hand_models.profile import Profile
 from hand_models.spines import Surface
 from hand_models.wrench_space import WrenchSpace
 
@@ -22,8 +24,10 @@ __all__ = [
     "Grasp",
     "Hold",
     "InvalidInputError",
+    "Mesh",
     "Plane",
     "Pose",
+    "Profile",
     "SettledHand",
     "Sphere",
     "SpinyHand",

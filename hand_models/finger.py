@@ -15,19 +15,22 @@ Solving for N gives both loads as affine functions of the tension f (Eq. 14).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
-from hand_models.holds import Section
 from hand_models.parameters import ParameterTable
 
-__all__ = ["PHALANGES", "Contact", "FingerModel", "SettledFinger"]
+__all__ = ["PHALANGES", "Contact", "FingerModel", "SettledFinger", "Stop"]
 
 PHALANGES = ("proximal", "middle", "distal")
+
+Stop = Literal["upper", "lower", "balance"]
+"""What holds a joint that no contact holds: its limit of closing or of opening, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -117,60 +120,15 @@ class FingerModel:
         return model
 
     @property
+    def reach(self) -> float:
+        """How far from its first joint a finger may touch anything [m]."""
+        return len(self.pulley_radii) * self.joint_spacing + self.tile_height
+
+    @property
     def tile_range(self) -> tuple[float, float]:
         """Where along a phalanx its tile's face begins and ends [m]."""
         half = self.tile_length / 2.0
         return self.tile_centre - half, self.tile_centre + half
-
-    def settle(self, section: Section | None, joint: tuple[float, float]) -> SettledFinger:
-        """Close the finger on a section of rock, phalanx by phalanx from the base.
-
-        Each phalanx turns until its face is tangent to the rock. Where the tangent point lies off
-        the tile, the spines at the tile's nearest edge reach across the gap, if it is within their
-        travel. On flat rock the tile's centre touches. A phalanx that finds no rock within its
-        joint's range stops at the upper limit, one that has rock in its way at the lower one; both
-        carry nothing.
-
-        Parameters
-        ----------
-        section : Section or None
-            Rock in the finger's plane, in the coordinates (x, z) of F; None if there is none.
-        joint : tuple of float
-            The proximal joint in the same coordinates [m].
-        """
-        contacts: list[Contact] = []
-        before = 0.0
-        for lower, upper in zip(self.joint_lower, self.joint_upper, strict=True):
-            contact = self._lay(section, joint, before + lower, before + upper)
-            contacts.append(contact)
-            before = contact.angle
-            joint = (
-                joint[0] + self.joint_spacing * math.cos(before),
-                joint[1] + self.joint_spacing * math.sin(before),
-            )
-        return SettledFinger(self, tuple(contacts))
-
-    def _lay(
-        self, section: Section | None, joint: tuple[float, float], low: float, high: float
-    ) -> Contact:
-        nearest, farthest = self.tile_range
-        if section is None:
-            return Contact(high, joint, self.tile_centre, "none")
-        tangency = section.tangent(joint, self.tile_height, low, high)
-        if tangency is not None:
-            along = min(max(tangency.distance, nearest), farthest)
-            if along == tangency.distance:
-                return Contact(tangency.angle, joint, along, "face")
-            edge = Contact(tangency.angle, joint, along, "edge")
-            bridged = section.clearance(edge.point(self.tile_height)) <= self.spine_travel
-            return edge if bridged else replace(edge, kind="none")
-        along, kind = (self.tile_centre, "face") if section.flat else (nearest, "edge")
-        if section.clearance(Contact(low, joint, along, kind).point(self.tile_height)) <= 0.0:
-            return Contact(low, joint, along, "none")
-        angle = section.touch(joint, along, self.tile_height, low, high)
-        if angle is None:
-            return Contact(high, joint, self.tile_centre, "none")
-        return Contact(angle, joint, along, kind)
 
 
 @dataclass(frozen=True)
@@ -185,14 +143,19 @@ class Contact:
         (x, z) of its joint [m].
     along : float
         c, of the contact from the joint along the phalanx [m].
-    kind : {'face', 'edge', 'none'}
-        Whether the tile's face touches, or one of its edges, or nothing.
+    kind : {'face', 'edge', 'frame', 'none'}
+        Whether the tile's face touches, or one of its edges, or the bare frame beyond the tile, or
+        nothing.
+    stop : {'upper', 'lower', 'balance'} or None
+        The limit at which the joint stands, or ``balance`` where tendon and springs hold it without
+        any contact; None where the contacts hold it.
     """
 
     angle: float
     joint: tuple[float, float]
     along: float
     kind: str
+    stop: Stop | None = None
 
     def point(self, height: float) -> tuple[float, float]:
         """Return the place (x, z) on a face that is ``height`` above the joint's axis [m]."""
@@ -220,7 +183,17 @@ class SettledFinger:
     @cached_property
     def touching(self) -> tuple[bool, ...]:
         """Whether each phalanx has rock under its tile."""
-        return tuple(contact.kind != "none" for contact in self.contacts)
+        return tuple(contact.kind in ("face", "edge") for contact in self.contacts)
+
+    @cached_property
+    def bearing(self) -> tuple[int, ...]:
+        """Phalanges that press on rock, with their tiles or their frames."""
+        return tuple(i for i, contact in enumerate(self.contacts) if contact.kind != "none")
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Joints that contacts hold; as many as phalanges that bear, if any do."""
+        return tuple(i for i, contact in enumerate(self.contacts) if contact.stop is None)
 
     @cached_property
     def joint_angles(self) -> Array:
@@ -259,10 +232,10 @@ class SettledFinger:
         return np.column_stack([local * at_zero, local * model.shear_gain])
 
     def normals(self, shears: Array, base_tile: bool = False) -> Array:
-        """Return each tile's normal load as an affine function of tension (Eqs. 4 and 14).
+        """Return each phalanx's normal load as an affine function of tension (Eqs. 4 and 14).
 
-        Where a phalanx touches nothing its joint stands at its limit: the phalanges on both sides
-        are one link, so that joint's equation and that tile's load both drop out (Section 5.7).
+        A joint at its limit makes one link of the phalanges on both sides: its equation drops out,
+        as the load of a phalanx without contact does, and the rest is square again (Section 5.7).
 
         Parameters
         ----------
@@ -275,28 +248,29 @@ class SettledFinger:
         -------
         ndarray, shape (3, 2)
             Columns as in `shears`.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the contacts cannot hold the joints that are free.
         """
-        normal_arms, rest = self._joint_balance(shears, base_tile)
-        for i, touches in enumerate(self.touching):
-            if not touches:
-                normal_arms[i] = 0.0
-                normal_arms[:, i] = 0.0
-                normal_arms[i, i] = 1.0
-                rest[i] = 0.0
-        return _upper_solve(normal_arms, rest)
+        normals = np.zeros_like(shears)
+        if self.bearing:
+            arms, rest = self._joint_balance(shears, base_tile)
+            free, bearing = list(self.free), list(self.bearing)
+            normals[bearing] = np.linalg.solve(arms[np.ix_(free, bearing)], rest[free])
+        return normals
 
     def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:
-        """Return what holds each joint without contact, affine in tension, shape (3, 2) [N·m].
+        """Return what turns each joint against its limit, affine in tension, shape (3, 2) [N·m].
 
-        That is its stop, or rock that its frame rests on. Either only pushes against the tendon's
-        closing, so the torque must not be negative; it is zero at a joint that is free.
+        Toward closing, so that an upper stop holds a torque that is not negative and a lower one a
+        torque that is not positive; zero at a joint that contacts hold.
         """
-        normal_arms, rest = self._joint_balance(shears, base_tile)
-        return np.where(np.array(self.touching)[:, None], 0.0, rest - normal_arms @ normals)
-
-    def released(self) -> SettledFinger:
-        """Return the finger where it is, but touching nothing."""
-        return replace(self, contacts=tuple(replace(c, kind="none") for c in self.contacts))
+        arms, rest = self._joint_balance(shears, base_tile)
+        torques = rest - arms @ normals
+        torques[list(self.free)] = 0.0
+        return np.asarray(torques)
 
     def _joint_balance(self, shears: Array, base_tile: bool) -> tuple[Array, Array]:
         """Return (A, b) with A N = b for the three joints; b has a column as each of `shears`."""
@@ -312,12 +286,3 @@ class SettledFinger:
         rest[:, 0] -= np.asarray(model.joint_preload)
         rest[:, 1] += self.losses(base_tile) * np.asarray(model.pulley_radii)
         return normal_arms, rest
-
-
-def _upper_solve(matrix: Array, rhs: Array) -> Array:
-    """Solve an upper-triangular system of three rows."""
-    x = np.empty_like(rhs)
-    x[2] = rhs[2] / matrix[2, 2]
-    x[1] = (rhs[1] - matrix[1, 2] * x[2]) / matrix[1, 1]
-    x[0] = (rhs[0] - matrix[0, 1] * x[1] - matrix[0, 2] * x[2]) / matrix[0, 0]
-    return x

@@ -3,28 +3,35 @@
 The loads y are the tendon tensions, a passive lateral reaction for each finger that touches rock,
 and the palm's shear and pressing. Everything is affine in them:
 
-    w = Σ_tiles W_t (c_sys + f c_act) + lateral and palm loads = o + V y.
+    w = Σ_tiles W_t (c_sys + f c_act) + lateral and palm loads = o + V y,
+
+and so are the loads of the motors and of the structure.
 """
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from hand_models.errors import EmptySetError
+from hand_models.finger import PHALANGES
 from hand_models.frames import Array, Indices
-from hand_models.hand import FINGERS, SettledHand, Tile
+from hand_models.hand import FINGERS, NAIL, NAIL_SHEAR, SettledHand, Tile
 from hand_models.spines import HalfPlane
+from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
 
 __all__ = ["TensionLimit", "parallelepiped", "tension_limits", "wrench_space"]
 
 PALM_SHEAR = "palm_shear"
 PALM_PRESSING = "palm_pressing"
+HAND_LOAD = "hand_load"
+TENDON_LIMITS = ("tendon_tension", "motor_torque", "motor_current")
+"""Limits of each tendon, in the order of their rows."""
 
 
 class TensionLimit(NamedTuple):
@@ -57,27 +64,32 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
     -------
     WrenchSpace
         Columns: four tensions, the lateral reactions, palm shear and palm pressing [N]. Limit rows:
-        each tile's half-planes (with both signs of its lateral load), each tendon, the palm. Hard
-        rows: tension, palm loads not negative; no tile dragged backwards; a joint's stop only
-        pushes.
+        each tile's half-planes (with both signs of its lateral load); each tendon's tension, motor
+        torque [N·m] and motor current [A]; the shear of a finger's tiles together, the pressing of
+        its tip; the palm; and, as wrench rows, what the hand holds in the directions `HELD`. Hard
+        rows: tension, palm loads not negative; no tile dragged backwards; a joint's stop and a
+        frame beside its tile only push; a nail that clings neither lifts nor slips; with friction
+        in the tendons, no tension below closing, where they would stick. A nail has a column for
+        the load along it, and a limit row.
     """
     maximum = settled.hand.maximum_tension
     if tension_limit is not None:
         maximum = min(maximum, tension_limit)
     touching = settled.touching
     finger_of = settled.finger_of
-    lateral = settled.grasp.lateral
     fingers = len(FINGERS)
-    reacting = [i for i in range(fingers) if lateral and touching[finger_of == i].any()]
+    engaged = [i for i in range(fingers) if touching[finger_of == i].any()]
+    reacting = engaged if settled.grasp.lateral else []
     palm = settled.palm
     layout = _layout(
         settled.tiles,
+        tuple(engaged),
         tuple(reacting),
         settled.surface.pieces(),
         tuple((i, j) for i, j, _ in settled.stops),
         bool(palm.engaged),
+        settled.hand.finger.friction > 0.0,
     )
-    m = len(layout.columns)
 
     # each tile's wrench: of a unit of shear, normal and lateral load
     units = np.concatenate(
@@ -85,91 +97,193 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
     )
     at_zero = np.einsum("tk,tkw->tw", settled.loads[..., 0], units[:, :2])
     per_newton = np.einsum("tk,tkw->tw", settled.loads[..., 1], units[:, :2])
-    generators = np.zeros((6, m))
+    origin = at_zero.sum(axis=0)
+    generators = np.zeros((6, len(layout.columns)))
     np.add.at(generators.T, finger_of, per_newton)
-    shares = settled.lateral_shares
     lateral_column = np.full(fingers, -1)
     lateral_column[reacting] = fingers + np.arange(len(reacting))
     if reacting:
+        shares = settled.lateral_shares
         mine = np.flatnonzero(shares * (lateral_column[finger_of] >= 0))
         np.add.at(
             generators.T, lateral_column[finger_of[mine]], shares[mine, None] * units[mine, 2]
         )
+    for column, tile in zip(layout.nail_columns, np.flatnonzero(settled.nails), strict=True):
+        generators[:, column] = units[tile, 0]
     if palm.engaged:
         x, y, z = palm.centre
         generators[:, -2] = (-1.0, 0.0, 0.0, 0.0, -z, y)
         generators[:, -1] = (0.0, 0.0, 1.0, y, -x, 0.0)
 
-    # limit rows: tiles, then tendons, then the palm
-    tile, a_shear, a_normal, a_lateral, capacity = layout.planes
-    n = len(tile)
-    nl = len(layout.limits)
-    L, l0, s = np.zeros((nl, m)), np.zeros(nl), np.empty(nl)
-    planar = np.column_stack([a_shear, a_normal])
-    index = np.arange(n)
-    L[index, finger_of[tile]] = (planar * settled.loads[tile, :, 1]).sum(axis=1)
-    l0[:n] = (planar * settled.loads[tile, :, 0]).sum(axis=1)
-    s[:n] = capacity
-    if reacting:
-        L[index, lateral_column[finger_of[tile]]] += a_lateral * shares[tile]
-    tendon = np.arange(fingers)
-    L[n + tendon, tendon] = 1.0
-    s[n : n + fingers] = maximum
-    if palm.engaged:
-        L[-2, -2] = L[-1, -1] = 1.0
-        s[-2:] = palm.shear_limit, palm.pressing_limit
-
-    # hard rows: tension, no tile dragged backwards, stops, palm
-    nh = len(layout.hard)
-    H, h = np.zeros((nh, m)), np.zeros(nh)
-    H[tendon, tendon] = -1.0
-    dragged = np.flatnonzero(touching)
-    row = fingers + np.arange(len(dragged))
-    H[row, finger_of[dragged]] = -settled.loads[dragged, 0, 1]
-    h[row] = settled.loads[dragged, 0, 0]
-    first_stop = fingers + len(dragged)
-    for k, (finger, _, torque) in enumerate(settled.stops):
-        # in newtons of tension, so that rows stay commensurate
-        scale = max(abs(float(torque[1])), 1e-6)
-        H[first_stop + k, finger] = -torque[1] / scale
-        h[first_stop + k] = torque[0] / scale
-    if palm.engaged:
-        H[-2, -2] = H[-1, -1] = -1.0
+    L, l0, s = _limit_rows(settled, layout, lateral_column, maximum)
+    D = np.zeros((len(HELD), 6))
+    D[:, :3] = HELD
+    H, h = _hard_rows(settled, layout)
     return WrenchSpace(
-        origin=at_zero.sum(axis=0),
+        origin=origin,
         generators=generators,
         columns=layout.columns,
         rows=layout.limits + layout.hard,
-        L=L,
-        l0=l0,
-        s=s,
+        L=np.vstack([L, D @ generators]),
+        l0=np.concatenate([l0, D @ origin]),
+        s=np.concatenate([s, np.full(len(D), settled.hand.structure.hand_load)]),
         H=H,
         h=h,
+        D=D,
     )
 
 
+def _limit_rows(
+    settled: SettledHand, layout: _Layout, lateral_column: Indices, maximum: float
+) -> tuple[Array, Array, Array]:
+    """Return L, l0 and s of all limit rows but the last, those of the whole hand's force."""
+    finger_of, loads, palm = settled.finger_of, settled.loads, settled.palm
+    tile, a_shear, a_normal, a_lateral, capacity = layout.planes
+    n = len(layout.limits) - len(HELD)
+    L, l0, s = np.zeros((n, len(layout.columns))), np.zeros(n), np.empty(n)
+
+    k = len(tile)
+    planar = np.column_stack([a_shear, a_normal])
+    index = np.arange(k)
+    L[index, finger_of[tile]] = (planar * loads[tile, :, 1]).sum(axis=1)
+    l0[:k] = (planar * loads[tile, :, 0]).sum(axis=1)
+    s[:k] = capacity
+    if (lateral_column >= 0).any():
+        L[index, lateral_column[finger_of[tile]]] += a_lateral * settled.lateral_shares[tile]
+
+    drive = settled.hand.drive
+    tendon = np.arange(len(FINGERS))
+    for per_newton, at_zero, most in (
+        (1.0, 0.0, maximum),
+        (drive.torque_per_newton, 0.0, drive.maximum_torque),
+        (drive.current_per_newton, drive.no_load_current, drive.maximum_current),
+    ):
+        L[k + tendon, tendon] = per_newton
+        l0[k + tendon] = at_zero
+        s[k + tendon] = most
+        k += len(tendon)
+
+    structure = settled.hand.structure
+    shears = np.zeros((len(FINGERS), 2))
+    np.add.at(shears, finger_of, loads[:, 0])
+    engaged, tips = list(layout.engaged), list(layout.tips)
+    for of, load, most in (
+        (engaged, shears[engaged], structure.finger_shear),
+        (finger_of[tips], loads[tips, 1], structure.fingertip_force),
+    ):
+        row = k + np.arange(len(of))
+        L[row, of] = load[:, 1]
+        l0[row] = load[:, 0]
+        s[row] = most
+        k += len(of)
+
+    for column, nail in zip(layout.nail_columns, np.flatnonzero(settled.nails), strict=True):
+        piece = settled.nail_limit(int(nail))
+        L[k, [int(finger_of[nail]), column]] = piece.a_normal * loads[nail, 1, 1], piece.a_shear
+        l0[k] = piece.a_normal * loads[nail, 1, 0]
+        s[k] = piece.capacity
+        k += 1
+
+    if palm.engaged:
+        L[-2, -2] = L[-1, -1] = 1.0
+        s[-2:] = palm.shear_limit, palm.pressing_limit
+    return L, l0, s
+
+
+def _hard_rows(settled: SettledHand, layout: _Layout) -> tuple[Array, Array]:
+    """Return H and h."""
+    finger_of, loads = settled.finger_of, settled.loads
+    nh = len(layout.hard)
+    H, h = np.zeros((nh, len(layout.columns))), np.zeros(nh)
+    tendon = np.arange(len(FINGERS))
+    H[tendon, tendon] = -1.0
+    k = len(tendon)
+    for tiles, component in ((np.flatnonzero(settled.touching), 0), (list(layout.frames), 1)):
+        row = k + np.arange(len(tiles))
+        H[row, finger_of[tiles]] = -loads[tiles, component, 1]
+        h[row] = loads[tiles, component, 0]
+        k += len(tiles)
+    for finger, _, torque in settled.stops:
+        # in newtons of tension, so that rows stay commensurate
+        scale = max(abs(float(torque[1])), 1e-6)
+        H[k, finger] = -torque[1] / scale
+        h[k] = torque[0] / scale
+        k += 1
+    for column, tile in zip(layout.nail_columns, np.flatnonzero(settled.nails), strict=True):
+        own = [int(finger_of[tile]), column]
+        along, across, _ = settled.axes[tile]
+        for direction in _nail_cone(settled, int(tile)):
+            # the force's part in this direction must not be positive
+            H[k, own] = direction @ across * loads[tile, 1, 1], direction @ along
+            h[k] = -(direction @ across) * loads[tile, 1, 0]
+            k += 1
+    if layout.sticking:
+        for finger in layout.engaged:
+            H[k, finger], h[k] = -1.0, -settled.closing_tension
+            k += 1
+    if settled.palm.engaged:
+        H[-2, -2] = H[-1, -1] = -1.0
+    return H, h
+
+
+def _nail_cone(settled: SettledHand, tile: int) -> Array:
+    """Return directions (3, 3) in which a nail cannot load the rock: out of it, along it."""
+    normal = settled.nail_normals[settled.finger_of[tile]]
+    along = np.cross(normal, settled.axes[tile, 2])
+    slip = settled.hand.nail.friction * normal
+    return np.array([normal, slip + along, slip - along])
+
+
 class _Layout(NamedTuple):
-    """Names and constant coefficients, which only depend on what touches."""
+    """Names and constant coefficients, which only depend on what touches.
+
+    Attributes
+    ----------
+    columns : tuple of str
+    limits, hard : tuple of Row
+    planes : tuple of ndarray
+        Tile, a_shear, a_normal, a_lateral (with its sign) and capacity of each tile's limit rows.
+    engaged : tuple of int
+        Fingers with a tile on rock.
+    tips, frames : tuple of int
+        Distal tiles whose phalanx presses on rock; tiles whose phalanx does so beside them.
+    nail_columns : tuple of int
+        Of the loads along the nails that hook.
+    sticking : bool
+        Whether the tendons have friction, so that they must not be slackened.
+    """
 
     columns: tuple[str, ...]
     limits: tuple[Row, ...]
     hard: tuple[Row, ...]
     planes: tuple[Indices, Array, Array, Array, Array]
+    engaged: tuple[int, ...]
+    tips: tuple[int, ...]
+    frames: tuple[int, ...]
+    nail_columns: tuple[int, ...]
+    sticking: bool
 
 
 @lru_cache(maxsize=512)
 def _layout(
     tiles: tuple[Tile, ...],
+    engaged: tuple[int, ...],
     reacting: tuple[int, ...],
     pieces: tuple[HalfPlane, ...],
     stops: tuple[tuple[int, int], ...],
     palm: bool,
+    sticking: bool,
 ) -> _Layout:
     columns = [f"{finger}/tension" for finger in FINGERS]
     columns += [f"{FINGERS[i]}/lateral" for i in reacting]
+    nails = [tile.finger for tile in tiles if tile.contact == NAIL]
+    nail_columns = range(len(columns), len(columns) + len(nails))
+    columns += [f"{finger}/{NAIL}" for finger in nails]
     limits, hard = [], []
     planes: list[tuple[int, float, float, float, float]] = []
-    touching = [i for i, tile in enumerate(tiles) if tile.contact != "none"]
+    touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
+    frames = [i for i, tile in enumerate(tiles) if tile.contact == "frame"]
+    tips = [i for i, t in enumerate(tiles) if t.phalanx == "distal" and t.contact != "none"]
     for i in touching:
         finger, phalanx = tiles[i].finger, tiles[i].phalanx
         pulls = 0
@@ -182,16 +296,21 @@ def _layout(
                 planes.append(
                     (i, piece.a_shear, piece.a_normal, factor * piece.a_lateral, piece.capacity)
                 )
-    for finger in FINGERS:
-        limits.append(Row(finger, None, "tendon_tension", "limit", f"{finger}/tendon_tension"))
-        hard.append(Row(finger, None, "slack_tendon", "hard", f"{finger}/slack_tendon"))
-    for i in touching:
-        finger, phalanx = tiles[i].finger, tiles[i].phalanx
-        label = f"{finger}/{phalanx}/dragged_backwards"
-        hard.append(Row(finger, phalanx, "dragged_backwards", "hard", label))
+    for name in TENDON_LIMITS:
+        limits += [_row(finger, None, name, "limit") for finger in FINGERS]
+    limits += [_row(FINGERS[i], None, "finger_shear", "limit") for i in engaged]
+    limits += [_row(tiles[i].finger, "distal", "fingertip_force", "limit") for i in tips]
+    limits += [_row(finger, NAIL, NAIL_SHEAR, "limit") for finger in nails]
+    hard += [_row(finger, None, "slack_tendon", "hard") for finger in FINGERS]
+    for name, those in (("dragged_backwards", touching), ("frame_pulled", frames)):
+        hard += [_row(tiles[i].finger, tiles[i].phalanx, name, "hard") for i in those]
     for finger_index, joint in stops:
-        finger, phalanx = FINGERS[finger_index], ("proximal", "middle", "distal")[joint]
-        hard.append(Row(finger, phalanx, "joint_stop", "hard", f"{finger}/{phalanx}/joint_stop"))
+        hard.append(_row(FINGERS[finger_index], PHALANGES[joint], "joint_stop", "hard"))
+    for finger in nails:
+        for name, label in (("nail_lifts", ""), ("nail_slips", "+"), ("nail_slips", "-")):
+            hard.append(Row(finger, NAIL, name, "hard", f"{finger}/{NAIL}/{name}{label}"))
+    if sticking:
+        hard += [_row(FINGERS[i], None, "tendon_sticks", "hard") for i in engaged]
     if palm:
         columns += [PALM_SHEAR, PALM_PRESSING]
         limits += [Row(None, None, name, "limit", name) for name in (PALM_SHEAR, PALM_PRESSING)]
@@ -199,13 +318,26 @@ def _layout(
             Row(None, None, f"{name}_reversed", "hard", f"{name}_reversed")
             for name in (PALM_SHEAR, PALM_PRESSING)
         ]
+    limits += [
+        Row(None, None, HAND_LOAD, "limit", f"{HAND_LOAD}/{k + 1}") for k in range(len(HELD))
+    ]
     table = np.array(planes).reshape(-1, 5)
     return _Layout(
         tuple(columns),
         tuple(limits),
         tuple(hard),
         (table[:, 0].astype(np.intp), table[:, 1], table[:, 2], table[:, 3], table[:, 4]),
+        engaged,
+        tuple(tips),
+        tuple(frames),
+        tuple(nail_columns),
+        sticking,
     )
+
+
+def _row(finger: str, phalanx: str | None, limit: str, kind: Literal["limit", "hard"]) -> Row:
+    label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
+    return Row(finger, phalanx, limit, kind, label)
 
 
 def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:

@@ -18,20 +18,32 @@ from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
+from hand_models.actuation import TendonDrive
 from hand_models.errors import InvalidInputError
-from hand_models.finger import PHALANGES, Contact, FingerModel, SettledFinger
+from hand_models.finger import PHALANGES, FingerModel, SettledFinger
+from hand_models.fingernail import Fingernail
 from hand_models.frames import Array, Indices, Pose
-from hand_models.holds import Hold, Plane
+from hand_models.holds import Hold
+from hand_models.limit_pieces import HalfPlane
 from hand_models.palm import shear_capacity
 from hand_models.parameters import ParameterTable, hand_table
+from hand_models.seating import Seating, seat
+from hand_models.sections import Section
+from hand_models.settling import ClosedFinger, close, intrusion, straight
 from hand_models.spines import Surface
+from hand_models.structure import Structure
 
 __all__ = ["FINGERS", "Grasp", "Palm", "Seating", "SettledHand", "SpinyHand", "Tile", "spiny_hand"]
 
 FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
 """Order of every list of four tensions; left is +y of H."""
+
+NAIL: Final = "nail"
+"""The ultrashort phalanx at a fingertip, by name, and the contact of one that hooks."""
+
+NAIL_SHEAR: Final = "nail_shear"
+"""Name of the limit of a nail that clings."""
 
 OPPOSED: Final = 1e-6
 """How close to π an outer rotation counts as a pinch [rad]."""
@@ -51,12 +63,15 @@ class Grasp:
         Whether the palm may carry load.
     lateral : bool
         Whether engaged spines may resist sideways.
+    fingernail : bool
+        Whether the fingers stay straight and cling with their nails alone.
     """
 
     outer_rotation: float = 0.0
     closing_tension: float | None = None
     palm: bool = True
     lateral: bool = True
+    fingernail: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.outer_rotation <= math.pi + OPPOSED:
@@ -74,22 +89,6 @@ class Grasp:
 
 
 @dataclass(frozen=True)
-class Seating:
-    """Where a hold is in the hand.
-
-    Attributes
-    ----------
-    pose : Pose
-        The hold's frame in H.
-    rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
-        How it was found.
-    """
-
-    pose: Pose
-    rule: str
-
-
-@dataclass(frozen=True)
 class Tile:
     """One finger tile's place among the hand's rows and columns.
 
@@ -97,9 +96,9 @@ class Tile:
     ----------
     finger : str
     phalanx : str
-        ``base``, ``proximal``, ``middle`` or ``distal``.
-    contact : {'face', 'edge', 'none'}
-        What of it touches the rock.
+        ``base``, ``proximal``, ``middle`` or ``distal``; ``nail`` where the hand clings with it.
+    contact : {'face', 'edge', 'frame', 'nail', 'none'}
+        What of it touches the rock; ``frame`` if its phalanx only rests beside the tile.
     """
 
     finger: str
@@ -148,17 +147,23 @@ class SettledHand:
     fingers : tuple of SettledFinger
         In the order of `FINGERS`.
     tiles : tuple of Tile
-        The 14 finger tiles, finger by finger, from the base outward.
-    finger_of : ndarray of int, shape (14,)
+        The 14 finger tiles, finger by finger, from the base outward; after each finger's, where the
+        hand clings, its nail.
+    finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
-    positions : ndarray, shape (14, 3)
+    positions : ndarray, shape (n, 3)
         Of each tile's contact in H [m].
-    axes : ndarray, shape (14, 3, 3)
+    axes : ndarray, shape (n, 3, 3)
         Rows: the unit force on the rock of shear, of normal and of lateral load, in H.
-    loads : ndarray, shape (14, 2, 2)
-        Shear and normal load, each at zero tension [N] and per newton of tension.
+    loads : ndarray, shape (n, 2, 2)
+        Shear and normal load, each at zero tension [N] and per newton of tension. A nail's normal
+        load is P across it; its shear A, along it, is passive.
+    nail_angles : ndarray, shape (4,)
+        How far each finger's nail has turned; all the way where it does not hook [rad].
+    nail_normals : ndarray, shape (4, 3)
+        Out of the rock where each finger's nail hooks, in H; zero where none does.
     stops : tuple of (int, int, ndarray)
-        Finger, joint and torque, affine in tension, of joints held by their upper stops.
+        Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
     palm : Palm
     """
 
@@ -174,21 +179,38 @@ class SettledHand:
     positions: Array
     axes: Array
     loads: Array
+    nail_angles: Array
+    nail_normals: Array
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
 
     @cached_property
     def touching(self) -> Array:
-        """Which tiles have rock under them, bool of shape (14,)."""
-        return np.array([tile.contact != "none" for tile in self.tiles])
+        """Which tiles have rock under them, bool of shape (n,)."""
+        return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
     @cached_property
     def lateral_shares(self) -> Array:
-        """Share of its finger's lateral reaction that each tile carries, shape (14,)."""
+        """Share of its finger's lateral reaction that each tile carries, shape (n,)."""
         counts = np.bincount(self.finger_of, weights=self.touching, minlength=len(FINGERS))
         return np.where(self.touching, 1.0 / np.maximum(counts, 1.0)[self.finger_of], 0.0)
 
-    def tile_loads(self, tensions: Array, laterals: Array | None = None) -> Array:
+    @cached_property
+    def nails(self) -> Array:
+        """Which tiles are nails that hook, bool of shape (n,)."""
+        return np.array([tile.contact == NAIL for tile in self.tiles])
+
+    def nail_limit(self, tile: int) -> HalfPlane:
+        """Return the limit of a nail's force along its finger, toward the base, as a half-plane."""
+        frame = self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]]
+        along, across, _ = self.axes[tile] @ -frame.along
+        return HalfPlane(
+            NAIL_SHEAR, float(along), float(across), 0.0, self.hand.structure.finger_shear
+        )
+
+    def tile_loads(
+        self, tensions: Array, laterals: Array | None = None, axials: Array | None = None
+    ) -> Array:
         """Return shear, normal and lateral load of each finger tile.
 
         Parameters
@@ -197,15 +219,19 @@ class SettledHand:
             Of the tendons [N].
         laterals : ndarray, shape (4,), optional
             Lateral reaction of each finger on the rock [N].
+        axials : ndarray, shape (4,), optional
+            A of each finger's nail [N].
 
         Returns
         -------
-        ndarray, shape (14, 3)
+        ndarray, shape (n, 3)
             [N]; c_sys + f c_act of Eq. 14.
         """
         f = np.asarray(tensions, dtype=float)[self.finger_of]
         y = np.zeros(len(FINGERS)) if laterals is None else np.asarray(laterals, dtype=float)
         planar = self.loads[..., 0] + self.loads[..., 1] * f[:, None]
+        if axials is not None:
+            planar[:, 0] += np.where(self.nails, np.asarray(axials)[self.finger_of], 0.0)
         return np.column_stack([planar, self.lateral_shares * y[self.finger_of]])
 
 
@@ -235,6 +261,9 @@ class SpinyHand:
     def __init__(self, table: ParameterTable | None = None) -> None:
         self.table = table = table or hand_table()
         self.finger = FingerModel.from_table(table)
+        self.drive = TendonDrive.from_table(table)
+        self.structure = Structure.from_table(table)
+        self.nail = Fingernail.from_table(table)
         self.mass = table.scalar("hand", "mass")
         self.maximum_tension = table.scalar("tendon", "maximum_tension")
         self.closing_tension = table.scalar("tendon", "closing_tension")
@@ -255,6 +284,7 @@ class SpinyHand:
         self.palm_tile_size = np.array(table.vector("palm", "tile_size"))
         self.palm_length = table.scalar("palm", "length")
         self.palm_friction = table.scalar("palm", "pulley_friction")
+        self.palm_own_friction = table.scalar("palm", "own_pulley_friction")
         self.palm_spring = table.scalar("palm", "spring_stiffness")
         self.palm_contact = table.vector("palm", "contact_stiffness")
         self.palm_pressing = table.scalar("palm", "pressing_limit")
@@ -280,89 +310,13 @@ class SpinyHand:
         return tuple(frames)
 
     def seat(self, hold: Hold, grasp: Grasp) -> Seating:
-        """Seat the hand on a hold that was given no place (axes parallel to H's).
+        """Seat the hand on a hold that was given no place; see `hand_models.seating`."""
+        return seat(self, hold, grasp)
 
-        The proximal tiles of the inner fingers touch at ``seated_contact`` from their joints. In a
-        pinch the crest lies midway between the opposed bases and the palm stands off as follows;
-        otherwise the palm rests on the rock and the crest's place along x follows. Where that
-        cannot be had, the palm rests on the rock with the crest under its centre. On a plane the
-        finger tiles lie flat, and the palm stands off by their height, within the spines' travel.
-        """
-        x, y, z = (float(v) for v in self.inner_joint)
-        if isinstance(hold, Plane):
-            height = self.finger.tile_height
-            return Seating(Pose(np.array([0.0, 0.0, z + height]), np.eye(3)), "flat")
-        centred = Seating(Pose.identity(), "palm_on_rock_centred")
-        opposed = float(self.outer_axis[0]) - self.outer_reach
-        crest = 0.5 * (x + opposed) if grasp.pinch else None
-        circle = hold.crest_circle(y)
-        place = (
-            self._seat_smooth(hold, crest) if circle is None else self._seat_round(*circle, crest)
-        )
-        if place is None:
-            return centred
-        pose = Pose(np.array([place[0], 0.0, place[1]]), np.eye(3))
-        if grasp.pinch:
-            seating, possible = Seating(pose, "pinch"), place[1] >= 0.0
-        else:
-            seating = Seating(pose, "palm_on_rock")
-            possible = abs(place[0]) <= 0.5 * self.palm_length
-        return seating if possible and self._seated(hold, grasp, seating) else centred
-
-    def _seat_round(
-        self, depth: float, radius: float, crest: float | None
-    ) -> tuple[float, float] | None:
-        """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
-        x, _, z = (float(v) for v in self.inner_joint)
-        reach = (radius + self.finger.tile_height) ** 2 + self.seated_contact**2
-        if crest is not None:
-            rise = reach - (x - crest) ** 2
-            return None if rise <= 0.0 else (crest, z + math.sqrt(rise) - depth)
-        run = reach - (depth - z) ** 2
-        return None if run <= 0.0 else (x - math.sqrt(run), 0.0)
-
-    def _seat_smooth(self, hold: Hold, crest: float | None) -> tuple[float, float] | None:
-        """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
-        x, y, z = (float(v) for v in self.inner_joint)
-
-        def place(angle: float) -> tuple[float, float] | None:
-            point = hold.tangent_point(y, angle)
-            if point is None:
-                return None
-            tile = Contact(angle, (x, z), self.seated_contact, "face").point(
-                self.finger.tile_height
-            )
-            return tile[0] - point[0], tile[1] - point[1]
-
-        def miss(angle: float) -> float:
-            there = place(angle)
-            assert there is not None
-            return there[0] - crest if crest is not None else there[1]
-
-        if place(0.0) is None:
-            return None
-        angles = np.linspace(0.0, self.finger.joint_upper[0], 64)
-        misses = np.array([miss(float(angle)) for angle in angles])
-        turns = np.flatnonzero(np.sign(misses[:-1]) * np.sign(misses[1:]) <= 0.0)
-        if not len(turns):
-            return None
-        first = int(turns[0])
-        root = brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
-        return place(float(root))
-
-    def _seated(self, hold: Hold, grasp: Grasp, seating: Seating) -> bool:
-        """Whether the inner fingers' proximal tiles do touch where seating meant them to."""
-        frame = self.frames(grasp.outer_rotation)[FINGERS.index("inner_left")]
-        finger = self._settle_finger(frame, hold, seating.pose.inverse())
-        contact = finger.contacts[0]
-        return contact.kind == "face" and abs(contact.along - self.seated_contact) < 1e-6
-
-    def _settle_finger(self, frame: _Frame, hold: Hold, hand_in_hold: Pose) -> SettledFinger:
+    def _section(self, frame: _Frame, hold: Hold, hand_in_hold: Pose) -> Section | None:
+        """Return the rock in a finger's plane, the proximal joint at its origin."""
         rotation = hand_in_hold.rotation
-        section = hold.section(
-            hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2]
-        )
-        return self.finger.settle(section, (0.0, 0.0))
+        return hold.section(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
 
     def settle(
         self,
@@ -385,7 +339,8 @@ class SpinyHand:
         Raises
         ------
         InvalidInputError
-            If the rock stands deeper in the palm than the spines can retract.
+            If the rock stands deeper in the palm than the spines can retract, or in a finger
+            wherever its joints turn.
         """
         grasp = grasp or Grasp()
         closing = self.closing_tension if grasp.closing_tension is None else grasp.closing_tension
@@ -401,11 +356,11 @@ class SpinyHand:
 
         frames = self.frames(grasp.outer_rotation)
         closed = [
-            _close(
-                self._settle_finger(frame, hold, hand_in_hold), closing, name.startswith("outer")
-            )
+            self._close(name, frame, hold, hand_in_hold, surface, grasp, closing)
             for name, frame in zip(FINGERS, frames, strict=True)
         ]
+        nail_angles = np.full(len(FINGERS), self.nail.retraction)
+        nail_normals = np.zeros((len(FINGERS), 3))
         tiles: list[Tile] = []
         positions, axes, loads = [], [], []
         stops: list[tuple[int, int, Array]] = []
@@ -418,7 +373,7 @@ class SpinyHand:
                 place = frame.joint + frame.along * (self.base_tile_reach - self.outer_reach)
                 place = np.array([place[0], place[1], self.base_tile_surface])
                 gap = hold.entry(hand_in_hold.apply(place), into_rock)
-                engaged = abs(gap) <= self.spine_travel
+                engaged = abs(gap) <= self.spine_travel and not grasp.fingernail
                 tiles.append(Tile(name, "base", "face" if engaged else "none"))
                 positions.append((place + gap * up if engaged else place)[None])
                 axes.append(np.stack([-frame.along, up, frame.across])[None])
@@ -437,9 +392,26 @@ class SpinyHand:
             positions.append(frame.joint + points[:, :1] * frame.along + points[:, 1:] * up)
             axes.append(np.stack([-along, into, across], axis=1))
             loads.append(np.stack([shears, normals], axis=1))
-            if any(finger.touching):
+            if grasp.fingernail:
+                section = self._section(frame, hold, hand_in_hold)
+                pin = len(PHALANGES) * self.finger.joint_spacing
+                hook = self.nail.hook(section, (pin, 0.0))
+                angle = self.nail.retraction if hook is None else hook.angle
+                w = math.cos(angle) * frame.along + math.sin(angle) * up
+                v = -math.sin(angle) * frame.along + math.cos(angle) * up
+                tiles.append(Tile(name, NAIL, "none" if hook is None else NAIL))
+                positions.append((frame.joint + pin * frame.along + self.nail.length * w)[None])
+                axes.append(np.stack([-w, v, frame.across])[None])
+                normal = (0.0, 0.0) if hook is None else self.nail.turning_force(angle)
+                loads.append(np.array([[(0.0, 0.0), normal]]))
+                if hook is not None:
+                    nail_angles[i] = hook.angle
+                    nail_normals[i] = hook.normal[0] * frame.along + hook.normal[1] * up
+            if finger.bearing:
                 stops.extend(
-                    (i, j, torques[j]) for j in range(len(PHALANGES)) if not finger.touching[j]
+                    (i, j, torques[j] if contact.stop == "upper" else -torques[j])
+                    for j, contact in enumerate(finger.contacts)
+                    if contact.stop in ("upper", "lower")
                 )
         return SettledHand(
             hand=self,
@@ -454,9 +426,39 @@ class SpinyHand:
             positions=np.concatenate(positions),
             axes=np.concatenate(axes),
             loads=np.concatenate(loads),
+            nail_angles=nail_angles,
+            nail_normals=nail_normals,
             stops=tuple(stops),
             palm=palm,
         )
+
+    def _close(
+        self,
+        name: str,
+        frame: _Frame,
+        hold: Hold,
+        hand_in_hold: Pose,
+        surface: Surface,
+        grasp: Grasp,
+        closing_tension: float,
+    ) -> ClosedFinger:
+        section = self._section(frame, hold, hand_in_hold)
+        if grasp.fingernail:
+            closed = straight(self.finger, section)
+            how = "straight, to cling with its nail"
+        else:
+            outer = name.startswith("outer")
+            closed = close(self.finger, section, surface, closing_tension, outer)
+            how = "even with its joints fully open"
+        if closed is None:
+            assert section is not None
+            depth = 1e3 * intrusion(self.finger, section, straight=grasp.fingernail)
+            raise InvalidInputError(
+                f"the hold stands {depth:.1f} mm inside {name} {how}; "
+                "move the hand away from the rock",
+                field="hold",
+            )
+        return closed
 
     def _settle_palm(self, hold: Hold, surface: Surface, grasp: Grasp, hand_in_hold: Pose) -> Palm:
         into_rock = hand_in_hold.rotation[:, 2]
@@ -482,33 +484,10 @@ class SpinyHand:
                 self.palm_spring,
                 self.palm_friction,
                 surface.shear_limit,
+                self.palm_own_friction,
             ),
             pressing_limit=self.palm_pressing * len(engaged),
         )
-
-
-def _close(
-    finger: SettledFinger, closing_tension: float, outer: bool
-) -> tuple[SettledFinger, Array, Array, Array]:
-    """Return a finger with its shears, normals and stop torques, affine in tension.
-
-    If no tension keeps its tiles dragged forward and its joints' stops pushing, the finger cannot
-    stay where it closed: it is released, and carries nothing.
-    """
-    shears = finger.shears(closing_tension, base_tile=outer)
-    normals = finger.normals(shears, base_tile=outer)
-    torques = finger.stop_torques(shears, normals, base_tile=outer)
-    least, most = 0.0, math.inf
-    for constant, slope in np.vstack([shears, torques]):
-        if slope > 0.0:
-            least = max(least, -constant / slope)
-        elif slope < 0.0:
-            most = min(most, -constant / slope)
-        elif constant < 0.0:
-            most = -math.inf
-    if any(finger.touching) and least > most:
-        return _close(finger.released(), closing_tension, outer)
-    return finger, shears, normals, torques
 
 
 @cache

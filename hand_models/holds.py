@@ -1,298 +1,37 @@
-"""Hold geometry, and the section of rock that a finger's plane meets.
+"""Hold geometry: pieces of rock that a hand may take.
 
 A hold has its own frame: origin on the rock at the crest (the point nearest the palm), z into the
-rock, y along the axis of a cylinder or an edge. Every hold here is convex and is described by a
-*profile* in its x-z plane: a disc of radius r that touches the origin, swept along a cone of
-directions (none for a round hold, two faces for an edge). A finger plane cuts it in an affine image
-of that profile.
-
-A section answers the two questions that settling asks of rock:
-
-``tangent``
-    at which angle does the face of a tile touch the curved part of the section,
-``touch``
-    at which angle does a given point of a tile reach the rock.
+rock, y along the axis of a cylinder or an edge. A finger plane cuts it in a section.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
+from hand_models.sections import (
+    FlatSection,
+    ProfileSection,
+    RoundSection,
+    Section,
+    Vector2,
+    outward,
+)
 
-__all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere", "Tangency"]
-
-Vector2 = tuple[float, float]
+__all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
 
 PARALLEL: Final = 1e-3
 """Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
 
 LARGEST: Final = 1e6
 """Size of a hold above which its curve is lost in rounding [m]."""
-
-SAMPLES: Final = 48
-"""Angles tried to bracket a root where there is no closed form."""
-
-ZOOMS: Final = 6
-"""How often the samples near a root that may hide between two of them are refined, 8 to 1."""
-
-
-class Tangency(NamedTuple):
-    """A tile's face tangent to the rock.
-
-    Attributes
-    ----------
-    angle : float
-        Of the phalanx, from the section's first axis toward its second [rad].
-    distance : float
-        Of the contact from the joint, along the phalanx [m].
-    """
-
-    angle: float
-    distance: float
-
-
-class Section(ABC):
-    """Rock in a plane with coordinates (s, t); t grows into the rock."""
-
-    flat = False
-    """Whether (part of) the section is straight, so that a face may lie on it anywhere."""
-
-    @abstractmethod
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
-        """Return where a face, ``height`` above a phalanx, first touches the section's curve.
-
-        The phalanx turns about ``joint`` from the angle ``low`` to ``high``.
-        """
-
-    @abstractmethod
-    def touch(
-        self, joint: Vector2, along: float, height: float, low: float, high: float
-    ) -> float | None:
-        """Return the first angle at which the point (along, height) of a phalanx is on the rock."""
-
-    @abstractmethod
-    def clearance(self, point: Vector2) -> float:
-        """Return about how far a point is from the rock, negative inside [m].
-
-        Exact on flat and round sections, and everywhere its sign is.
-        """
-
-
-def _within(angle: float, low: float, high: float) -> float | None:
-    """Return ``angle`` plus the whole turns that bring it into [low, high], if any do."""
-    angle = low + (angle - low) % math.tau
-    return angle if angle <= high else None
-
-
-@dataclass(frozen=True)
-class FlatSection(Section):
-    """Rock ``normal · q ≥ offset`` with a unit normal."""
-
-    normal: Vector2
-    offset: float
-    flat = True
-
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
-        return None
-
-    def touch(
-        self, joint: Vector2, along: float, height: float, low: float, high: float
-    ) -> float | None:
-        distance = self.offset - self.normal[0] * joint[0] - self.normal[1] * joint[1]
-        radius = math.hypot(along, height)
-        if abs(distance) > radius:
-            return None
-        # n · (cos ψ, sin ψ) = distance / radius, coming from outside
-        toward = math.atan2(self.normal[1], self.normal[0])
-        angle = toward - math.acos(distance / radius) - math.atan2(height, along)
-        return _within(angle, low, high)
-
-    def clearance(self, point: Vector2) -> float:
-        return self.offset - self.normal[0] * point[0] - self.normal[1] * point[1]
-
-
-@dataclass(frozen=True)
-class RoundSection(Section):
-    """A disc of rock."""
-
-    centre: Vector2
-    radius: float
-
-    def _polar(self, joint: Vector2) -> tuple[float, float]:
-        dx, dz = self.centre[0] - joint[0], self.centre[1] - joint[1]
-        return math.hypot(dx, dz), math.atan2(dz, dx)
-
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
-        distance, bearing = self._polar(joint)
-        offset = self.radius + height
-        if distance <= offset:
-            return None
-        angle = _within(bearing - math.asin(offset / distance), low, high)
-        if angle is None:
-            return None
-        return Tangency(angle, math.sqrt(distance**2 - offset**2))
-
-    def touch(
-        self, joint: Vector2, along: float, height: float, low: float, high: float
-    ) -> float | None:
-        distance, bearing = self._polar(joint)
-        arm = math.hypot(along, height)
-        if distance == 0.0:
-            return None
-        cosine = (arm**2 + distance**2 - self.radius**2) / (2.0 * arm * distance)
-        if abs(cosine) > 1.0:
-            return None
-        return _within(bearing - math.acos(cosine) - math.atan2(height, along), low, high)
-
-    def clearance(self, point: Vector2) -> float:
-        distance = math.hypot(point[0] - self.centre[0], point[1] - self.centre[1])
-        return distance - self.radius
-
-
-@dataclass(frozen=True, eq=False)
-class ProfileSection(Section):
-    """The preimage of a profile (a disc swept along a cone) under ``p = M q + m``.
-
-    Attributes
-    ----------
-    M : ndarray, shape (2, 2)
-    m : ndarray, shape (2,)
-        From the section's coordinates to the profile's.
-    radius : float
-        Of the disc, which touches the profile's origin from below [m].
-    faces : ndarray, shape (k, 2)
-        Directions that span the cone; none for a round profile.
-    """
-
-    M: Array
-    m: Array
-    radius: float
-    faces: Array
-
-    @property
-    def flat(self) -> bool:  # type: ignore[override]
-        return len(self.faces) > 0
-
-    def _clearance(self, normal: Array, joint: Vector2, height: float) -> Array:
-        """Distance from a face with the given normals (2, n) to the rock, −∞ if it cuts a face."""
-        dual = np.linalg.solve(self.M.T, normal)
-        support = dual[1] * self.radius - self.radius * np.hypot(dual[0], dual[1])
-        support = support - self.m @ dual
-        if self.flat:
-            support = np.where((self.faces @ dual >= 0.0).all(axis=0), support, -np.inf)
-        return np.asarray(support - normal.T @ np.asarray(joint) - height)
-
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
-        def clearance(angle: Array) -> Array:
-            return self._clearance(np.stack([-np.sin(angle), np.cos(angle)]), joint, height)
-
-        angle = _descent(clearance, low, high)
-        if angle is None:
-            return None
-        # the derivative of the clearance is minus the distance of the contact along the phalanx
-        normal = np.array([-math.sin(angle), math.cos(angle)])
-        dual = np.linalg.solve(self.M.T, normal)
-        contact = np.array([0.0, self.radius]) - self.radius * dual / np.hypot(*dual)
-        point = np.linalg.solve(self.M, contact - self.m) - np.asarray(joint)
-        distance = float(point[0] * math.cos(angle) + point[1] * math.sin(angle))
-        return Tangency(angle, distance) if distance > 0.0 else None
-
-    def touch(
-        self, joint: Vector2, along: float, height: float, low: float, high: float
-    ) -> float | None:
-        arm, phase = math.hypot(along, height), math.atan2(height, along)
-
-        def clearance(angle: Array) -> Array:
-            turned = np.stack([np.cos(angle + phase), np.sin(angle + phase)])
-            q = np.asarray(joint)[:, None] + arm * turned
-            return _profile_distance(self.M @ q + self.m[:, None], self.radius, self.faces)
-
-        return _descent(clearance, low, high)
-
-    def clearance(self, point: Vector2) -> float:
-        q = self.M @ np.asarray(point) + self.m
-        return float(_profile_distance(q[:, None], self.radius, self.faces)[0])
-
-
-def _descent(function: Callable[[Array], Array], low: float, high: float) -> float | None:
-    """Return the first angle where a sampled function falls through zero.
-
-    Between two samples it may rise above zero and fall again (a face on rock that curves little),
-    or dip below: peaks below zero and troughs above it are therefore sampled more closely.
-    """
-    angles = np.linspace(low, high, SAMPLES)
-    values = function(angles)
-    for _ in range(ZOOMS):
-        above = values > 0.0
-        falls = np.flatnonzero(above[:-1] & ~above[1:])
-        height = np.where(above, -values, values)
-        beside = np.pad(height, 1, constant_values=-np.inf)
-        alike = np.pad(above, 1, mode="edge")
-        peaks = (height >= beside[:-2]) & (height >= beside[2:])
-        peaks &= (above == alike[:-2]) & (above == alike[2:])
-        # a smooth peak rises above its highest sample by no more than the samples differ there
-        steps = np.abs(np.diff(np.where(np.isfinite(height), height, 0.0)))
-        peaks &= height + np.maximum(np.append(steps, steps[-2]), np.append(steps[1], steps)) > 0.0
-        places = np.flatnonzero(peaks[: falls[0] if len(falls) else None])
-        if not len(places):
-            break
-        left = angles[np.maximum(places - 1, 0)]
-        right = angles[np.minimum(places + 1, len(angles) - 1)]
-        angles = np.unique(np.concatenate([angles, np.linspace(left, right, 17)[1:-1].ravel()]))
-        values = function(angles)
-    falls = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
-    if not len(falls):
-        return None
-    start, end = float(angles[falls[0]]), float(angles[falls[0] + 1])
-
-    def scalar(angle: float) -> float:
-        return float(function(np.array([angle]))[0])
-
-    if not math.isfinite(values[falls[0] + 1]):
-        # the function ends in −∞: find the last finite value, and see whether it fell before
-        for _ in range(60):
-            middle = 0.5 * (start + end)
-            value = scalar(middle)
-            if value > 0.0:
-                start = middle
-            elif math.isfinite(value):
-                end = middle
-                break
-            else:
-                end = middle
-        else:
-            return None
-    return float(brentq(scalar, start, end, xtol=1e-14, rtol=1e-14))
-
-
-def _outward(faces: Array) -> Array:
-    """Return the unit normals, out of the rock, of the two faces of a cone, shape (2, 2)."""
-    normals = faces * (faces[0] @ faces[1]) - faces[::-1]
-    return np.asarray(normals / np.hypot(normals[:, 0], normals[:, 1])[:, None])
-
-
-def _profile_distance(points: Array, radius: float, faces: Array) -> Array:
-    """Distance of points (2, n) from the profile, negative inside."""
-    q = points - np.array([[0.0], [radius]])
-    distance = np.hypot(q[0], q[1])
-    if len(faces):
-        sides = _outward(faces) @ q
-        beside = (faces @ q >= 0.0) & (sides >= 0.0)
-        outside = np.where(beside, sides, np.inf).min(axis=0, initial=np.inf)
-        distance = np.where(
-            (sides <= 0.0).all(axis=0), sides.max(axis=0), np.minimum(distance, outside)
-        )
-    return np.asarray(distance - radius)
 
 
 class Hold(ABC):
@@ -418,10 +157,10 @@ def _profile_entry(p: Vector2, d: Vector2, radius: float, faces: Array) -> float
     if a > 0.0 and discriminant >= 0.0:
         candidates.append((-b - math.sqrt(discriminant)) / a)
     if len(faces):
-        for direction, outward in zip(faces, _outward(faces), strict=True):
-            closing = float(outward @ np.asarray(d))
+        for direction, normal in zip(faces, outward(faces), strict=True):
+            closing = float(normal @ np.asarray(d))
             if closing < 0.0:
-                hit = (radius - float(outward @ np.asarray(p))) / closing
+                hit = (radius - float(normal @ np.asarray(p))) / closing
                 where = np.asarray(p) + hit * np.asarray(d)
                 if float(direction @ where) >= 0.0:
                     candidates.append(hit)

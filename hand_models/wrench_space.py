@@ -4,7 +4,9 @@
 
 Its views (vertices, half-spaces, support function, …) are of the set at u = 1. The inequalities of
 a fixed-wrist hand couple no finger to another, so the set is a Minkowski sum of small polytopes,
-one for each block of coupled columns; the views use that, and need no double description.
+one for each block of coupled columns; the views use that, and need no double description. Only
+*wrench rows*, D w ≤ u s, couple all: they are half-spaces of the wrench itself, with which the
+views clip that sum where it reaches beyond them.
 
 Directions and distances that mix forces and moments are taken in *scaled* wrenches, whose moments
 are divided by `MOMENT_ARM`, so that all six components are newtons.
@@ -13,7 +15,7 @@ are divided by `MOMENT_ARM`, so that all six components are newtons.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, Literal, NamedTuple
 
@@ -27,7 +29,9 @@ from hand_models.errors import EmptySetError, InvalidInputError, SolverError, Un
 from hand_models.frames import Array, Indices, finite_vector
 from hand_models.polytopes import (
     TOLERANCE,
+    Faces,
     Summand,
+    clipped,
     extreme_points,
     hull,
     hull_facets,
@@ -50,6 +54,10 @@ FLATNESS: Final = 1e-9
 
 MOST_CANDIDATES: Final = 500_000
 """How many sums of the blocks' vertices are looked through; that many take some 20 s."""
+
+
+EXACT: Final = 1e-9
+"""Tolerance of the linear program of a support function [N]."""
 
 
 class Row(NamedTuple):
@@ -103,6 +111,9 @@ class WrenchSpace:
         Limit rows: the load ``L y + l0`` against the capacity ``s`` > 0.
     H, h : ndarray, shapes (nh, m), (nh,)
         Hard rows ``H y ≤ h``, whatever the utilisation.
+    D : ndarray, shape (nd, 6), optional
+        Wrench rows: the last nd limit rows have the load D w, so that their L is D V and their l0
+        is D o. None by default.
     """
 
     origin: Array
@@ -114,6 +125,7 @@ class WrenchSpace:
     s: Array
     H: Array
     h: Array
+    D: Array = field(default_factory=lambda: np.zeros((0, 6)))
 
     def __post_init__(self) -> None:
         m = len(self.columns)
@@ -123,12 +135,15 @@ class WrenchSpace:
             "L": (len(self.s), m),
             "l0": (len(self.s),),
             "H": (len(self.h), m),
+            "D": (len(self.D), 6),
         }
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise InvalidInputError(
                     f"shape {shape} is needed, got {getattr(self, name).shape}", field=name
                 )
+        if len(self.D) > len(self.s):
+            raise InvalidInputError("a limit row for each wrench row is needed", field="D")
         if len(self.rows) != len(self.s) + len(self.h):
             raise InvalidInputError("one name for each row is needed", field="rows")
         if not (self.s > 0.0).all():
@@ -157,7 +172,9 @@ class WrenchSpace:
     @cached_property
     def _blocks(self) -> tuple[tuple[Indices, Array], ...]:
         """Columns of each block and the vertices of its polytope, (indices, (n, d))."""
-        A, b = self.A, self.b
+        apart = len(self.s) - len(self.D)
+        A = np.vstack([self.L[:apart], self.H])
+        b = np.concatenate([(self.s - self.l0)[:apart], self.h])
         used = np.abs(A) > 0.0
         idle = ~used.any(axis=1)
         if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
@@ -236,22 +253,91 @@ class WrenchSpace:
     @property
     def dimension(self) -> int:
         """Of the set's affine hull, from 0 to 6."""
+        _ = self._cuts  # an empty set has none
         return len(self._axes[1])
 
     @cached_property
-    def _facets(self) -> tuple[Array, Array]:
-        """Unit normals (k, r) and offsets (k,) in the coordinates of `_axes`, about `_base`."""
-        parts, r = self._parts, self.dimension
+    def _cuts(self) -> Indices:
+        """Wrench rows beyond which the sum of the blocks reaches."""
+        slopes = self.D @ self.generators
+        reach = self.D @ self.origin
+        for columns, vertices in self._blocks:
+            reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
+        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
+        # where the sum reaches least far along the cuts is most often a wrench of the set
+        within = not len(cuts) or self._obeys(self._extreme(-slopes[cuts].sum(axis=0)))
+        if not within and self._farthest(np.zeros(6)) is None:
+            row = self.rows[len(self.s) - len(self.D) + cuts[0]]
+            raise EmptySetError(f"no wrench is left at utilisation 1: all exceed {row.limit}")
+        return cuts
+
+    def _extreme(self, slopes: Array) -> Array:
+        """Return the loads y, shape (m,), with the largest slopes · y in the sum of the blocks."""
+        y = np.zeros(len(self.columns))
+        for columns, vertices in self._blocks:
+            y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
+        return y
+
+    def _obeys(self, y: Array) -> bool:
+        """Whether loads of the sum of the blocks also keep to the wrench rows."""
+        return bool((self.D @ self.wrench(y) <= self._held * (1.0 + TOLERANCE)).all())
+
+    @property
+    def _held(self) -> Array:
+        """Capacities of the wrench rows, shape (nd,)."""
+        return self.s[len(self.s) - len(self.D) :]
+
+    def _farthest(self, direction: Array) -> float | None:
+        """Return max { d · w } over all rows at u = 1, by linear programming; None if empty."""
+        result = linprog(
+            -(self.generators.T @ direction),
+            A_ub=self.A,
+            b_ub=self.b,
+            bounds=[(None, None)] * len(self.columns),
+            method="highs",
+            options={"primal_feasibility_tolerance": EXACT, "dual_feasibility_tolerance": EXACT},
+        )
+        if result.status == 2:
+            return None
+        if result.status != 0 or result.x is None:
+            raise SolverError(f"support: {result.message}")
+        return float(direction @ self.wrench(result.x))
+
+    @cached_property
+    def _clipped(self) -> tuple[Array, Faces]:
+        """Vertices (n, r) and facets where wrench rows cut the sum of the blocks."""
+        directions, reach = self._axes
+        rows, held = self.D[self._cuts] / SCALE, self._held[self._cuts]
+        normals = rows @ directions.T * reach
+        lengths = np.linalg.norm(normals, axis=1)
+        # what is constant on the set, and yet beyond its capacity, is so by rounding
+        turns = lengths > FLATNESS * held
+        room = held - np.asarray(rows @ self._base)
+        cuts = Faces(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
+        found = clipped(self._sum_vertices, self._sum_facets, cuts, self._rounding)
+        if found is None:
+            raise self._empty()
+        return found
+
+    @property
+    def _facets(self) -> Faces:
+        """In the coordinates of `_axes`, about `_base`."""
+        return self._clipped[1] if len(self._cuts) else self._sum_facets
+
+    @cached_property
+    def _sum_facets(self) -> Faces:
+        """Facets of the sum of the blocks, without wrench rows."""
+        parts, r = self._parts, len(self._axes[1])
         if r == 0:
-            return np.zeros((0, 0)), np.zeros(0)
+            return Faces(np.zeros((0, 0)), np.zeros(0))
         if all(part.dimension <= 2 for part in parts):
             normals = sum_normals(parts, r, self._rounding)
             offsets = sum(
                 ((part.points @ normals.T).max(axis=0) for part in parts),
                 start=np.zeros(len(normals)),
             )
-            return normals, np.asarray(offsets)
-        return hull_facets(sums(parts))
+            return Faces(normals, np.asarray(offsets))
+        return Faces(*hull_facets(sums(parts)))
 
     def half_spaces(self) -> HalfSpaces:
         """Return the set at u = 1 as inequalities and, where it is flat, equations.
@@ -286,12 +372,17 @@ class WrenchSpace:
         directions, reach = self._axes
         return np.asarray(((self._vertices * reach) @ directions + self._base) / SCALE)
 
-    @cached_property
+    @property
     def _vertices(self) -> Array:
         """Vertices (n, r) in the coordinates of `_axes`, about `_base`."""
+        return self._clipped[0] if len(self._cuts) else self._sum_vertices
+
+    @cached_property
+    def _sum_vertices(self) -> Array:
+        """Vertices of the sum of the blocks, without wrench rows."""
         if not self._parts:
             return np.zeros((1, 0))
-        return sum_vertices(self._parts, *self._facets, self._rounding)
+        return sum_vertices(self._parts, *self._sum_facets, self._rounding)
 
     def support(self, direction: ArrayLike) -> float:
         """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
@@ -300,11 +391,17 @@ class WrenchSpace:
         ------
         EmptySetError
             If nothing is left at u = 1.
+        SolverError
+            If a linear program fails.
         """
         d = finite_vector(direction, 6, "direction")
-        slopes = self.generators.T @ d
-        reach = sum(float((v @ slopes[columns]).max()) for columns, v in self._blocks)
-        return float(d @ self.origin) + reach
+        y = self._extreme(self.generators.T @ d)
+        if not len(self._cuts) or self._obeys(y):
+            return float(d @ self.wrench(y))
+        farthest = self._farthest(d)
+        if farthest is None:
+            raise self._empty()
+        return farthest
 
     def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
         """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.
