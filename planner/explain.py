@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.hand import SettledHand
+from hand_models.hand import NAIL, SettledHand
 from planner.plan import Certificate, HandPlan, LimitName
 from planner.program import WRENCH_UNIT
 from planner.stance import Stance
@@ -23,13 +23,26 @@ MANNERS: Final = {
     "pull_off": " toward pull-off",
     "palm_shear": " in shear",
     "palm_pressing": " in pressing",
+    "finger_shear": " in shear together",
+    "fingertip_force": " in pressing",
 }
 """How a limit is loaded."""
+
+BEARERS: Final = {
+    "motor_torque": "motor",
+    "motor_current": "motor",
+    "finger_shear": "tiles",
+}
+"""What of a finger a limit is about; its tendon by default."""
 
 BARRIERS: Final = {
     "slack_tendon": "cannot push",
     "dragged_backwards": "cannot be dragged away from the finger's base",
     "joint_stop": "cannot leave its joint's stop",
+    "frame_pulled": "rests beside its spines, which cannot pull there",
+    "nail_lifts": "cannot pull",
+    "nail_slips": "would slip",
+    "tendon_sticks": "would stick if it were slackened",
     "palm_shear_reversed": "cannot drag the rock along +x of the hand",
     "palm_pressing_reversed": "cannot pull",
 }
@@ -38,15 +51,33 @@ BARRIERS: Final = {
 
 def _spoken(name: LimitName) -> str:
     """Say whose limit it is: ``front_left: proximal tile of inner_right``."""
+    if name.limit == "fingertip_force":
+        return f"{name.limb}: fingertip of {name.finger}"
     if name.phalanx is not None:
-        return f"{name.limb}: {name.phalanx} tile of {name.finger}"
+        tile = "" if name.phalanx == NAIL else " tile"
+        return f"{name.limb}: {name.phalanx}{tile} of {name.finger}"
     if name.finger is not None:
-        return f"{name.limb}: tendon of {name.finger}"
-    return f"{name.limb}: palm"
+        return f"{name.limb}: {BEARERS.get(name.limit, 'tendon')} of {name.finger}"
+    return f"{name.limb}: {'the hand' if name.limit == 'hand_load' else 'palm'}"
 
 
-def _newtons(force: float) -> str:
-    return f"{force:.0f} N" if abs(force) >= 10.0 else f"{force:.2g} N"
+def _verb(limit: str, held: bool) -> str:
+    """Say what is done to a limit, or would be."""
+    does, would_do = {
+        "motor_torque": ("gives", "give"),
+        "motor_current": ("draws", "draw"),
+        "finger_shear": ("carry", "carry"),
+        "hand_load": ("holds", "hold"),
+    }.get(limit, ("carries", "carry"))
+    return does if held else f"would {would_do}"
+
+
+def _spoken_load(limit: str, load: float) -> str:
+    if limit == "motor_torque":
+        return f"{1e3 * load:.3g} mN·m"
+    if limit == "motor_current":
+        return f"{load:.3g} A"
+    return f"{load:.0f} N" if abs(load) >= 10.0 else f"{load:.2g} N"
 
 
 def limit_sentence(
@@ -55,27 +86,32 @@ def limit_sentence(
     """Say how much of a limit is used.
 
     A tile's force is told with what the tile would hold in that direction, not with the distances
-    to its half-plane.
+    to its half-plane; the force that a hand holds likewise.
 
     Parameters
     ----------
     name : LimitName
     load, capacity : float
-        Of its row [N].
+        Of its row [N], [N·m] or [A].
     hand : HandPlan
         Whose limit it is.
     held : bool
         Whether the plan is within its limits.
     """
-    if name.phalanx is not None and load > 0.0:
+    force = 0.0
+    if name.limit == "hand_load":
+        fx, fy, fz = hand.wrench[:3]
+        force = math.hypot(fx, fy, min(fz, 0.0))
+    elif name.limit in ("shear", "pull_off"):
         finger = next(f for f in hand.fingers if f.name == name.finger)
         tile = next(t for t in finger.tiles if t.phalanx == name.phalanx)
         pull = tile.normal if name.limit == "pull_off" else 0.0
         force = math.hypot(tile.shear, pull, tile.lateral)
+    if force > 0.0 and load > 0.0:
         load, capacity = force, force * capacity / load
-    verb = "carries" if held else "would carry"
+    used, most = (_spoken_load(name.limit, value) for value in (load, capacity))
     manner = MANNERS.get(name.limit, "")
-    return f"{_spoken(name)} {verb} {_newtons(load)} of {_newtons(capacity)}{manner}"
+    return f"{_spoken(name)} {_verb(name.limit, held)} {used} of {most}{manner}"
 
 
 def shortfall_sentence(certificate: Certificate, touching: bool) -> str:

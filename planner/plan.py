@@ -37,8 +37,10 @@ class LimitName:
     finger, phalanx : str or None
         None where the limit is not a finger's, or not a tile's.
     limit : str
-        What is limited: ``shear``, ``pull_off``, ``tendon_tension``, ``palm_shear``,
-        ``palm_pressing``; or a hard row's name.
+        What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
+        ``motor_torque``, ``motor_current``, ``finger_shear`` and, with its distal phalanx,
+        ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``, ``hand_load``; or a hard
+        row's name.
     """
 
     limb: str
@@ -49,10 +51,20 @@ class LimitName:
 
 @dataclass(frozen=True)
 class Price:
-    """A limit that binds, and what one more unit of it would take off the utilisation [1/N]."""
+    """A limit that binds, and what one more unit of it would take off the utilisation.
+
+    Attributes
+    ----------
+    name : LimitName
+    price : float
+        [1/unit]
+    unit : str
+        Of the limit's capacity: ``N``, ``N·m`` or ``A``.
+    """
 
     name: LimitName
     price: float
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +76,8 @@ class TileLoad:
     phalanx : str
         ``base``, ``proximal``, ``middle`` or ``distal``.
     contact : str
-        ``face``, ``edge``, or ``none`` where the tile touches nothing and carries nothing.
+        ``face``, ``edge``, ``frame`` where its phalanx only presses beside it, or ``none`` where
+        it touches nothing and carries nothing.
     position : ndarray, shape (3,)
     force : ndarray, shape (3,)
         shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
@@ -97,10 +110,26 @@ class TileLoad:
 
 @dataclass(frozen=True)
 class FingerPlan:
-    """One finger of a plan: its tendon's tension [N] and its tiles, from the base outward."""
+    """One finger of a plan.
+
+    Attributes
+    ----------
+    name : str
+    tendon_tension : float
+        [N]
+    motor_torque, motor_current : float
+        Of its motor while it tightens the tendon to that [N·m], [A].
+    winch_angle : float
+        From the open finger to that tension [rad].
+    tiles : tuple of TileLoad
+        From the base outward.
+    """
 
     name: str
     tendon_tension: float
+    motor_torque: float
+    motor_current: float
+    winch_angle: float
     tiles: tuple[TileLoad, ...]
 
 

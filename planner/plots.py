@@ -1,4 +1,4 @@
-"""Pictures of plans, wrench spaces and climbs.
+"""Pictures of plans and climbs.
 
 Figures are built without a display and written to a file; every axis says what it shows in which
 unit.
@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull, QhullError
 
 from hand_models.frames import Array, Pose
-from hand_models.hand import FINGERS, SettledHand
-from hand_models.wrench_space import WrenchSpace
+from hand_models.hand import SettledHand
 from planner.plan import Plan
 from planner.route import RouteResult
 from planner.solve import settle
@@ -26,7 +24,7 @@ from planner.stance import Stance
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_plan", "plot_route", "plot_wrench_space"]
+__all__ = ["plot_plan", "plot_route"]
 
 COLOURS: Final = LinearSegmentedColormap.from_list("load", ["#1a9850", "#e6a117", "#d73027"])
 UTILISATION: Final = Normalize(0.0, 1.0)
@@ -216,110 +214,6 @@ def _draw_tiles(axes: Axes, plan: Plan) -> None:
         axes.axhline(line - 0.5, color="black", linewidth=1.0)
     axes.set_title("utilisation of each tile; tension of each tendon")
     axes.figure.colorbar(image, ax=axes, label="load / capacity", shrink=0.6)
-
-
-# A wrench space ---------------------------------------------------------------------------------
-
-COMPONENTS: Final = (
-    ("F_x", "N"),
-    ("F_y", "N"),
-    ("F_z", "N"),
-    ("M_x", "N·m"),
-    ("M_y", "N·m"),
-    ("M_z", "N·m"),
-)
-
-
-def plot_wrench_space(settled: SettledHand, space: WrenchSpace, path: Path, title: str) -> None:
-    """Draw a hand on its hold and three projections of what it can carry.
-
-    Parameters
-    ----------
-    settled : SettledHand
-    space : WrenchSpace
-        Not empty at utilisation 1.
-    path : Path
-    title : str
-    """
-    figure = Figure(figsize=(13.0, 9.0), layout="constrained")
-    panels = figure.subplots(2, 2)
-    _draw_section(panels[0, 0], settled)
-    vertices = space.vertices()
-    for axes, (i, j) in zip(panels.flat[1:], ((0, 2), (0, 4), (1, 5)), strict=True):
-        _draw_projection(axes, vertices, i, j)
-    figure.suptitle(title)
-    _save(figure, path)
-
-
-def _draw_section(axes: Axes, settled: SettledHand) -> None:
-    """Draw the left fingers and the rock under each of them, in x-z of H."""
-    shown = {"inner_left": "tab:blue", "outer_left": "tab:green"}
-    frames = settled.hand.frames(settled.grasp.outer_rotation)
-    xs = np.linspace(-0.22, 0.24, 600)
-    for name, colour in shown.items():
-        depths = _depths(settled, xs, float(frames[FINGERS.index(name)].joint[1]))
-        if name == "inner_left":
-            axes.fill_between(1e3 * xs, 1e3 * depths, 400.0, color="0.9")
-        label = f"rock under {name.replace('_', ' ')}"
-        axes.plot(1e3 * xs, 1e3 * depths, "--", color=colour, linewidth=1.0, label=label)
-    ends = 1e3 * _palm_outline(settled)[[0, 2], 0]
-    axes.plot(ends, [0.0, 0.0], color="tab:brown", linewidth=4, label="palm")
-    chains = _finger_chains(settled)
-    loads = settled.tile_loads(np.full(len(FINGERS), settled.closing_tension))
-    largest = max(float(np.abs(loads[:, :2]).max()), 1e-9)
-    for name, colour in shown.items():
-        i = FINGERS.index(name)
-        axes.plot(
-            1e3 * chains[i][:, 0], 1e3 * chains[i][:, 2], "o-", color=colour, markersize=5,
-            label=name.replace("_", " "),
-        )  # fmt: skip
-        for t in np.flatnonzero((settled.finger_of == i) & settled.touching):
-            force = loads[t, :2] @ settled.axes[t, :2]
-            start = 1e3 * settled.positions[t][[0, 2]]
-            _arrow(axes, start, 40.0 * force[[0, 2]] / largest, colour)
-            axes.plot(*start, ".", color="black", markersize=5)
-    axes.set(
-        title=f"seated: {settled.seating.rule.replace('_', ' ')}; tile forces on the rock at "
-        f"{settled.closing_tension:g} N",
-        xlabel="x of H [mm]",
-        ylabel="z of H, into the rock [mm]",
-        xlim=(-180.0, 220.0),
-    )
-    low = min(-40.0, float(1e3 * min(chain[:, 2].min() for chain in chains)) - 15.0)
-    high = max(90.0, float(1e3 * max(chain[:, 2].max() for chain in chains)) + 45.0)
-    axes.set_ylim(high, low)
-    axes.set_aspect("equal", adjustable="box")
-    axes.legend(loc="lower center", ncols=2, fontsize=8)
-
-
-def _depths(settled: SettledHand, xs: Array, offset: float) -> Array:
-    """Return z of H at which the rock begins over x, at y = ``offset``; NaN where there is none."""
-    hand_in_hold = settled.seating.pose.inverse()
-    into_rock = hand_in_hold.rotation[:, 2]
-    depths = np.array(
-        [settled.hold.entry(hand_in_hold.apply((x, offset, 0.0)), into_rock) for x in xs]
-    )
-    depths[~np.isfinite(depths)] = np.nan
-    return depths
-
-
-def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
-    points = vertices[:, [i, j]]
-    try:
-        outline = points[ConvexHull(points).vertices]
-    except QhullError:
-        outline = points[np.lexsort(points.T)][[0, -1]]
-    axes.fill(*outline.T, alpha=0.35, color="tab:blue")
-    axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
-    axes.axhline(0.0, color="0.5", linewidth=0.8)
-    axes.axvline(0.0, color="0.5", linewidth=0.8)
-    (a, unit_a), (b, unit_b) = COMPONENTS[i], COMPONENTS[j]
-    axes.set(
-        title=f"all wrenches on the rock, in ${a}$ and ${b}$",
-        xlabel=f"${a}$ [{unit_a}]",
-        ylabel=f"${b}$ [{unit_b}]",
-    )
-    axes.grid(alpha=0.3)
 
 
 # A climb ----------------------------------------------------------------------------------------

@@ -13,26 +13,24 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
 from hand_models.errors import InvalidInputError
-from hand_models.fixed_wrist import wrench_space
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, wrench_space
 from hand_models.frames import Array, wrench_transport
-from hand_models.hand import FINGERS, SettledHand
+from hand_models.hand import SettledHand
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
 from planner.explain import limit_sentence, shortfall_sentence, warnings
 from planner.plan import (
     Certificate,
-    FingerPlan,
     HandPlan,
     LimitName,
-    PalmPlan,
     Plan,
     Price,
     SolverInfo,
     Status,
-    TileLoad,
     Times,
 )
 from planner.program import LOAD_UNIT, SOLVER, UNLIMITED, WRENCH_UNIT, HandData, Outcome, StanceData
+from planner.reading import read_hand
 from planner.stance import HandOnHold, Question, Stance
 from planner.verify import problems
 
@@ -50,8 +48,14 @@ BALANCED: Final = 1e-7
 BINDING: Final = 1e-6
 """Multipliers below this do not count as binding."""
 
+ALIKE: Final = 5
+"""Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
+
 BLOCKING: Final = 1e-6
 """Multipliers of hard rows below this do not count as blocking a direction of unit length."""
+
+UNITS: Final = {"motor_torque": "N·m", "motor_current": "A"}
+"""Of limits that are not in newtons."""
 
 CLOSE: Final = 0.1
 """What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
@@ -132,7 +136,7 @@ def _reach(space: WrenchSpace) -> Array:
     """
     reach = np.full(len(space.columns), LOAD_UNIT)
     for coefficients, row, capacity in zip(space.L, space.rows, space.s, strict=False):
-        if row.phalanx is None:
+        if row.limit in ("tendon_tension", PALM_SHEAR, PALM_PRESSING):
             reach[np.flatnonzero(coefficients)[0]] = capacity
     return reach
 
@@ -188,7 +192,7 @@ class _Answer:
         """Read these loads, and check them."""
         self.loads = loads
         self.hands = tuple(
-            _read_hand(place.limb, settled, space, y)
+            read_hand(place.limb, settled, space, y)
             for place, settled, space, y in zip(
                 self.question.stance.hands, self.settled, self.spaces, loads, strict=True
             )
@@ -351,18 +355,18 @@ class _Answer:
     ) -> tuple[LimitName | None, str]:
         """Return the limit with the largest utilisation, and a sentence about it.
 
-        Of limits that tie, the one with the highest price: the others only follow it.
+        Of limits that tie, the dearest: the others only follow it.
         """
         close = utilisation - 2.0 * SLACK * max(1.0, utilisation)
-        prices = {price.name: price.price for price in dear}
-        best: tuple[bool, float, float] | None = None
+        rank_of = {price.name: len(dear) - i for i, price in enumerate(dear)}
+        best: tuple[bool, int, float] | None = None
         limiting: LimitName | None = None
         sentence = "nothing limits this stance"
         held = utilisation <= 1.0 + SLACK
         for hand, space, y in zip(hands, self.spaces, self.loads, strict=True):
             for row, used in enumerate(space.utilisations(y)):
                 name = _name(hand.limb, space.rows[row])
-                rank = (bool(used >= close), prices.get(name, 0.0), float(used))
+                rank = (bool(used >= close), rank_of.get(name, 0), float(used))
                 if best is None or rank > best:
                     best, limiting = rank, name
                     load, capacity = float(used * space.s[row]), float(space.s[row])
@@ -373,8 +377,13 @@ class _Answer:
         return limiting, sentence
 
     def _prices(self) -> tuple[Price, ...]:
-        """Return the price of each limit that binds; rows of one name are one limit."""
+        """Return the price of each limit that binds; rows of one name are one limit.
+
+        The dearest first: of which one per cent more would take most off the utilisation, so that
+        newtons compare with amperes.
+        """
         prices: dict[LimitName, float] = {}
+        worth: dict[LimitName, float] = {}
         for place, space, duals in zip(
             self.question.stance.hands, self.spaces, self.outcome.limit_duals, strict=True
         ):
@@ -383,8 +392,11 @@ class _Answer:
                     name = _name(place.limb, row)
                     price = float(multiplier * self.outcome.value / capacity)
                     prices[name] = prices.get(name, 0.0) + price
-        ranked = sorted(prices.items(), key=lambda item: -item[1])
-        return tuple(Price(name, price) for name, price in ranked)
+                    worth[name] = worth.get(name, 0.0) + float(multiplier)
+        return tuple(
+            Price(name, prices[name], UNITS.get(name.limit, "N"))
+            for name in sorted(worth, key=lambda name: -round(worth[name], ALIKE))
+        )
 
 
 def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tuple[Array, Array]:
@@ -417,81 +429,6 @@ def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tupl
     if length < BLOCKING:
         return near, np.zeros(rows)
     return result.x[:6] / length, np.maximum(result.x[12 : 12 + rows], 0.0) / length
-
-
-def _read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:
-    """Turn one hand's loads y into tile loads and forces."""
-    column = {name: i for i, name in enumerate(space.columns)}
-
-    def load(name: str) -> float:
-        return float(y[column[name]]) if name in column else 0.0
-
-    tensions = np.array([max(load(f"{finger}/tension"), 0.0) for finger in FINGERS])
-    laterals = np.array([load(f"{finger}/lateral") for finger in FINGERS])
-    loads = settled.tile_loads(tensions, laterals)
-    forces = np.einsum("tk,tkx->tx", loads, settled.axes)
-    pieces = settled.surface.pieces()
-    planes = np.array([(p.a_shear, p.a_normal, p.a_lateral) for p in pieces])
-    capacities = np.array([p.capacity for p in pieces])
-    magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
-    used = np.where(settled.touching, (magnitudes @ planes.T / capacities).max(axis=1), 0.0)
-    used = np.maximum(used, 0.0)
-    fingers = []
-    for i, finger in enumerate(FINGERS):
-        tiles = tuple(
-            TileLoad(
-                phalanx=settled.tiles[t].phalanx,
-                contact=settled.tiles[t].contact,
-                position=settled.positions[t],
-                force=forces[t],
-                shear=float(loads[t, 0]),
-                normal=float(loads[t, 1]),
-                lateral=float(loads[t, 2]),
-                shear_axis=settled.axes[t, 0],
-                normal_axis=settled.axes[t, 1],
-                lateral_axis=settled.axes[t, 2],
-                utilisation=float(used[t]),
-                load_at_zero=settled.loads[t, :, 0],
-                load_per_newton=settled.loads[t, :, 1],
-                half_planes=pieces,
-            )
-            for t in np.flatnonzero(settled.finger_of == i)
-        )
-        fingers.append(FingerPlan(finger, float(tensions[i]), tiles))
-    shear = max(load("palm_shear"), 0.0)
-    pressing = max(load("palm_pressing"), 0.0)
-    palm = PalmPlan(
-        position=settled.palm.centre,
-        force=np.array([-shear, 0.0, pressing]),
-        moment=np.zeros(3),
-        engaged=settled.palm.engaged,
-        utilisation=(
-            max(shear / settled.palm.shear_limit, pressing / settled.palm.pressing_limit)
-            if settled.palm.engaged
-            else 0.0
-        ),
-    )
-    wrench = np.concatenate([palm.force, np.cross(palm.position, palm.force)])
-    wrench = wrench + np.concatenate(
-        [forces.sum(axis=0), np.cross(settled.positions, forces).sum(axis=0)]
-    )
-    maximum = min(
-        (
-            float(capacity)
-            for row, capacity in zip(space.rows, space.s, strict=False)
-            if row.limit == "tendon_tension"
-        ),
-    )
-    utilisation = max(float(used.max()), float(tensions.max()) / maximum, palm.utilisation)
-    return HandPlan(
-        limb=limb,
-        wrench=wrench,
-        fingers=tuple(fingers),
-        palm=palm,
-        utilisation=utilisation,
-        seating=settled.seating,
-        space=space,
-    )
 
 
 def _name(limb: str, row: Row) -> LimitName:

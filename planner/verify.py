@@ -2,8 +2,9 @@
 
 Nothing here is shared with the way the plan was found. Tile loads are recomputed from the tensions
 by solving the full equilibrium of Eq. 6 (joint rows and tile rows, forces in the finger's frame),
-not by the affine maps of Eq. 14; wrenches are summed force by force; limits are Eq. 21 itself and
-the plan's half-planes; balance is added up in the body frame.
+not by the affine maps of Eq. 14, motors and winches from those; wrenches are summed force by force;
+limits are Eq. 21 itself, the plan's half-planes and the structure's published figures; balance is
+added up in the body frame.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import numpy as np
 
 from hand_models.finger import SettledFinger
 from hand_models.frames import Array
-from hand_models.hand import SettledHand
-from planner.plan import HandPlan, TileLoad
+from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.structure import HELD
+from planner.plan import FingerPlan, HandPlan, TileLoad
 from planner.stance import Question
 
 __all__ = ["BALANCE", "LOAD", "UTILISATION", "equilibrium", "problems"]
@@ -28,11 +30,17 @@ BALANCE: Final = 1e-6
 LOAD: Final = 1e-6
 """Largest disagreement of a tile's load, relative to the largest load of its hand."""
 
+STOP_SIDES: Final = {"upper": 1.0, "lower": -1.0, "balance": 0.0, None: 0.0}
+"""Which way a joint presses on the limit at which it stands: closing, opening."""
+
 STOP: Final = 1e-6
 """How much torque a joint's stop may seem to pull, by rounding [N·m]."""
 
 UTILISATION: Final = 1e-6
 """How far a utilisation may be from what the plan says."""
+
+DRIVE: Final = 1e-9
+"""How far a motor's torque, current or winch angle may be from what the plan says, relative."""
 
 
 def equilibrium(
@@ -53,8 +61,8 @@ def equilibrium(
     shear, normal : ndarray, shape (3,)
         Tile loads on the rock, in each phalanx's frame [N].
     stop : ndarray, shape (3,)
-        Torque that holds each joint at its upper limit where its phalanx touches nothing, zero
-        elsewhere [N·m].
+        Torque with which each joint presses on the limit at which it stands, zero where it is free
+        [N·m].
     """
     model = finger.model
     count = len(finger.contacts)
@@ -65,7 +73,8 @@ def equilibrium(
         joints.append(joints[-1] + step)
     A = np.zeros((2 * count, 2 * count))
     b = np.zeros(2 * count)
-    touching = [contact.kind != "none" for contact in finger.contacts]
+    bearing = [contact.kind != "none" for contact in finger.contacts]
+    side = np.array([STOP_SIDES[contact.stop] for contact in finger.contacts])
     along = np.column_stack([np.cos(angles), np.sin(angles)])
     into = np.column_stack([-along[:, 1], along[:, 0]])
     loss = 1.0 - model.friction
@@ -73,7 +82,7 @@ def equilibrium(
     for i in range(count):
         # joint row: a force (fx, fz) of the rock on tile j turns joint i from x toward z (J^T f_c)
         for j in range(i, count):
-            if touching[j]:
+            if bearing[j]:
                 contact = joints[j] + finger.contacts[j].along * along[j]
                 arm = contact + model.tile_height * into[j] - joints[i]
                 A[2 * i, 2 * j : 2 * j + 2] = (-arm[1], arm[0])
@@ -82,16 +91,20 @@ def equilibrium(
             + model.joint_preload[i]
             - local * model.pulley_radii[i]
         )
-        # tile row: the rock's force on the tile along +x of its phalanx is the shear
-        if touching[i]:
-            A[2 * i + 1, 2 * i : 2 * i + 2] = along[i]
+        # tile row: the rock's force on the tile along +x of its phalanx is the shear; a bare frame
+        # only presses
+        A[2 * i + 1, 2 * i : 2 * i + 2] = along[i]
+        if finger.contacts[i].kind in ("face", "edge"):
             b[2 * i + 1] = model.engagement[i] * closing + model.shear_gain * (local - closing)
         local, closing = local * loss, closing * loss
-    kept = np.repeat(touching, 2)
     forces = np.zeros(2 * count)
-    if kept.any():
-        forces[kept] = np.linalg.solve(A[np.ix_(kept, kept)], b[kept])
-    stop = np.where(touching, 0.0, (A @ forces - b)[::2])
+    if any(bearing):
+        # rows: joints that are free, tiles that bear; columns: forces on phalanges that bear
+        held = [contact.stop is None for contact in finger.contacts]
+        rows = np.stack([held, bearing], axis=1).ravel()
+        kept = np.repeat(bearing, 2)
+        forces[kept] = np.linalg.solve(A[np.ix_(rows, kept)], b[rows])
+    stop = side * (A @ forces - b)[::2]
     pairs = forces.reshape(count, 2)
     return (pairs * along).sum(axis=1), -(pairs * into).sum(axis=1), stop
 
@@ -154,7 +167,7 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             continue
         worst = max(worst, tension / maximum)
         shear, normal, stop = equilibrium(finger, tension, hand.closing_tension, outer)
-        if any(finger.touching) and stop.min() < -STOP:
+        if finger.bearing and stop.min() < -STOP:
             found.append(f"{limb}: a joint of {planned.name} would leave its stop")
         if outer:
             model = hand.hand.finger
@@ -163,7 +176,20 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             drag += model.shear_gain * (tension - hand.closing_tension)
             shear = np.append(drag if base.contact != "none" else 0.0, shear)
             normal = np.append(0.0, normal)
-        for tile, t, n in zip(planned.tiles, shear, normal, strict=True):
+        if hand.hand.finger.friction > 0.0 and any(finger.touching):
+            slack = hand.closing_tension - tension
+            if slack > allowed:
+                found.append(
+                    f"{limb}: tendon of {planned.name} would stick, slackened {slack:.3g} N"
+                )
+        worst = max(worst, _check_drive(found, hand, planned, finger, shear, limb))
+        worst = max(worst, float(shear.sum()) / hand.hand.structure.finger_shear)
+        worst = max(worst, float(normal[-1]) / hand.hand.structure.fingertip_force)
+        tiles = [tile for tile in planned.tiles if tile.phalanx != NAIL]
+        for nail in planned.tiles[len(tiles) :]:
+            worst = max(worst, _check_nail(found, hand, planned, nail, limb, allowed))
+            wrench += np.concatenate([nail.force, np.cross(nail.position, nail.force)])
+        for tile, t, n in zip(tiles, shear, normal, strict=True):
             name = f"{limb}: {tile.phalanx} tile of {planned.name}"
             off = max(abs(tile.shear - t), abs(tile.normal - n))
             if not off <= allowed:
@@ -180,7 +206,9 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             if tile.contact == "none" and np.abs(tile.force).max() > 0.0:
                 found.append(f"{name} carries a load but touches nothing")
             wrench += np.concatenate([tile.force, np.cross(tile.position, tile.force)])
-            touches = tile.contact != "none"
+            touches = tile.contact in ("face", "edge")
+            if not touches and n < -allowed:
+                found.append(f"{name}: its bare frame would be pulled off with {-n:.3g} N")
             used = _tile_utilisation(tile, t, n) if touches else 0.0
             worst = max(worst, used)
             _compare(found, name, used, tile.utilisation)
@@ -193,8 +221,105 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
     wrench += np.concatenate([force, plan.palm.moment + np.cross(plan.palm.position, force)])
     if not np.abs(wrench - plan.wrench).max() <= allowed:
         found.append(f"{limb}: the wrench is not the sum of its tiles' and palm's forces")
+    worst = max(worst, _check_held(found, hand, plan, allowed))
     _compare(found, limb, worst, plan.utilisation)
     return worst
+
+
+def _check_drive(
+    found: list[str],
+    hand: SettledHand,
+    planned: FingerPlan,
+    finger: SettledFinger,
+    shear: Array,
+    limb: str,
+) -> float:
+    """Check one finger's motor and winch; return the utilisation of the motor.
+
+    A tile has slid so far that its spring and the rock's shear balance the tendon's two strands
+    (Eq. 5), and the tendon drawn in is that of all joints and tiles, on the winch.
+    """
+    drive = hand.hand.drive
+    tension = planned.tendon_tension
+    torque = tension * drive.winch_radius / drive.gear_ratio / drive.efficiency
+    current = drive.no_load_current + torque / drive.torque_constant
+    drawn = hand.hand.nail.pulley_radius * _nail_angle(hand, planned)
+    for radius, angle in zip(finger.model.pulley_radii, finger.joint_angles, strict=True):
+        drawn += radius * angle
+    local = tension
+    for drag in shear:
+        drawn += drive.pulley_ratio * (drive.pulley_ratio * local - drag) / drive.tile_stiffness
+        local *= 1.0 - finger.model.friction
+    for name, value, said in (
+        ("motor torque", torque, planned.motor_torque),
+        ("motor current", current, planned.motor_current),
+        ("winch angle", drawn / drive.winch_radius, planned.winch_angle),
+    ):
+        if not abs(value - said) <= DRIVE * max(1.0, abs(value)):
+            found.append(f"{limb}: {name} of {planned.name} is {value:.8g}, not {said:.8g}")
+    return max(torque / drive.maximum_torque, current / drive.maximum_current)
+
+
+def _nail_arm(hand: SettledHand, planned: FingerPlan, place: Array) -> tuple[float, float]:
+    """Return where a place is from a straight finger's nail pin, in (x, z) of the finger."""
+    frame = hand.hand.frames(hand.grasp.outer_rotation)[FINGERS.index(planned.name)]
+    model = hand.hand.finger
+    arm = place - frame.joint - len(model.pulley_radii) * model.joint_spacing * frame.along
+    return float(arm @ frame.along), float(arm[2])
+
+
+def _nail_angle(hand: SettledHand, planned: FingerPlan) -> float:
+    nail = planned.tiles[-1]
+    if nail.contact != NAIL:
+        return hand.hand.nail.retraction
+    x, z = _nail_arm(hand, planned, nail.position)
+    return math.atan2(z, x)
+
+
+def _check_nail(
+    found: list[str],
+    hand: SettledHand,
+    planned: FingerPlan,
+    tile: TileLoad,
+    limb: str,
+    allowed: float,
+) -> float:
+    """Check a nail that clings: its balance about its pin, its friction; return its utilisation."""
+    name = f"{limb}: nail of {planned.name}"
+    if tile.contact != NAIL:
+        if np.abs(tile.force).max() > 0.0:
+            found.append(f"{name} carries a load but touches nothing")
+        return 0.0
+    index = FINGERS.index(planned.name)
+    frame, nail = hand.hand.frames(hand.grasp.outer_rotation)[index], hand.hand.nail
+    x, z = _nail_arm(hand, planned, tile.position)
+    along, into = float(tile.force @ frame.along), float(tile.force[2])
+    held = nail.preload + nail.stiffness * math.atan2(z, x)
+    turning = planned.tendon_tension * nail.pulley_radius - held - (x * into - z * along)
+    if not abs(turning) <= allowed * nail.length:
+        found.append(f"{name} is out of balance by {turning:.3g} N·m")
+    pressed = -float(tile.force @ hand.nail_normals[index])
+    dragged = float(np.linalg.norm(tile.force + pressed * hand.nail_normals[index]))
+    if pressed < -allowed or dragged > nail.friction * pressed + allowed:
+        found.append(f"{name} would slip: {dragged:.3g} N along rock pressed with {pressed:.3g} N")
+    used = -along / hand.hand.structure.finger_shear
+    _compare(found, name, used, tile.utilisation)
+    return used
+
+
+def _check_held(found: list[str], hand: SettledHand, plan: HandPlan, allowed: float) -> float:
+    """Check what one hand holds; return its utilisation.
+
+    That of its rows must be no less than that of the force itself: across the rock and away from
+    it, without what presses.
+    """
+    most = hand.hand.structure.hand_load
+    force = plan.wrench[:3]
+    used = float((HELD @ force).max()) / most
+    held = math.hypot(force[0], force[1], min(force[2], 0.0))
+    if not held <= used * most + allowed:
+        found.append(f"{plan.limb}: the hand holds {held:.6g} N, more than its rows say")
+    return used
 
 
 def _compare(found: list[str], name: str, utilisation: float, planned: float) -> None:
@@ -214,12 +339,13 @@ def _tile_utilisation(tile: TileLoad, shear: float, normal: float) -> float:
 def _inside_curve(
     hand: SettledHand, tile: TileLoad, shear: float, normal: float, allowed: float
 ) -> bool:
-    """Whether a tile's load in the finger plane is inside the limit curve itself (Eq. 21)."""
-    angle = math.atan2(-normal, shear)
-    if abs(angle) > math.pi / 2:
-        return math.hypot(shear, normal) <= allowed or shear >= -allowed
-    strength = float(hand.surface.strength(angle))
-    return math.hypot(shear, normal) <= strength * (1.0 + UTILISATION) + allowed
+    """Whether a tile's load is inside the limit surface itself, not only its half-planes."""
+    if shear < -allowed:
+        return False
+    along = math.hypot(shear, tile.lateral)
+    angle, azimuth = math.atan2(-normal, along), math.atan2(abs(tile.lateral), shear)
+    strength = float(hand.surface.strength(angle, azimuth))
+    return math.hypot(along, normal) <= strength * (1.0 + UTILISATION) + allowed
 
 
 def _check_palm(found: list[str], hand: SettledHand, plan: HandPlan, allowed: float) -> float:

@@ -149,7 +149,9 @@ def _limit(name: LimitName) -> replies.LimitName:
 
 def _price(price: Price) -> replies.Price:
     name = price.name
-    return replies.Price(name.limb, name.finger, name.phalanx, name.limit, float(price.price))
+    return replies.Price(
+        name.limb, name.finger, name.phalanx, name.limit, float(price.price), price.unit
+    )
 
 
 def _certificate(certificate: Certificate) -> replies.Certificate:
@@ -172,6 +174,9 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
             replies.Finger(
                 name=finger.name,
                 tendon_tension=float(finger.tendon_tension),
+                motor_torque=float(finger.motor_torque),
+                motor_current=float(finger.motor_current),
+                winch_angle=float(finger.winch_angle),
                 tiles=[_tile(tile, model) for tile in finger.tiles],
             )
             for finger in part.fingers

@@ -24,7 +24,6 @@ class _Later(NamedTuple):
 
 
 _OMIT = "leave it out"
-_SHAPES = "valid shapes are plane, cylinder, sphere, ellipsoid and edge"
 
 LATER: Final[dict[type, dict[str, _Later]]] = {
     requests.PlanRequest: {
@@ -46,7 +45,8 @@ LATER: Final[dict[type, dict[str, _Later]]] = {
 }
 """By message and field, what this version supports of the fields that later versions will."""
 
-LATER_HOLDS: Final = (requests.Profile, requests.Mesh)
+BULK: Final[dict[type, tuple[str, ...]]] = {requests.Mesh: ("vertices", "faces")}
+"""By message, long lists of numbers that their model checks as arrays."""
 
 
 def check(value: object, path: str = "") -> None:
@@ -62,11 +62,6 @@ def check(value: object, path: str = "") -> None:
     if isinstance(value, float):
         if not math.isfinite(value):
             raise InvalidInputError(f"must be a finite number, got {value}", field=path)
-    elif isinstance(value, LATER_HOLDS):
-        shape = value.__struct_config__.tag
-        raise UnsupportedError(
-            f"{shape} is not supported in this version; {_SHAPES}", field=f"{path}.shape"
-        )
     elif isinstance(value, msgspec.Struct):
         later = {k: v for kind in type(value).__mro__ for k, v in LATER.get(kind, {}).items()}
         for name in value.__struct_fields__:
@@ -76,7 +71,8 @@ def check(value: object, path: str = "") -> None:
                     f"{_given(part)}not supported in this version; {later[name].advice}",
                     field=field,
                 )
-            check(part, field)
+            if name not in BULK.get(type(value), ()):
+                check(part, field)
     elif isinstance(value, (list, tuple)):
         for i, part in enumerate(value):
             check(part, f"{path}[{i}]")

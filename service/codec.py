@@ -17,8 +17,8 @@ __all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error"]
 
 T = TypeVar("T")
 
-LARGEST_REQUEST: Final = 2**20
-"""Bytes of a request; a stance takes a few thousand."""
+LARGEST_REQUEST: Final = 2**26
+"""Bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
 
 ALIASES: Final = {
     "": "application/json",

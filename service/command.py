@@ -103,8 +103,8 @@ def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
     STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance: overhang, slab, wall, wall-300, wall-700. ROUTE is the same of a climb; bundled
-    is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
+    bundled stance: boulders, overhang, slab, wall, wall-300, wall-700. ROUTE is the same of a
+    climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.
@@ -181,12 +181,13 @@ def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) ->
 
     request = WrenchSpaceRequest(v=1, stance=read_request(stance).stance, limb=limb)
     reply = dispatch.wrench_space(request)
-    if picture is not None and reply.vertices:
-        from planner import plots
+    if picture is not None:
+        from planner import hand_plots
 
         settled, space = solve.hand_space(questions.stance(request.stance), limb)
+        shown = space if reply.vertices else None
         with _writing(picture):
-            plots.plot_wrench_space(settled, space, picture, f"{limb} of {stance}")
+            hand_plots.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}")
     if as_json:
         _say(reply)
     else:
@@ -339,6 +340,43 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
     if result.feasible:
         return DONE
     return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
+
+
+@crux.command()
+@click.argument("name")
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    metavar="DIR",
+    help="Where result.json and the pictures go.",
+)
+@json_option
+def study(name: str, folder: Path, as_json: bool) -> None:
+    """Run an experiment of the paper again, and hold its claims against the model.
+
+    NAME is that of the figure: fig06, fig07, fig10. The exit status is 0 whatever the claims say.
+    """
+    from rich.progress import Progress
+
+    from hand_models import studies
+    from service.studies import print_study
+
+    screen = console(stderr=True)
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(name, total=None)
+        try:
+            result, files = studies.run_study(
+                name, folder, lambda done, total: bar.update(task, completed=done, total=total)
+            )
+        except OSError as error:
+            raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+    if as_json:
+        _say(studies.as_json(result) | {"files": [str(path) for path in files]})
+    else:
+        print_study(result, files, console())
 
 
 @crux.command()

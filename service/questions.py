@@ -10,9 +10,11 @@ import msgspec
 import numpy as np
 
 from hand_models import holds
-from hand_models.errors import InvalidInputError, UnsupportedError
+from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose
 from hand_models.hand import Grasp
+from hand_models.mesh import Mesh
+from hand_models.profile import Profile
 from hand_models.spines import Surface
 from planner.robosimian import Robot, robosimian
 from planner.route import Move, Route
@@ -154,5 +156,26 @@ def _hold(message: requests.Hold) -> holds.Hold:
             return holds.Ellipsoid(message.semi_axes)
         case requests.Edge():
             return holds.Edge(message.fillet_radius, message.angle)
-        case _:
-            raise UnsupportedError("not supported in this version", field="shape")
+        case requests.Profile():
+            return _profile(message)
+        case requests.Mesh():
+            return _mesh(message)
+
+
+def _profile(message: requests.Profile) -> Profile:
+    if message.points is not None and message.profiles is None:
+        return Profile(message.points)
+    if message.profiles is not None and message.points is None:
+        return Profile(msgspec.structs.asdict(message.profiles))
+    raise InvalidInputError("give points or profiles, one of them", field="points")
+
+
+def _mesh(message: requests.Mesh) -> Mesh:
+    if message.file is not None:
+        raise InvalidInputError(
+            "only the command line reads files; send vertices and faces", field="file"
+        )
+    if message.vertices is None or message.faces is None:
+        missing = "vertices" if message.vertices is None else "faces"
+        raise InvalidInputError("missing", field=missing)
+    return Mesh(message.vertices, message.faces)

@@ -72,9 +72,13 @@ class LimitName(Struct):
 
 
 class Price(LimitName):
-    """What one more unit of a limit that binds would take off the utilisation [1/N]."""
+    """What one more unit of a limit that binds would take off the utilisation.
+
+    The unit is that of the limit's capacity: ``N``, ``N·m`` or ``A``.
+    """
 
     price: float
+    unit: str
 
 
 class Tile(Struct, kw_only=True):
@@ -97,12 +101,16 @@ class Tile(Struct, kw_only=True):
 
 
 class Finger(Struct, kw_only=True):
-    """One finger; its motor's values are null until motors are modelled."""
+    """One finger: its tendon, its motor while it tightens that, its tiles from the base outward.
+
+    The winch's angle is from the open finger [rad].
+    """
 
     name: str
     tendon_tension: float
-    motor_torque: float | None = None
-    motor_current: float | None = None
+    motor_torque: float
+    motor_current: float
+    winch_angle: float
     tiles: list[Tile]
 
 
@@ -140,7 +148,8 @@ class Generator(Struct):
 class Row(Struct, kw_only=True):
     """An inequality of a hand's wrench space.
 
-    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity.
+    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
+    for ``motor_torque`` in newton-metres, for ``motor_current`` in amperes.
     ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
     """
 

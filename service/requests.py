@@ -33,6 +33,7 @@ __all__ = [
     "Sphere",
     "Stance",
     "Strict",
+    "Strips",
     "Surface",
     "WrenchSpaceRequest",
 ]
@@ -61,9 +62,32 @@ FilletRadius = Annotated[float, Meta(ge=1e-4, le=100.0, description="[m]")]
 EdgeAngle = Annotated[
     float, Meta(ge=1e-2, lt=math.pi, description="of the rock between the faces [rad]")
 ]
+OutlinePoint = Annotated[tuple[Coordinate, Coordinate], Meta(description="[x, z] [m]")]
+Outline = Annotated[
+    list[OutlinePoint],
+    Meta(min_length=2, max_length=5000, description="rock on the side of larger z"),
+]
+VertexIndex = Annotated[int, Meta(ge=0, lt=2_000_000)]
+Vertices = Annotated[
+    list[Position], Meta(max_length=2_000_000, description="in the hold's frame [m]")
+]
+Faces = Annotated[
+    list[tuple[VertexIndex, VertexIndex, VertexIndex]],
+    Meta(max_length=4_000_000, description="counterclockwise seen from outside the rock"),
+]
+FileName = Annotated[
+    str,
+    Meta(
+        max_length=4096,
+        description="STL, PLY, OBJ or OFF in metres, relative to the file that names it; only on "
+        "the command line, which sends vertices and faces",
+    ),
+]
 TileForce = Annotated[float, Meta(ge=1e-3, le=1e5, description="of one tile [N]")]
 PullOffAngle = Annotated[float, Meta(ge=1e-3, le=math.pi / 2, description="[rad]")]
 Gain = Annotated[float, Meta(ge=0.0, le=1e3)]
+LateralShare = Annotated[float, Meta(ge=1e-3, le=1.0)]
+Scatter = Annotated[float, Meta(ge=0.0, le=1e5, description="standard deviation, of one tile [N]")]
 Count = Annotated[int, Meta(ge=1, le=64)]
 OuterRotation = Annotated[float, Meta(ge=0.0, le=math.pi + 1e-6, description="[rad]")]
 Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
@@ -122,12 +146,28 @@ class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
     ]
 
 
-class Profile(Placed, frozen=True, kw_only=True, tag="profile", forbid_unknown_fields=False):
-    """Not supported in this version."""
+class Strips(Strict, frozen=True, kw_only=True):
+    """The rock under each finger; the strips meet at y = 0 and half-way between two fingers."""
+
+    outer_left: Outline
+    inner_left: Outline
+    inner_right: Outline
+    outer_right: Outline
 
 
-class Mesh(Placed, frozen=True, kw_only=True, tag="mesh", forbid_unknown_fields=False):
-    """Not supported in this version."""
+class Profile(Placed, frozen=True, kw_only=True, tag="profile"):
+    """Rock drawn out along y of its frame, smoothed to the scale of a tile; points or profiles."""
+
+    points: Outline | None = None
+    profiles: Strips | None = None
+
+
+class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
+    """Triangles of rock, open or closed; vertices and faces, or a file for the command line."""
+
+    vertices: Vertices | None = None
+    faces: Faces | None = None
+    file: FileName | None = None
 
 
 Hold = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
@@ -142,6 +182,8 @@ class Surface(Strict, frozen=True, kw_only=True):
     lateral_limit: TileForce | None = None
     compression_gain: Gain | None = None
     half_planes: Count | None = None
+    lateral_pull_off_ratio: LateralShare | None = None
+    shear_scatter: Scatter | None = None
 
 
 class Grasp(Strict, frozen=True, kw_only=True):
@@ -151,6 +193,9 @@ class Grasp(Strict, frozen=True, kw_only=True):
     closing_tension: Tension | None = None
     palm: bool = True
     lateral: bool = True
+    fingernail: Annotated[
+        bool, Meta(description="fingers straight, clinging with their nails alone")
+    ] = False
 
 
 class Hand(Strict, frozen=True, kw_only=True):

@@ -1,4 +1,7 @@
-"""Where the command line finds a stance or a route: a file, standard input, or a bundled one."""
+"""Where the command line finds a stance or a route: a file, standard input, or a bundled one.
+
+Files that its holds name are read here, so that what travels is whole.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,16 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TypeVar
 
+import msgspec
+
 from hand_models.errors import InvalidInputError
+from hand_models.mesh import read_mesh
 from service.codec import decode_request
-from service.requests import PlanRequest, Request, RouteRequest
+from service.requests import Hand, Mesh, PlanRequest, Request, RouteRequest
 
 __all__ = ["bundled", "read_request", "read_route"]
 
+H = TypeVar("H", bound=Hand)
 R = TypeVar("R", bound=Request)
 
 
@@ -54,16 +61,54 @@ def _is_json(file: Traversable) -> bool:
 
 def _read(source: str, kind: type[R], field: str, noun: str) -> R:
     if source == "-":
-        return decode_request(sys.stdin.buffer.read(), kind)
+        return _whole(decode_request(sys.stdin.buffer.read(), kind), Path())
     path = Path(source)
     if path.is_file():
         try:
-            return decode_request(path.read_bytes(), kind)
+            return _whole(decode_request(path.read_bytes(), kind), path.parent)
         except OSError as error:
             raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
     if source in bundled(kind):
-        return decode_request((_folder(kind) / f"{source}.json").read_bytes(), kind)
+        with resources.as_file(_folder(kind)) as folder:
+            return _whole(
+                decode_request((folder / f"{source}.json").read_bytes(), kind), Path(folder)
+            )
     raise InvalidInputError(
         f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
         field=field,
     )
+
+
+def _whole(request: R, folder: Path) -> R:
+    """Return a request with the meshes that it names by file, relative to a folder."""
+    read: dict[str, Mesh] = {}
+
+    def filled(hands: list[H], path: str) -> list[H]:
+        return [_filled(hand, folder, read, f"{path}[{i}]") for i, hand in enumerate(hands)]
+
+    replace = msgspec.structs.replace
+    if isinstance(request, (PlanRequest, RouteRequest)):
+        hands = filled(request.stance.hands, "stance.hands")
+        request = replace(request, stance=replace(request.stance, hands=hands))
+    if isinstance(request, RouteRequest):
+        request = replace(request, moves=filled(request.moves, "moves"))
+    return request
+
+
+def _filled(hand: H, folder: Path, read: dict[str, Mesh], path: str) -> H:
+    hold = hand.hold
+    if not isinstance(hold, Mesh) or hold.file is None:
+        return hand
+    if hold.vertices is not None or hold.faces is not None:
+        raise InvalidInputError(
+            "give a file, or vertices and faces, not both", field=f"{path}.hold.file"
+        )
+    if hold.file not in read:
+        try:
+            vertices, faces = read_mesh(folder / hold.file)
+        except InvalidInputError as error:
+            raise error.within(f"{path}.hold") from None
+        read[hold.file] = Mesh(vertices=vertices.tolist(), faces=faces.tolist())
+    known = read[hold.file]
+    hold = msgspec.structs.replace(hold, vertices=known.vertices, faces=known.faces, file=None)
+    return msgspec.structs.replace(hand, hold=hold)

@@ -48,9 +48,10 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         _show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
         )
-        _show("tendons, and each finger's most loaded tile", _tendon_table(reply.hands), out)
+        title = "tendons and their motors, and each finger's most loaded tile"
+        _show(title, _tendon_table(reply.hands), out)
     if reply.prices:
-        title = "what one newton more of a limit would take off the utilisation"
+        title = "what one unit more of a limit would take off the utilisation"
         if len(reply.prices) > MOST_PRICES:
             title += f" ({MOST_PRICES} of {len(reply.prices)})"
         _show(title, _price_table(reply.prices[:MOST_PRICES]), out)
@@ -131,14 +132,16 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
 
 def _tendon_table(hands: Iterable[Hand]) -> Table:
     table = table_of("hand", "finger")
-    table.add_column("tension N", justify="right")
+    for name in ("tension N", "current A"):
+        table.add_column(name, justify="right")
     table.add_column("tile")
     table.add_column("util", justify="right")
     for hand in hands:
         for finger in hand.fingers:
             worst = _worst(finger)
             cells = ("-", "-") if worst is None else (worst.phalanx, f"{worst.utilisation:.2f}")
-            table.add_row(hand.limb, finger.name, f"{finger.tendon_tension:.1f}", *cells)
+            drive = (f"{finger.tendon_tension:.1f}", f"{finger.motor_current:.3f}")
+            table.add_row(hand.limb, finger.name, *drive, *cells)
         table.add_section()
     return table
 
@@ -151,8 +154,8 @@ def _worst(finger: Finger) -> Tile | None:
 
 def _price_table(prices: Iterable[Price]) -> Table:
     table = table_of("hand", "finger", "tile", "limit")
-    table.add_column("price 1/N", justify="right")
+    table.add_column("price", justify="right")
     for price in prices:
         names = (price.limb, price.finger or "-", price.phalanx or "-", price.limit)
-        table.add_row(*names, f"{price.price:.2g}")
+        table.add_row(*names, f"{price.price:.2g} /{price.unit}")
     return table

@@ -1,0 +1,436 @@
+"""Fig. 10: the limit curve of one tile on 36-grit sandpaper, simulated, and the laws fitted to it.
+
+Seventy tiles of the spine array are pulled until they let go, five in each of fourteen directions
+of the finger plane, as in Section 6.1. The straight lines of the paper, in φ (Eq. 21) and in
+Cartesian coordinates, are fitted to them and to the array's mean, and held against the planner's
+own law. Also here: the measured strengths from which the array's asperities come, and the surface
+out of the finger plane.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from hand_models.frames import Array
+from hand_models.limit_pieces import bounds_gap, reach
+from hand_models.spine_array import SpineArray, statistics
+from hand_models.spine_calibration import (
+    LEAST_SPINES,
+    LineFit,
+    fit_lateral,
+    fit_line,
+    measured_tile_shear,
+    within_law,
+)
+from hand_models.spines import Surface
+from hand_models.studies import Claim, Progress, StudyResult, save_picture
+
+__all__ = ["plot", "run"]
+
+PRESET: Final = "sandpaper-36"
+"""The surface of the experiment."""
+
+ANGLES: Final = np.radians(np.linspace(-30.0, 67.5, 14))
+"""Loading angles φ of the trials."""
+
+REPEATS: Final = 5
+"""Trials in each direction: "each point represents data of at least 5 measurements"."""
+
+SEED: Final = 10
+"""Of the trials."""
+
+TRIALS: Final = 4000
+"""Simulated tiles for means and scatter."""
+
+CURVE: Final = np.radians(np.linspace(-30.0, 90.0, 121))
+"""Loading angles φ of the curves."""
+
+BEYOND: Final = math.radians(60.0)
+"""Where the planner's law, held beyond φ_max, is held against the array."""
+
+DIRECTIONS: Final = 100_000
+"""Random directions for volumes."""
+
+COUNTS: Final = (1, 2, 4, 8)
+"""Half-planes for which the gap is told."""
+
+
+def run(progress: Progress) -> StudyResult:
+    """Simulate the trials, the table of strengths and the surface."""
+    surface, array = Surface.named(PRESET), SpineArray.named(PRESET)
+    steps = 4
+    progress(0, steps)
+    limit = surface.pull_off_angle
+    trials = _trials(array)
+    drag = statistics(array.simulate_drag(np.random.default_rng(SEED + 1), TRIALS))
+    spread = statistics(array.simulate(np.random.default_rng(SEED + 1), TRIALS, CURVE))
+    mean = float(drag.mean) * array.share(CURVE)
+    of_trials = fit_line(np.repeat(ANGLES, REPEATS), trials.ravel(), limit)
+    of_mean = fit_line(CURVE, mean, limit)
+    straight = _cartesian_line(CURVE, mean, limit)
+    progress(1, steps)
+    table = _table()
+    progress(2, steps)
+    gaps = _gaps(surface)
+    progress(3, steps)
+    hull = _hull_over_surface(surface)
+    lateral = fit_lateral(array, limit)
+    progress(4, steps)
+    data: dict[str, Any] = {
+        "surface": PRESET,
+        "trials": {"angle": ANGLES.tolist(), "strength": trials.tolist()},
+        "array": {
+            "angle": CURVE.tolist(),
+            "mean": mean.tolist(),
+            "deviation": spread.deviation.tolist(),
+            "quantiles_5_50_95": spread.quantiles.tolist(),
+        },
+        "planner": {
+            "law": surface.strength(CURVE).tolist(),
+            "half_plane": _half_plane_reach(surface, CURVE).tolist(),
+            "shear_limit": surface.shear_limit,
+            "pull_off_limit": surface.pull_off_limit,
+            "pull_off_angle": limit,
+            "shear_scatter": surface.shear_scatter,
+        },
+        "fit_of_trials": of_trials._asdict(),
+        "fit_of_mean": of_mean._asdict(),
+        "cartesian_line_of_mean": straight,
+        "tile_shear": table,
+        "lateral_fit": lateral._asdict(),
+        "bounds": gaps,
+        "hull_over_surface": hull,
+        "not_tested": [
+            "the 70 trials of the paper match its model: both are printed in a picture only",
+        ],
+    }
+    claims = (
+        *_claims_of_the_curve(surface, array, data, of_trials, of_mean),
+        *_claims_of_the_table(table),
+        _claim_of_the_hull(hull),
+    )
+    return StudyResult("fig10", "limit curve of a spine tile on 36-grit sandpaper", data, claims)
+
+
+def _trials(array: SpineArray) -> Array:
+    """Return what the tiles of the experiment hold, a row for each direction [N]."""
+    rng = np.random.default_rng(SEED)
+    return np.stack([array.simulate(rng, REPEATS, angle) for angle in ANGLES])
+
+
+def _half_plane_reach(surface: Surface, angles: Array) -> Array:
+    """Return how far the planner's half-planes let a load in the finger plane go [N]."""
+    directions = np.column_stack([np.cos(angles), -np.sin(angles), np.zeros(len(angles))])
+    return reach(surface.pieces(), directions)
+
+
+def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
+    """Fit T + k P = T_0 to the curve up to φ_max, by least squares of the distance."""
+    within = within_law(angles, pull_off_angle)
+    points = strengths[within, None] * np.column_stack(
+        [np.cos(angles[within]), np.sin(angles[within])]
+    )
+    centre = points.mean(axis=0)
+    normal = np.linalg.svd(points - centre)[2][1]
+    normal = normal * np.sign(normal[0])
+    distance = (points - centre) @ normal
+    spread = points - centre
+    return {
+        "slope": float(normal[1] / normal[0]),
+        "shear_limit": float(normal @ centre / normal[0]),
+        "worst": float(np.abs(distance).max()),
+        "r_squared": 1.0 - float(distance @ distance) / float(np.sum(spread**2)),
+    }
+
+
+def _table() -> list[dict[str, Any]]:
+    """Simulate every cell of the measured table."""
+    cells = []
+    for concrete in ("fine", "coarse"):
+        array = SpineArray.named(f"concrete-{concrete}")
+        for cell in measured_tile_shear(concrete):
+            tile = replace(array, spines=cell.spines, backlash=cell.backlash)
+            found = statistics(tile.simulate_drag(np.random.default_rng(SEED), TRIALS))
+            cells.append(
+                {
+                    "concrete": concrete,
+                    **cell._asdict(),
+                    "simulated_mean": float(found.mean),
+                    "simulated_deviation": float(found.deviation),
+                }
+            )
+    return cells
+
+
+def _gaps(surface: Surface) -> list[dict[str, float]]:
+    directions = np.abs(np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3)))
+    directions *= (1.0, -1.0, 1.0)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    sideways = np.array([[0.0, 0.0, 1.0]])
+    gaps = []
+    for count in COUNTS:
+        pieces = replace(surface, half_planes=count)
+        lateral = float(reach(pieces.pieces(), sideways)[0]) / surface.shear_limit
+        gap = bounds_gap(pieces, directions)
+        gaps.append({"half_planes": count, "lateral_reach": lateral, **gap._asdict()})
+    return gaps
+
+
+def _hull_over_surface(surface: Surface) -> float:
+    """Return the volume of the surface's convex hull over its own, for T ≥ 0 and N ≤ 0."""
+    angle, azimuth = np.meshgrid(
+        np.linspace(0.0, math.pi / 2, 181), np.linspace(-math.pi / 2, math.pi / 2, 181)
+    )
+    radius = surface.strength(angle, azimuth)
+    points = radius[..., None] * np.stack(
+        [np.cos(angle) * np.cos(azimuth), np.cos(angle) * np.sin(azimuth), np.sin(angle)], axis=-1
+    )
+    rows = np.trapezoid(radius**3 * np.cos(angle) / 3.0, angle, axis=1)
+    own = float(np.trapezoid(rows, azimuth[:, 0]))
+    return float(ConvexHull(points.reshape(-1, 3)).volume) / own
+
+
+def _claims_of_the_curve(
+    surface: Surface,
+    array: SpineArray,
+    data: dict[str, Any],
+    of_trials: LineFit,
+    of_mean: LineFit,
+) -> tuple[Claim, ...]:
+    limit = surface.pull_off_angle
+    within = within_law(CURVE, limit)
+    # what the mean of the measurements in one direction is known to
+    error = float(np.mean(np.array(data["array"]["deviation"])[within])) / math.sqrt(REPEATS)
+    line = data["cartesian_line_of_mean"]
+    pressed = CURVE[CURVE < 0.0]
+    force = array.share(pressed)
+    gained = np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0]
+    ratio = surface.pull_off_limit / surface.shear_limit
+    coarse = Surface.named("concrete-coarse").shear_limit / surface.shear_limit
+    rock = Surface.named("rock").shear_limit / surface.shear_limit
+    beyond = float(array.share(BEYOND))
+    kept = surface.strength(BEYOND) / surface.shear_limit
+    return (
+        Claim(
+            "attachment is approximately linear with the loading angle (Appendix 9.4)",
+            f"off by less than five measurements can tell, {error:.1f} N",
+            f"off by up to {of_mean.worst:.1f} N, R² {of_mean.r_squared:.2f}",
+            of_mean.worst <= error,
+        ),
+        Claim(
+            "the limit curve is nearly a straight line in Cartesian coordinates (Section 6.1)",
+            f"off by less than five measurements can tell, {error:.1f} N",
+            f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}",
+            line["worst"] <= error,
+        ),
+        Claim(
+            "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
+            surface.shear_limit,
+            of_trials.shear_limit,
+            abs(of_trials.shear_limit - surface.shear_limit) <= surface.shear_scatter,
+            role="calibration",
+        ),
+        Claim(
+            "f_smin / f_smax at 45° is that of the fit to Fig. 13",
+            ratio,
+            float(array.share(limit)),
+            abs(float(array.share(limit)) - ratio) <= 0.01 * ratio,
+            role="calibration",
+        ),
+        Claim(
+            "beyond 45° (not published) the planner's constant f_smin: f_s / f_smax at 60°",
+            float(kept),
+            beyond,
+            beyond >= float(kept),
+        ),
+        Claim(
+            "under positive normal forces conventional Coulomb friction applies (Section 6.1)",
+            array.tile_friction,
+            float(gained),
+            abs(float(gained) - array.tile_friction) <= 1e-6,
+        ),
+        Claim(
+            "the force on rock is 2 to 5 times greater (Section 6): coarse concrete, as measured",
+            "2 to 5",
+            coarse,
+            2.0 <= coarse <= 5.0,
+        ),
+        Claim(
+            "the force on rock is 2 to 5 times greater (Section 6): the planner's rock",
+            "2 to 5",
+            rock,
+            2.0 <= rock <= 5.0,
+            role="calibration",
+        ),
+    )
+
+
+def _claims_of_the_table(table: list[dict[str, Any]]) -> tuple[Claim, ...]:
+    claims = []
+    for fitted, spines in ((True, "20, 40, 60"), (False, "5, 10")):
+        cells = [cell for cell in table if (cell["spines"] >= LEAST_SPINES) == fitted]
+        off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
+        claims.append(
+            Claim(
+                f"strength of tiles of {spines} spines, 2 concretes, 2 backlashes ([16], Fig. 7)",
+                "within the bars",
+                f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less",
+                max(off) <= 1.0,
+                role="calibration" if fitted else "test",
+            )
+        )
+    for concrete in ("fine", "coarse"):
+        cells = [
+            cell
+            for cell in table
+            if cell["spines"] >= LEAST_SPINES and cell["concrete"] == concrete
+        ]
+        ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
+        claims.append(
+            Claim(
+                f"scatter of those tiles on {concrete} concrete, over the length of its bar",
+                "0.5 to 1.5",
+                f"{min(ratios):.2f} to {max(ratios):.2f}",
+                min(ratios) >= 0.5 and max(ratios) <= 1.5,
+            )
+        )
+    return tuple(claims)
+
+
+def _claim_of_the_hull(hull: float) -> Claim:
+    return Claim(
+        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
+        "> 1",
+        hull,
+        hull > 1.01,
+    )
+
+
+def plot(result: StudyResult, folder: Path) -> list[Path]:
+    """Draw the limit curve, the table of strengths, and the surface seen from the pull."""
+    return [
+        save_picture(_draw_curve(result.data), folder / "fig10.png"),
+        save_picture(_draw_table(result.data), folder / "fig10_tile_shear.png"),
+        save_picture(_draw_surface(), folder / "fig10_surface.png"),
+    ]
+
+
+def _draw_curve(data: dict[str, Any]) -> Figure:
+    figure = Figure(figsize=(13.0, 5.0), layout="constrained")
+    polar, cartesian = figure.subplots(1, 2)
+    angles = np.array(data["array"]["angle"])
+    curves = (
+        (np.array(data["array"]["mean"]), "tab:blue", "-", "spine array, mean"),
+        (np.array(data["planner"]["law"]), "k", "-", "planner, Eq. 21"),
+        (np.array(data["planner"]["half_plane"]), "k", ":", "planner, half-planes"),
+    )
+    fit, limit = data["fit_of_trials"], data["planner"]["pull_off_angle"]
+    fitted = np.linspace(0.0, limit, 46)
+    line = fit["shear_limit"] + (fit["pull_off_limit"] - fit["shear_limit"]) * fitted / limit
+    low, _, high = np.array(data["array"]["quantiles_5_50_95"])
+    of_trials = np.repeat(data["trials"]["angle"], REPEATS)
+    strengths = np.array(data["trials"]["strength"]).ravel()
+
+    polar.axvspan(-30.0, 0.0, color="0.9")
+    polar.fill_between(np.degrees(angles), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
+    polar.plot(np.degrees(of_trials), strengths, ".", color="tab:blue", alpha=0.6)
+    polar.plot(np.degrees(fitted), line, color="tab:red", label="Eq. 21 fitted to the trials")
+    cartesian.axhspan(0.0, -20.0, color="0.9")
+    cartesian.plot(
+        strengths * np.cos(of_trials),
+        strengths * np.sin(of_trials),
+        ".",
+        color="tab:blue",
+        alpha=0.6,
+        label="70 simulated trials",
+    )
+    cartesian.plot(line * np.cos(fitted), line * np.sin(fitted), color="tab:red")
+    for strength, colour, style, label in curves:
+        polar.plot(np.degrees(angles), strength, style, color=colour, label=label)
+        cartesian.plot(strength * np.cos(angles), strength * np.sin(angles), style, color=colour)
+    polar.set(
+        xlabel="loading angle φ from shear toward pull-off [°]; grey: pressed",
+        ylabel="largest force [N]; band: 5 to 95 % of tiles",
+        title="over the loading angle",
+        xlim=(-30.0, 90.0),
+        ylim=(0.0, 60.0),
+    )
+    cartesian.set(
+        xlabel="shear [N]",
+        ylabel="pull-off [N]; grey: pressed",
+        title="in Cartesian coordinates",
+        xlim=(0.0, 50.0),
+        ylim=(-20.0, 20.0),
+    )
+    polar.legend()
+    cartesian.legend()
+    for axes in (polar, cartesian):
+        axes.grid(alpha=0.3)
+    return figure
+
+
+def _draw_table(data: dict[str, Any]) -> Figure:
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    highest = 1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"])
+    for axes, concrete in zip(figure.subplots(1, 2, sharey=True), ("fine", "coarse"), strict=True):
+        cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
+        ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
+        for (backlash, group), colour in zip(ordered, ("tab:blue", "tab:orange"), strict=True):
+            rows = list(group)
+            spines, mean, error, simulated, deviation = (
+                np.array([row[key] for row in rows])
+                for key in ("spines", "mean", "error", "simulated_mean", "simulated_deviation")
+            )
+            name = f"{1e3 * backlash:g} mm of play"
+            axes.errorbar(
+                spines, mean, error, fmt="o", color=colour, capsize=3, label=f"measured, {name}"
+            )
+            axes.plot(spines, simulated, color=colour, label=f"simulated, {name}")
+            axes.fill_between(
+                spines, simulated - deviation, simulated + deviation, color=colour, alpha=0.15
+            )
+        axes.set(xlabel="spines of a tile [1]", title=f"{concrete} concrete", ylim=(0.0, highest))
+        axes.grid(alpha=0.3)
+        axes.legend(loc="upper left")
+    figure.axes[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
+    return figure
+
+
+def _draw_surface() -> Figure:
+    """Draw the strength over the azimuth at three loading angles."""
+    surface, array = Surface.named(PRESET), SpineArray.named(PRESET)
+    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
+    azimuth = np.radians(np.linspace(-90.0, 90.0, 181))
+    share = (0.0, 0.5, 1.0)
+    for axes, part in zip(figure.subplots(1, 3), share, strict=True):
+        angle = part * surface.pull_off_angle
+        along, aside = np.cos(angle) * np.cos(azimuth), np.cos(angle) * np.sin(azimuth)
+        directions = np.column_stack([along, np.full(len(along), -math.sin(angle)), aside])
+        drag = float(surface.strength(angle)) / float(array.share(angle))
+        radii: list[tuple[Array, str, str, str]] = [
+            (drag * array.share(angle, azimuth), "tab:blue", "-", "spine array, to its level"),
+            (surface.strength(angle, azimuth), "k", "-", "planner's surface"),
+        ]
+        for count, style in ((1, ":"), (4, "--")):
+            pieces = replace(surface, half_planes=count).pieces()
+            radii.append((reach(pieces, directions), "k", style, f"half-planes: {count}"))
+        for radius, colour, style, label in radii:
+            axes.plot(radius * along, radius * aside, style, color=colour, label=label)
+        axes.set(
+            xlabel="shear [N]",
+            ylabel="lateral load [N]",
+            title=f"pulled at φ = {math.degrees(angle):g}°",
+            aspect="equal",
+        )
+        axes.grid(alpha=0.3)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure

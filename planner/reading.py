@@ -1,0 +1,118 @@
+"""From a hand's loads y to what each tile, tendon, motor and the palm carry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
+from hand_models.frames import Array
+from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.wrench_space import WrenchSpace
+from planner.plan import FingerPlan, HandPlan, PalmPlan, TileLoad
+
+__all__ = ["read_hand"]
+
+
+def read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:
+    """Turn one hand's loads y into tile loads and forces.
+
+    What may not be negative and is, by rounding, counts as zero.
+
+    Parameters
+    ----------
+    limb : str
+    settled : SettledHand
+    space : WrenchSpace
+        Its set.
+    y : ndarray, shape (m,)
+        A load for each of the set's columns [N].
+    """
+    column = {name: i for i, name in enumerate(space.columns)}
+    signed = np.array([name.endswith(("/lateral", "/nail")) for name in space.columns])
+    y = np.where(signed, y, np.maximum(y, 0.0))
+
+    def load(name: str) -> float:
+        return float(y[column[name]]) if name in column else 0.0
+
+    tensions = np.array([load(f"{finger}/tension") for finger in FINGERS])
+    laterals = np.array([load(f"{finger}/lateral") for finger in FINGERS])
+    axials = np.array([load(f"{finger}/nail") for finger in FINGERS])
+    loads = settled.tile_loads(tensions, laterals, axials)
+    forces = np.einsum("tk,tkx->tx", loads, settled.axes)
+    pieces = settled.surface.pieces()
+    planes = np.array([(p.a_shear, p.a_normal, p.a_lateral) for p in pieces])
+    capacities = np.array([p.capacity for p in pieces])
+    magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
+    used = np.where(settled.touching, (magnitudes @ planes.T / capacities).max(axis=1), 0.0)
+    limits = {int(t): (settled.nail_limit(int(t)),) for t in np.flatnonzero(settled.nails)}
+    for t, (limit,) in limits.items():
+        used[t] = (limit.a_shear * loads[t, 0] + limit.a_normal * loads[t, 1]) / limit.capacity
+    used = np.maximum(used, 0.0)
+    drive = settled.hand.drive
+    losses = (1.0 - settled.hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0)
+    fingers = []
+    for i, finger in enumerate(FINGERS):
+        own = np.flatnonzero(settled.finger_of == i)
+        dragged = [t for t in own if settled.tiles[t].phalanx != NAIL]
+        tension = float(tensions[i])
+        tiles = tuple(
+            TileLoad(
+                phalanx=settled.tiles[t].phalanx,
+                contact=settled.tiles[t].contact,
+                position=settled.positions[t],
+                force=forces[t],
+                shear=float(loads[t, 0]),
+                normal=float(loads[t, 1]),
+                lateral=float(loads[t, 2]),
+                shear_axis=settled.axes[t, 0],
+                normal_axis=settled.axes[t, 1],
+                lateral_axis=settled.axes[t, 2],
+                utilisation=float(used[t]),
+                load_at_zero=settled.loads[t, :, 0],
+                load_per_newton=settled.loads[t, :, 1],
+                half_planes=limits.get(int(t), pieces),
+            )
+            for t in own
+        )
+        fingers.append(
+            FingerPlan(
+                name=finger,
+                tendon_tension=tension,
+                motor_torque=drive.torque(tension),
+                motor_current=drive.current(tension),
+                winch_angle=drive.winch_angle(
+                    settled.fingers[i],
+                    tension,
+                    loads[dragged, 0],
+                    losses[: len(dragged)],
+                    settled.hand.nail.pulley_radius * float(settled.nail_angles[i]),
+                ),
+                tiles=tiles,
+            )
+        )
+    shear, pressing = load(PALM_SHEAR), load(PALM_PRESSING)
+    palm = PalmPlan(
+        position=settled.palm.centre,
+        force=np.array([-shear, 0.0, pressing]),
+        moment=np.zeros(3),
+        engaged=settled.palm.engaged,
+        utilisation=(
+            max(shear / settled.palm.shear_limit, pressing / settled.palm.pressing_limit)
+            if settled.palm.engaged
+            else 0.0
+        ),
+    )
+    wrench = np.concatenate([palm.force, np.cross(palm.position, palm.force)])
+    wrench = wrench + np.concatenate(
+        [forces.sum(axis=0), np.cross(settled.positions, forces).sum(axis=0)]
+    )
+    return HandPlan(
+        limb=limb,
+        wrench=wrench,
+        fingers=tuple(fingers),
+        palm=palm,
+        utilisation=max(0.0, float(space.utilisations(y).max())),
+        seating=settled.seating,
+        space=space,
+    )
