@@ -77,6 +77,8 @@ def full_request() -> dict:
         "lateral_limit": 20.0,
         "compression_gain": 0.1,
         "half_planes": 3,
+        "lateral_pull_off_ratio": 0.6,
+        "shear_scatter": 12.0,
     }
     fourth["wrist"] = "fixed"
     request["stance"] |= {"robot": "robosimian", "gravity": [0.0, 0.0, -3.7]}

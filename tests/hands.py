@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from rocks import random_axes
@@ -16,9 +17,12 @@ from hand_models import (
     Pose,
     SettledHand,
     Sphere,
+    SpinyHand,
     Surface,
+    WrenchSpace,
     spiny_hand,
 )
+from hand_models.parameters import ParameterTable, Quantity, hand_table
 
 HAND = spiny_hand()
 ROCK = Surface.named("rock")
@@ -28,6 +32,26 @@ PINCH = Grasp(outer_rotation=math.pi)
 def pinch(diameter: float = 0.3, surface: Surface = ROCK, **grasp) -> SettledHand:
     """A hand that pinches a cylinder, seated."""
     return HAND.settle(Cylinder(diameter), surface, Grasp(outer_rotation=math.pi, **grasp))
+
+
+def changed_hand(section: str, name: str, value: float) -> SpinyHand:
+    """The SpinyHand with one number of its own."""
+    unit = hand_table().quantity(section, name).unit
+    own = {section: {name: Quantity(value, unit, "assumed", "of a test")}}
+    return SpinyHand(hand_table().replaced(ParameterTable(own)))
+
+
+def without_hand_load(space: WrenchSpace) -> WrenchSpace:
+    """The same set without its wrench rows, those of the whole hand's force."""
+    kept = len(space.s) - len(space.D)
+    return replace(
+        space,
+        rows=(*space.rows[:kept], *space.rows[len(space.s) :]),
+        L=space.L[:kept],
+        l0=space.l0[:kept],
+        s=space.s[:kept],
+        D=np.zeros((0, 6)),
+    )
 
 
 def random_surface(rng: np.random.Generator) -> Surface:

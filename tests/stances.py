@@ -14,8 +14,9 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose, wrench_transport
-from hand_models.hand import Grasp
+from hand_models.hand import Grasp, spiny_hand
 from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
 from hand_models.spines import Surface
 from planner.plan import Plan
@@ -124,20 +125,28 @@ def random_stance(rng: np.random.Generator) -> Stance:
         closing = None if rng.random() < 0.5 else rng.uniform(20.0, 60.0)
         given = None
         if rng.random() < 0.4:
-            # a little off the palm and askew; never deeper in it than the spines' travel
+            # a little off the palm and askew
             askew = Rotation.from_rotvec(rng.uniform(-0.04, 0.04, 3)).as_matrix()
             given = Pose(rng.uniform([-0.03, -0.03, 0.0], [0.03, 0.03, 0.012]), askew)
-        hands.append(
-            HandOnHold(
-                str(limb),
-                body @ Pose(place, PALM_TO_WALL @ turn.as_matrix()),
-                random_hold(rng),
-                random_surface(rng),
-                hold_in_hand=given,
-                grasp=Grasp(rotation, closing, rng.random() < 0.85, rng.random() < 0.85),
-            )
+        hand = HandOnHold(
+            str(limb),
+            body @ Pose(place, PALM_TO_WALL @ turn.as_matrix()),
+            random_hold(rng),
+            random_surface(rng),
+            hold_in_hand=given,
+            grasp=Grasp(rotation, closing, rng.random() < 0.85, rng.random() < 0.85),
         )
+        hands.append(hand if possible(hand) else replace(hand, hold_in_hand=None))
     return Stance(tuple(hands), body)
+
+
+def possible(hand: HandOnHold) -> bool:
+    """Whether the rock does not stand in the hand."""
+    try:
+        spiny_hand().settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+    except InvalidInputError:
+        return False
+    return True
 
 
 def attainable_wrench(stance: Stance, rng: np.random.Generator) -> np.ndarray:

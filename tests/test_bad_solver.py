@@ -7,7 +7,7 @@ import peer
 import pytest
 from stances import CALIBRATION_LOAD, ask, on_wall
 
-from hand_models.holds import Cylinder, Edge, Plane
+from hand_models.holds import Cylinder, Plane
 from planner import program
 from planner.program import Outcome
 from planner.solve import hand_space, plan
@@ -72,7 +72,7 @@ def gently(tension: float, hold, closing_tension: float) -> tuple[Question, tupl
     ("tension", "hold", "closing_tension", "words"),
     [
         (28.0, Cylinder(0.3), 37.0, "dragged backwards"),
-        (25.0, Edge(0.02, 0.6), 25.0, "leave its stop"),
+        (32.3, Cylinder(0.07), 37.0, "leave its stop"),
     ],
 )
 def test_a_solver_that_ignores_a_hard_row_gets_failed(

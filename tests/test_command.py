@@ -11,7 +11,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import trimesh
 from asked import HEAVY, flat_request, put, wall_request
+from rocks import cylinder_mesh
 from test_service import ROOT, Served, free_endpoint
 
 from service import command, dispatch
@@ -138,7 +140,7 @@ def test_a_stance_from_standard_input(
     assert result(capfd)["id"] == "wall"
 
 
-@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab"])
+@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab", "boulders"])
 def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert name in bundled()
     assert run(["plan", name, "--json"]) in (DONE, OVERLOADED)
@@ -203,6 +205,59 @@ def test_a_picture_of_a_wrench_space(stance, tmp_path: Path) -> None:
     arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
     assert run([*arguments, "--plot", str(picture), "--json"]) == DONE
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_of_a_hand_that_can_carry_nothing(stance, tmp_path: Path) -> None:
+    request = flat_request()
+    # a tile of this surface is overloaded as soon as the finger closes
+    request["stance"]["hands"][0]["surface"] = {"shear_limit": 0.01}
+    picture = tmp_path / "space.png"
+    arguments = ["wrench-space", stance(request), "--hand", "front_left", "--plot", str(picture)]
+    assert run([*arguments, "--json"]) == OVERLOADED
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+# Holds in files -----------------------------------------------------------------------------------
+
+
+def scanned(file: str) -> dict:
+    request = wall_request()
+    for hand in request["stance"]["hands"]:
+        hand["hold"] = {"shape": "mesh", "file": file}
+    return request
+
+
+def test_a_scan_is_read_beside_the_stance_that_names_it(
+    stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    trimesh.Trimesh(*cylinder_mesh(0.3), process=False).export(tmp_path / "log.stl")
+    assert run(["plan", stance(wall_request()), "--json"]) == DONE
+    want = result(capfd)
+    assert run(["plan", stance(scanned("log.stl")), "--json"]) == DONE
+    assert result(capfd)["load_factor"] == pytest.approx(want["load_factor"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(None, "no such file"), (b"solid\nendsolid\n", "no triangles")]
+)
+def test_a_scan_that_cannot_be_read(
+    content: bytes | None, words: str, stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        (tmp_path / "rock.stl").write_bytes(content)
+    assert run(["plan", stance(scanned("rock.stl"))]) == BAD_INPUT
+    error = complaint(capfd)
+    assert error.startswith("crux: stance.hands[0].hold.file: ")
+    assert words in error
+    assert "rock.stl" in error
+
+
+def test_a_scan_is_in_a_file_or_in_the_message_not_in_both(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = put(scanned("a.stl"), ("stance", "hands", 0, "hold", "vertices"), [])
+    assert run(["plan", stance(request)]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: stance.hands[0].hold.file: give a file, or ")
 
 
 @pytest.mark.parametrize("picture", ["space.xyz", "no/folder/space.png"])

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stances import ask, on_wall
+from hands import changed_hand
+from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models.frames import Pose
 from hand_models.holds import Plane
 from planner.solve import plan, settle
-from planner.stance import Question
+from planner.stance import Limits, Question
 from service import questions
 from service.stances import read_request
 
@@ -24,9 +25,27 @@ def bundled(name: str) -> Question:
 @pytest.mark.parametrize("name", ["wall-300", "overhang", "slab"])
 def test_of_limits_that_tie_the_dearest_is_named(name: str):
     answer = plan(bundled(name))
-    dearest = answer.prices[0].price
-    named = next(p.price for p in answer.prices if p.name == answer.limiting)
-    assert named == pytest.approx(dearest, rel=1e-3)
+    assert answer.limiting == answer.prices[0].name
+
+
+def test_of_a_tendon_and_a_motor_as_strong_as_it_the_tendon_is_named():
+    stance = on_wall()
+    motor = stance.robot.hand.drive.torque(60.0)
+    robot = replace(stance.robot, hand=changed_hand("motor", "maximum_torque", motor))
+    question = ask(replace(stance, robot=robot), limits=Limits(tendon_tension=60.0))
+    answer = plan(question)
+    assert answer.limiting.limit == "tendon_tension"
+    assert f"would carry {60.0 * answer.utilisation:.0f} N of 60 N" in answer.reason
+
+
+def test_what_a_hand_holds_is_told_with_what_it_would_hold_in_that_direction():
+    answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, mass=112.0)))
+    assert answer.limiting.limit == "hand_load"
+    hand = next(h for h in answer.hands if h.limb == answer.limiting.limb)
+    force = float(np.linalg.norm(np.minimum(hand.wrench[:3], [np.inf, np.inf, 0.0])))
+    most = force / answer.utilisation
+    assert f"the hand holds {force:.0f} N of {most:.0f} N" in answer.reason
+    assert most <= 50.0 * 9.80665
 
 
 def test_a_tiles_force_is_told_with_what_it_holds_in_that_direction():

@@ -15,7 +15,8 @@ from rocks import distance, random_axes, random_hold
 
 from hand_models import Plane, spiny_hand
 from hand_models.finger import Contact, SettledFinger
-from hand_models.holds import FlatSection, RoundSection
+from hand_models.sections import LEVEL, FlatSection, RoundSection
+from hand_models.settling import settle
 
 MODEL = spiny_hand().finger
 L, H = MODEL.joint_spacing, MODEL.tile_height
@@ -29,7 +30,7 @@ def on_circle(radius, first_contact=0.0247, first_angle=0.25):
     u = np.array([math.cos(first_angle), math.sin(first_angle)])
     n = np.array([-u[1], u[0]])
     centre = first_contact * u + (radius + H) * n
-    return MODEL.settle(RoundSection((float(centre[0]), float(centre[1])), radius), (0.0, 0.0))
+    return settle(MODEL, RoundSection((float(centre[0]), float(centre[1])), radius), (0.0, 0.0))
 
 
 def random_finger(seed):
@@ -41,7 +42,7 @@ def random_finger(seed):
         # a joint from which a tile can lie tangent to rock of little curvature
         below = hold.entry(origin, np.array([0.0, 0.0, 1.0]))
         origin[2] += (below if math.isfinite(below) else 0.0) - H - rng.uniform(0.0, 0.005)
-    finger = MODEL.settle(hold.section(origin, axes[:, 0], axes[:, 2]), (0.0, 0.0))
+    finger = settle(MODEL, hold.section(origin, axes[:, 0], axes[:, 2]), (0.0, 0.0))
 
     def clearance(points):
         return distance(hold, origin + points[..., :1] * axes[:, 0] + points[..., 1:] * axes[:, 2])
@@ -78,38 +79,61 @@ def test_contacts_lie_on_the_rock_and_tangent_faces_do_not_cut_it(seed):
     for contact, point, u in zip(finger.contacts, finger.points, finger.directions, strict=True):
         if contact.kind == "none":
             continue
-        # spines at an edge reach across a gap; a face is on the rock
+        # spines at an edge reach across a gap; a face or a frame is on the rock
         gap = clearance(point)
-        assert -1e-9 < gap < (1e-9 if contact.kind == "face" else MODEL.spine_travel + 1e-9)
-        assert near - 1e-12 <= contact.along <= far + 1e-12
-        face = point + np.linspace(near - contact.along, far - contact.along, 41)[:, None] * u
-        if contact.kind == "face" and contact.along != MODEL.tile_centre:
-            assert clearance(face).min() > -1e-9
+        if contact.kind == "edge":
+            assert -1e-9 < gap < MODEL.spine_travel + 1e-9
+            assert contact.along in (near, far)
+        else:
+            assert -1e-9 < gap < (LEVEL if contact.along == MODEL.tile_centre else 1e-9)
+            assert (near < contact.along < far) == (contact.kind == "face")
+            assert contact.along <= L
+        face = point + np.linspace(near - contact.along, L - contact.along, 41)[:, None] * u
+        assert clearance(face).min() > -1e-9
 
 
-def test_a_tile_whose_phalanx_touches_beyond_it_reaches_across_with_its_edge_if_spines_can():
+def off_disc(stand_off, radius=0.3):
+    """A finger whose joint is off the crest of a disc."""
+    centre = np.array([0.0, stand_off + radius])
+    return settle(MODEL, RoundSection((0.0, float(centre[1])), radius), (0.0, 0.0)), centre
+
+
+def test_a_phalanx_that_touches_beyond_its_tile_holds_by_its_edge_if_spines_reach():
     """On a disc of 600 mm, from joints farther and farther off it."""
     radius, far = 0.3, MODEL.tile_range[1]
-    for stand_off, kind in ((0.006, "face"), (0.012, "edge"), (0.02, "none")):
-        centre = np.array([0.0, stand_off + radius])
-        section = RoundSection((0.0, float(centre[1])), radius)
-        contact = MODEL.settle(section, (0.0, 0.0)).contacts[0]
-        # the phalanx itself is tangent, at the length of the tangent from its joint
+    for stand_off, kind in ((0.006, "face"), (0.007, "edge"), (0.012, "edge")):
+        finger, centre = off_disc(stand_off)
+        contact = finger.contacts[0]
+        assert contact.kind == kind
+        # tangent at the length of the tangent from the joint, or with the end of the phalanx
         tangent = math.sqrt((radius + stand_off) ** 2 - (radius + H) ** 2)
         bearing = math.pi / 2 - math.asin((radius + H) / (radius + stand_off))
-        gap = math.hypot(radius, max(tangent - far, 0.0)) - radius
-        assert contact.kind == kind
-        assert contact.angle == pytest.approx(bearing, abs=1e-9)
-        assert (gap > 0.0, gap > 0.005) == (kind != "face", kind == "none")
-        if kind != "none":
-            assert contact.along == pytest.approx(min(tangent, far), abs=1e-9)
-            off = np.hypot(*(contact.point(H) - centre)) - radius
-            assert off == pytest.approx(gap, abs=1e-9)
+        if tangent <= L:
+            assert contact.angle == pytest.approx(bearing, abs=1e-9)
+        else:
+            end = np.hypot(*(replace(contact, along=L).point(H) - centre))
+            assert contact.angle > bearing
+            assert end == pytest.approx(radius, abs=1e-9)
+        assert contact.along == pytest.approx(min(tangent, far), abs=1e-9)
+        gap = np.hypot(*(contact.point(H) - centre)) - radius
+        assert (1e-6 < gap < MODEL.spine_travel) == (kind == "edge")
+
+
+def test_a_bare_frame_presses_where_spines_cannot_reach():
+    """A rung of 6 mm under the end of the first phalanx, 30 degrees down."""
+    angle = math.radians(30.0)
+    u = np.array([math.cos(angle), math.sin(angle)])
+    n = np.array([-u[1], u[0]])
+    centre = 0.042 * u + (H + 0.003) * n
+    contact = settle(MODEL, RoundSection((centre[0], centre[1]), 0.003), (0.0, 0.0)).contacts[0]
+    assert (contact.kind, contact.stop) == ("frame", None)
+    assert contact.angle == pytest.approx(angle, abs=1e-9)
+    assert contact.along == pytest.approx(0.042, abs=1e-9)
 
 
 def test_from_a_joint_close_to_the_rock_a_tile_touches_with_its_near_edge():
     section = RoundSection((0.0, 0.303), 0.3)
-    contact = MODEL.settle(section, (0.0, 0.0)).contacts[0]
+    contact = settle(MODEL, section, (0.0, 0.0)).contacts[0]
     assert (contact.kind, contact.along) == ("edge", MODEL.tile_range[0])
     assert np.hypot(*(contact.point(H) - np.array([0.0, 0.303]))) == pytest.approx(0.3, abs=1e-9)
 
@@ -117,28 +141,28 @@ def test_from_a_joint_close_to_the_rock_a_tile_touches_with_its_near_edge():
 @settings(max_examples=200, deadline=None)
 @given(seeds)
 def test_phalanges_form_a_chain_within_their_joints_limits(seed):
-    finger, clearance = random_finger(seed)
+    finger, _ = random_finger(seed)
     q = finger.joint_angles
     assert (q >= np.array(MODEL.joint_lower) - 1e-9).all()
     assert (q <= np.array(MODEL.joint_upper) + 1e-9).all()
     c = [contact.along for contact in finger.contacts]
     np.testing.assert_allclose(finger.points, reached(q, c, [H] * 3), atol=1e-12)
     limits = zip(MODEL.joint_lower, MODEL.joint_upper, strict=True)
-    for touches, point, angle, ends in zip(finger.touching, finger.points, q, limits, strict=True):
-        if not touches:
-            at_a_stop = min(abs(angle - end) for end in ends) < 1e-9
-            assert at_a_stop or clearance(point) > MODEL.spine_travel
+    for contact, angle, (lower, upper) in zip(finger.contacts, q, limits, strict=True):
+        assert (contact.stop is None) == (contact.kind != "none")
+        if contact.stop is not None:
+            assert angle == pytest.approx({"lower": lower, "upper": upper}[contact.stop])
 
 
 def test_on_flat_rock_at_tile_height_every_tile_lies_flat_at_its_centre():
-    finger = MODEL.settle(FlatSection((0.0, 1.0), H), (0.0, 0.0))
+    finger = settle(MODEL, FlatSection((0.0, 1.0), H), (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, 0.0, atol=1e-12)
     assert [c.along for c in finger.contacts] == [MODEL.tile_centre] * 3
     assert all(finger.touching)
 
 
 def test_without_rock_a_finger_closes_fully_and_carries_nothing():
-    finger = MODEL.settle(None, (0.0, 0.0))
+    finger = settle(MODEL, None, (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, MODEL.joint_upper)
     shears = finger.shears(37.0)
     np.testing.assert_array_equal(shears, 0.0)
@@ -186,7 +210,7 @@ def test_joints_balance_by_virtual_work(seed, tension, closing, base_tile, frict
     size = 1.0 + np.abs(normal).max()
     # a free joint balances; a stop pushes back what is left at a joint that touches nothing
     np.testing.assert_allclose(torque, stop, atol=1e-8 * size)
-    np.testing.assert_array_equal(stop[list(finger.touching)], 0.0)
+    np.testing.assert_array_equal(stop[list(finger.free)], 0.0)
 
 
 @settings(max_examples=100, deadline=None)
@@ -194,17 +218,17 @@ def test_joints_balance_by_virtual_work(seed, tension, closing, base_tile, frict
 def test_tiles_that_touch_nothing_carry_nothing_and_leave_the_equations(seed, tension):
     finger, _ = random_finger(seed)
     shear, normal, _ = (v.sum(axis=1) for v in loads(finger, tension))
-    idle = ~np.array(finger.touching)
-    np.testing.assert_array_equal(shear[idle], 0.0)
-    np.testing.assert_array_equal(normal[idle], 0.0)
+    kinds = np.array([contact.kind for contact in finger.contacts])
+    np.testing.assert_array_equal(shear[(kinds == "none") | (kinds == "frame")], 0.0)
+    np.testing.assert_array_equal(normal[kinds == "none"], 0.0)
 
 
 def test_with_its_middle_tile_in_the_air_two_phalanges_become_one_link():
     """Section 5.7, by hand: distal joint first, then the proximal one with both contacts."""
     angle = 0.3
     straight = [
-        Contact(angle, (i * L * math.cos(angle), i * L * math.sin(angle)), 0.02, kind)
-        for i, kind in enumerate(("face", "none", "face"))
+        Contact(angle, (i * L * math.cos(angle), i * L * math.sin(angle)), 0.02, kind, stop)
+        for i, (kind, stop) in enumerate((("face", None), ("none", "upper"), ("face", None)))
     ]
     finger = SettledFinger(MODEL, tuple(straight))
     f, r, k = 50.0, MODEL.pulley_radii, 0.05
@@ -250,5 +274,5 @@ def test_a_wall_turned_away_from_the_finger_is_not_touched():
     tilt = 0.9  # rad: steeper than the hyperextension of the first joint allows
     s = np.array([math.cos(tilt), 0.0, -math.sin(tilt)])
     t = np.array([math.sin(tilt), 0.0, math.cos(tilt)])
-    finger = MODEL.settle(plane.section([0.0, 0.0, -0.05], s, t), (0.0, 0.0))
+    finger = settle(MODEL, plane.section([0.0, 0.0, -0.05], s, t), (0.0, 0.0))
     assert not finger.touching[0]

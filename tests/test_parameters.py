@@ -6,15 +6,28 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError, SpinyHand
-from hand_models.parameters import ParameterTable, hand_table, surface_table
+from hand_models.parameters import (
+    ParameterTable,
+    experiment_table,
+    hand_table,
+    scan_table,
+    spine_table,
+    surface_table,
+)
 
 ENTRIES = [
     (f"{file}:{section}.{name}", quantity)
-    for file, table in (("hand", hand_table()), ("surfaces", surface_table()))
+    for file, table in (
+        ("hand", hand_table()),
+        ("surfaces", surface_table()),
+        ("spines", spine_table()),
+        ("scan", scan_table()),
+        ("experiments", experiment_table()),
+    )
     for section, name, quantity in table
 ]
 
-SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1"}
+SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1", "A", "N·m/A", "m/s²"}
 
 PRINTED = {
     # from the SpinyHand paper: mass and tension (Section 2), springs (3.2), palm (4), pulleys (4.2)
@@ -27,7 +40,16 @@ PRINTED = {
     ("tile", "spine_travel"): (0.005, "m"),
     ("palm", "length"): (0.11, "m"),
     ("palm", "pulley_friction"): (0.34, "1"),
+    # gear (Section 2), driver (9.1); strengths (Sections 2 and 3.2)
+    ("motor", "gear_ratio"): (236.0, "1"),
+    ("motor", "driver_current"): (15.0, "A"),
+    ("structure", "finger_shear"): (500.0, "N"),
+    ("structure", "fingertip_force"): (600.0, "N"),
+    ("structure", "held_mass"): (50.0, "kg"),
 }
+
+TENDON = {("tendon", "entry_friction")}
+"""Read by the stick–slip model of a finger's tendon alone."""
 
 UNUSED = {("palm", "tile_size")}
 """Known of the hand, but of no effect on any model."""
@@ -70,7 +92,7 @@ def test_distal_pulley_is_not_larger_than_middle():
 
 @pytest.mark.parametrize(
     ("section", "name"),
-    [(s, n) for s, n, _ in hand_table() if (s, n) not in UNUSED],
+    [(s, n) for s, n, _ in hand_table() if (s, n) not in UNUSED | TENDON],
 )
 def test_the_hand_misses_any_number_by_name(section, name):
     sections = {s: dict(entries) for s, entries in hand_table().sections.items()}

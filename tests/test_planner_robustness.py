@@ -119,7 +119,7 @@ ANSWERED = {
         ),
         "overloaded",
     ),
-    "nearly flat edge": (on_wall(Edge(0.01, math.pi - 1e-9)), "infeasible"),
+    "nearly flat edge": (on_wall(Edge(0.01, math.pi - 1e-9)), "overloaded"),
 }
 
 

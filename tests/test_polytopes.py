@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
 from hand_models.errors import SolverError, UnsupportedError
+from hand_models.polytopes import Faces, clipped
 from hand_models.wrench_space import SCALE, Row
 
 seeds = st.integers(0, 2**32 - 1)
@@ -279,3 +280,65 @@ def test_a_limit_needs_a_capacity_above_zero(capacity):
             np.zeros(6), np.ones((6, 1)), ("y",), (row,), np.ones((1, 1)), np.zeros(1),
             np.array([capacity]), np.zeros((0, 1)), np.zeros(0),
         )  # fmt: skip
+
+
+# Clipping ---------------------------------------------------------------------------------------
+
+
+def cube(r):
+    """Vertices and facets of [0, 1]^r."""
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=r)))
+    return corners, Faces(np.vstack([np.eye(r), -np.eye(r)]), np.repeat([1.0, 0.0], r))
+
+
+@pytest.mark.parametrize("r", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("part", [0.5, 1.0])
+def test_the_corner_of_a_cube_is_a_simplex(r, part):
+    """Of sides ``part`` of the cube's: r + 1 vertices and facets, but r of each on the line."""
+    cut = Faces(np.full((1, r), r**-0.5), np.array([part * r**-0.5]))
+    vertices, faces = clipped(*cube(r), cut, 1e-9)
+    expected = part * np.vstack([np.zeros(r), np.eye(r)])
+    gaps = np.abs(vertices[:, None] - expected).max(axis=2)
+    assert len(vertices) == r + 1
+    assert gaps.min(axis=0).max() < 1e-12
+    assert len(faces.offsets) == r + 1
+
+
+def test_a_cut_beyond_everything_leaves_nothing_and_one_that_misses_leaves_all():
+    vertices, faces = cube(3)
+    up = np.array([[0.0, 0.0, 1.0]])
+    assert clipped(vertices, faces, Faces(up, np.array([-0.1])), 1e-9) is None
+    kept, same = clipped(vertices, faces, Faces(up, np.array([1.1])), 1e-9)
+    np.testing.assert_array_equal(kept, vertices)
+    assert len(same.offsets) == 6
+
+
+def test_a_cut_through_vertices_keeps_them_and_adds_none_beside_them():
+    """A cube halved along the diagonals of two faces is a prism."""
+    half = Faces(np.array([[1.0, 1.0, 0.0]]) / math.sqrt(2.0), np.array([1.0 / math.sqrt(2.0)]))
+    vertices, faces = clipped(*cube(3), half, 1e-9)
+    assert len(vertices) == 6
+    assert set(map(tuple, vertices)) <= set(map(tuple, cube(3)[0]))
+    assert len(faces.offsets) == 5
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.integers(2, 6))
+def test_cuts_leave_what_qhull_says_of_all_half_spaces_together(seed, r):
+    rng = np.random.default_rng(seed)
+    vertices, faces = cube(r)
+    normals = rng.normal(size=(rng.integers(1, 7), r))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    inside = rng.uniform(0.2, 0.8, r)
+    cuts = Faces(normals, normals @ inside + rng.uniform(0.05, 0.4, len(normals)))
+    found, left = clipped(vertices, faces, cuts, 1e-10)
+    every = np.vstack([np.column_stack([n, -o]) for n, o in (faces, cuts)])
+    corners = HalfspaceIntersection(every, inside).intersections
+    gaps = np.abs(found[:, None] - corners).max(axis=2)
+    assert gaps.min(axis=0).max() < 1e-6
+    assert gaps.min(axis=1).max() < 1e-6
+    assert ConvexHull(found).volume == pytest.approx(ConvexHull(corners).volume, rel=1e-9)
+    assert (found @ left.normals.T <= left.offsets + 1e-8).all()
+    bounding = {tuple(row) for row in np.round(ConvexHull(corners).equations, 6) + 0.0}
+    ours = np.round(np.column_stack([left.normals, -left.offsets]), 6) + 0.0
+    assert {tuple(row) for row in ours} == bounding

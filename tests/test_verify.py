@@ -5,9 +5,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hands import changed_hand
 from stances import CALIBRATION_LOAD, ask, on_wall, random_question
 
 from hand_models.holds import Cylinder, Plane
+from planner import verify
 from planner.plan import Plan
 from planner.solve import plan, settle
 from planner.verify import equilibrium, problems
@@ -83,6 +85,14 @@ TAMPERED = {
     "position": ((*TILES, 1, "position"), axis(1, 0.001), "not the sum"),
     "contact": ((*TILES, 1, "contact"), lambda c: "none", "touches nothing"),
     "utilisation of a tile": ((*TILES, 1, "utilisation"), more(-1e-4), "utilisation"),
+    "motor torque": (("fingers", FINGER, "motor_torque"), more(1e-6), "motor torque"),
+    "motor current": (("fingers", FINGER, "motor_current"), more(1e-6), "motor current"),
+    "no motor current": (
+        ("fingers", FINGER, "motor_current"),
+        lambda i: float("nan"),
+        "motor current",
+    ),
+    "winch angle": (("fingers", FINGER, "winch_angle"), more(1e-6), "winch angle"),
     "palm pulls": ((*PALM, "force"), lambda f: f * [1.0, 1.0, -1.0], "cannot exert"),
     "palm pushes along x": ((*PALM, "force"), lambda f: f * [-1.0, 1.0, 1.0], "cannot exert"),
     "palm sideways": ((*PALM, "force"), axis(1, 0.01), "cannot exert"),
@@ -139,6 +149,30 @@ def test_half_planes_that_promise_more_than_the_limit_curve_are_found():
         lambda planes: tuple(replace(plane, capacity=10.0 * plane.capacity) for plane in planes),
     )
     assert any("limit curve" in each for each in complaints(generous, question))
+
+
+def test_rows_that_promise_more_than_a_hand_holds_are_found(monkeypatch):
+    monkeypatch.setattr(verify, "HELD", 0.5 * verify.HELD)
+    assert any("more than its rows say" in each for each in complaints(honest()))
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "weaker"),
+    [
+        ("structure", "finger_shear", 40.0),
+        ("structure", "fingertip_force", 0.1),
+        ("structure", "held_mass", 10.0),
+        ("motor", "maximum_torque", 1e-3),
+        ("motor", "maximum_current", 0.05),
+    ],
+)
+def test_a_limit_that_the_planner_does_not_know_of_is_found(section, name, weaker):
+    """The same plan, checked for a hand that bears less."""
+    weak = changed_hand(section, name, weaker)
+    settled = [replace(settle(hand, QUESTION.stance), hand=weak) for hand in QUESTION.stance.hands]
+    answer = honest()
+    found = problems(QUESTION, settled, answer.hands, answer.utilisation, answer.body_wrench)
+    assert any("plan: utilisation is" in each for each in found)
 
 
 def test_a_wrong_utilisation_of_the_plan_is_found():

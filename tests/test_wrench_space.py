@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hands import HAND, ROCK, pinch, settled_at
+from hands import HAND, ROCK, pinch, settled_at, without_hand_load
 from scipy.optimize import linprog
 
 from hand_models import Cylinder, EmptySetError, Grasp, Plane, wrench_space
@@ -71,6 +71,13 @@ def mixture(rng, points):
     return rng.dirichlet(np.ones(len(some))) @ some
 
 
+def is_cut(space):
+    """Whether the set without its wrench rows reaches beyond one of them."""
+    whole = without_hand_load(space)
+    held = space.s[len(space.s) - len(space.D) :]
+    return any(largest(whole, d) > s for d, s in zip(space.D, held, strict=True))
+
+
 def test_there_are_hands_of_every_sort_among_them():
     spaces = [space_of(seed) for seed in non_empty_seeds()]
     assert len(spaces) >= 150
@@ -78,7 +85,11 @@ def test_there_are_hands_of_every_sort_among_them():
     assert {space.dimension for space in spaces} >= {3, 4, 5, 6}
     assert sum(any("lateral" in c for c in space.columns) for space in spaces) >= 50
     assert sum(any("palm" in c for c in space.columns) for space in spaces) >= 50
-    assert sum(any(r.limit == "joint_stop" for r in space.rows) for space in spaces) >= 20
+    assert sum(any(r.limit == "joint_stop" for r in space.rows) for space in spaces) >= 4
+    # wrench rows cut many, flat ones too, and leave as many as they are
+    cut = [space for space in spaces if is_cut(space)]
+    assert 30 <= len(cut) <= len(spaces) - 30
+    assert {space.dimension for space in cut} >= {4, 5, 6}
 
 
 def test_a_set_is_empty_exactly_where_its_linear_program_is_infeasible():
@@ -236,7 +247,8 @@ def largest_column(space, k, sign):
 
 def test_volume_without_lateral_is_that_of_a_zonotope():
     checked = 0
-    for space, _, _ in each_set():
+    for held, _, _ in each_set():
+        space = without_hand_load(held)
         if not any("lateral" in c for c in space.columns) and space.dimension:
             expected, r = segments_volume(space)
             volume, dimension = space.volume()
@@ -244,6 +256,31 @@ def test_volume_without_lateral_is_that_of_a_zonotope():
             assert volume == pytest.approx(expected, rel=1e-4)
             checked += 1
     assert checked >= 50
+
+
+def test_what_wrench_rows_cut_off_is_the_share_of_random_points_beyond_them():
+    checked = 0
+    for space, _, rng in each_set():
+        if not 2 <= space.dimension <= 4 or not is_cut(space):
+            continue
+        whole = without_hand_load(space)
+        faces = whole.half_spaces()
+        # points of the whole set, from a box about it in its own flat
+        corners = whole.vertices() * SCALE
+        base = corners.mean(axis=0)
+        _, _, axes = np.linalg.svd(corners - base, full_matrices=False)
+        axes = axes[: space.dimension]
+        inside = (corners - base) @ axes.T
+        points = rng.uniform(inside.min(axis=0), inside.max(axis=0), (40_000, space.dimension))
+        points = (base + points @ axes) / SCALE
+        points = points[(points @ faces.normals.T <= faces.offsets).all(axis=1)]
+        held = space.s[len(space.s) - len(space.D) :]
+        share = (points @ space.D.T <= held).all(axis=1).mean()
+        ratio = space.volume()[0] / whole.volume()[0]
+        spread = math.sqrt(max(share * (1.0 - share), 1e-3) / len(points))
+        assert abs(ratio - share) < 5.0 * spread
+        checked += 1
+    assert checked >= 5
 
 
 def test_half_planes_only_ever_add_to_the_set():
