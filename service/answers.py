@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from msgspec import UNSET
 
+from hand_models.closing import closing_sequence
 from hand_models.errors import EmptySetError
+from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import TensionLimit
 from hand_models.frames import Array
-from hand_models.hand import Seating, SettledHand
+from hand_models.hand import FINGERS, Seating, SettledHand, Tile
 from hand_models.spines import HalfPlane
 from hand_models.wrench_space import WrenchSpace
 from planner.plan import Certificate, HandPlan, LimitName, Plan, Price, TileLoad
@@ -90,6 +92,7 @@ def wrench_space_reply(
                 finger=tile.finger,
                 phalanx=tile.phalanx,
                 contact=tile.contact,
+                stop=_stop(settled, tile),
                 position=_vector(position),
                 shear_axis=_vector(axes[0]),
                 normal_axis=_vector(axes[1]),
@@ -98,6 +101,14 @@ def wrench_space_reply(
             for tile, position, axes in zip(
                 settled.tiles, settled.positions, settled.axes, strict=True
             )
+        ],
+        closing=[
+            replies.Closing(
+                closing.finger,
+                [replies.Stage(*stage) for stage in closing.stages],
+                closing.in_order,
+            )
+            for closing in closing_sequence(settled)
         ],
         tension_limits=[
             replies.TensionLimit(limit.finger, _number(limit.tension), limit.phalanx)
@@ -108,6 +119,13 @@ def wrench_space_reply(
         rows=parts.rows,
         **views._asdict(),
     )
+
+
+def _stop(settled: SettledHand, tile: Tile) -> str | None:
+    if tile.phalanx not in PHALANGES:
+        return None
+    finger = settled.fingers[FINGERS.index(tile.finger)]
+    return finger.contacts[PHALANGES.index(tile.phalanx)].stop
 
 
 class _Views(NamedTuple):

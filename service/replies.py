@@ -14,6 +14,7 @@ __all__ = [
     "AXES",
     "AxisCapability",
     "Certificate",
+    "Closing",
     "Contact",
     "ErrorDetail",
     "ErrorReply",
@@ -29,6 +30,7 @@ __all__ = [
     "Row",
     "Seating",
     "Solver",
+    "Stage",
     "TensionLimit",
     "Tile",
     "Time",
@@ -239,15 +241,39 @@ class PlanReply(Reply, kw_only=True):
 
 
 class Contact(Struct, kw_only=True):
-    """Where a finger tile meets the rock, and the axes of its loads."""
+    """Where a finger tile meets the rock, and the axes of its loads.
+
+    ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
+    where tendon and springs hold it without contact; null where contacts hold it.
+    """
 
     finger: str
     phalanx: str
     contact: str
+    stop: str | None
     position: Vector
     shear_axis: Vector
     normal_axis: Vector
     lateral_axis: Vector
+
+
+class Stage(Struct):
+    """One part of a closing finger: from which tension it moves, at which it is at rest [N]."""
+
+    part: str
+    starts: float
+    ends: float
+
+
+class Closing(Struct):
+    """How a finger has closed: its nail, its joints from the base outward, its tiles.
+
+    ``in_order``: whether nail and joints move one after the other.
+    """
+
+    finger: str
+    stages: list[Stage]
+    in_order: bool
 
 
 class TensionLimit(Struct):
@@ -291,6 +317,7 @@ class WrenchSpaceReply(Reply, kw_only=True):
     limb: str
     seating: Seating
     contacts: list[Contact]
+    closing: list[Closing]
     tension_limits: list[TensionLimit]
     origin: Vector
     generators: list[Generator]

@@ -68,6 +68,11 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
     out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
+    _show(
+        "contacts, and the tendon tension [N] at which each part was at rest",
+        _closing_table(reply),
+        out,
+    )
     tensions = table_of("finger", "phalanx")
     tensions.add_column("f_t(max) N", justify="right")
     for limit in reply.tension_limits:
@@ -91,6 +96,21 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         reaches.add_row(f"{axis} {unit}", *("-" if c is None else _fixed(c, 2) for c in cells))
     _show("capability along the axes of H", reaches, out)
     out.print("pure: with nothing else; extent: with whatever else the hand can carry")
+
+
+def _closing_table(reply: WrenchSpaceReply) -> Table:
+    """Return what of each finger touches, and when it stopped moving."""
+    table = table_of("finger", "base")
+    kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
+    for part in (stage.part for stage in reply.closing[0].stages):
+        table.add_column(part, justify="right")
+    for closing in reply.closing:
+        cells = [
+            f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
+            for stage in closing.stages
+        ]
+        table.add_row(closing.finger, kinds.get((closing.finger, "base"), ""), *cells)
+    return table
 
 
 def _load_factor(reply: PlanReply) -> str:

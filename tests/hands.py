@@ -34,7 +34,7 @@ def pinch(diameter: float = 0.3, surface: Surface = ROCK, **grasp) -> SettledHan
     return HAND.settle(Cylinder(diameter), surface, Grasp(outer_rotation=math.pi, **grasp))
 
 
-def changed_hand(section: str, name: str, value: float) -> SpinyHand:
+def changed_hand(section: str, name: str, value: float | list[float]) -> SpinyHand:
     """The SpinyHand with one number of its own."""
     unit = hand_table().quantity(section, name).unit
     own = {section: {name: Quantity(value, unit, "assumed", "of a test")}}
