@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hands import HAND, ROCK, pinch, settled_at, without_hand_load
+from hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at, without_hand_load
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,8 +16,10 @@ from hand_models import (
     EmptySetError,
     Grasp,
     Plane,
+    SpinyHand,
     wrench_space,
 )
+from hand_models.parameters import ParameterTable, Quantity, hand_table
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -225,3 +227,31 @@ def test_closing_beyond_what_tiles_hold_leaves_no_wrench():
     settled = pinch(0.3, ROCK.from_values({"shear_limit": 1.0}))
     with pytest.raises(EmptySetError, match="contradict"):
         wrench_space(settled).vertices()
+
+
+def test_tendons_with_friction_are_not_slackened_below_closing():
+    """There the far tiles would stick, and their loads not follow the tension."""
+    hand = changed_hand("tendon", "friction", 0.2)
+    settled = hand.settle(Cylinder(0.3), ROCK, PINCH)
+    space = wrench_space(settled)
+    hard = space.rows[len(space.s) :]
+    sticks = [i for i, row in enumerate(hard) if row.limit == "tendon_sticks"]
+    assert [hard[i].finger for i in sticks] == list(FINGERS)
+    for finger, i in enumerate(sticks):
+        np.testing.assert_array_equal(space.H[i], -np.eye(len(space.columns))[finger])
+        assert space.h[i] == -37.0
+    assert not any(row.limit == "tendon_sticks" for row in wrench_space(pinch()).rows)
+
+
+def test_friction_at_the_palms_own_pulleys_lets_stiff_tiles_carry_more():
+    stiffness = [1e4, 1e4, 1e4, 1e4, 4e3, 1e4, 1e4, 1e4]
+    uneven = ParameterTable(
+        {"palm": {"contact_stiffness": Quantity(stiffness, "N/m", "assumed", "of a test")}}
+    )
+    own = ParameterTable({"palm": {"own_pulley_friction": Quantity(0.34, "1", "assumed", "")}})
+    table = hand_table().replaced(uneven)
+    limits = [
+        SpinyHand(one).settle(Cylinder(2.0), ROCK, PINCH).palm.shear_limit
+        for one in (table, table.replaced(own))
+    ]
+    assert limits[1] > 1.02 * limits[0]
