@@ -32,7 +32,6 @@ __all__ = [
     "Rest",
     "RoundSection",
     "Section",
-    "Tangency",
     "Vector2",
     "outward",
 ]
@@ -76,25 +75,10 @@ class Rest(NamedTuple):
     flat: bool = False
 
 
-class Tangency(NamedTuple):
-    """A tile's face tangent to the rock.
-
-    Attributes
-    ----------
-    angle : float
-        Of the phalanx, from the section's first axis toward its second [rad].
-    distance : float
-        Of the contact from the joint, along the phalanx [m].
-    """
-
-    angle: float
-    distance: float
-
-
 class Section(ABC):
     """Rock in a plane with coordinates (s, t); t grows into the rock."""
 
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
+    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Rest | None:
         """Return where a face, ``height`` above a phalanx, first touches the section's curve.
 
         The phalanx turns about ``joint`` from the angle ``low`` to ``high``; its face goes on
@@ -138,7 +122,7 @@ class Section(ABC):
         """
         tangency = self.tangent(joint, height, low, high)
         if tangency is not None and start <= tangency.distance <= end:
-            return Rest(*tangency)
+            return tangency
         ends = [
             Rest(angle, along)
             for along in (start, end)
@@ -239,7 +223,7 @@ class RoundSection(Section):
         dx, dz = self.centre[0] - joint[0], self.centre[1] - joint[1]
         return math.hypot(dx, dz), math.atan2(dz, dx)
 
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
+    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Rest | None:
         distance, bearing = self._polar(joint)
         offset = self.radius + height
         if distance <= abs(offset):
@@ -247,7 +231,7 @@ class RoundSection(Section):
         angle = _within(bearing - math.asin(offset / distance), low, high)
         if angle is None:
             return None
-        return Tangency(angle, math.sqrt(distance**2 - offset**2))
+        return Rest(angle, math.sqrt(distance**2 - offset**2))
 
     def touch(
         self, joint: Vector2, along: float, height: float, low: float, high: float
@@ -302,7 +286,7 @@ class ProfileSection(Section):
             support = np.where((self.faces @ dual >= 0.0).all(axis=0), support, -np.inf)
         return np.asarray(support - normal.T @ np.asarray(joint) - height)
 
-    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Tangency | None:
+    def tangent(self, joint: Vector2, height: float, low: float, high: float) -> Rest | None:
         def clearance(angle: Array) -> Array:
             return self._clearance(np.stack([-np.sin(angle), np.cos(angle)]), joint, height)
 
@@ -315,7 +299,7 @@ class ProfileSection(Section):
         contact = np.array([0.0, self.radius]) - self.radius * dual / np.hypot(*dual)
         point = np.linalg.solve(self.M, contact - self.m) - np.asarray(joint)
         distance = float(point[0] * math.cos(angle) + point[1] * math.sin(angle))
-        return Tangency(angle, distance) if distance > 0.0 else None
+        return Rest(angle, distance) if distance > 0.0 else None
 
     def touch(
         self, joint: Vector2, along: float, height: float, low: float, high: float
