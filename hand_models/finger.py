@@ -210,6 +210,16 @@ class SettledFinger:
         """Unit vectors u along the phalanges in (x, z) of F, shape (3, 2)."""
         return np.array([(math.cos(c.angle), math.sin(c.angle)) for c in self.contacts])
 
+    @property
+    def pin(self) -> tuple[float, float]:
+        """(x, z) of the fingernail's pin in F, at the end of the last phalanx [m]."""
+        u, v = self.directions[-1]
+        x, z = self.contacts[-1].joint
+        return (
+            x + self.model.joint_spacing * float(u),
+            z + self.model.joint_spacing * float(v),
+        )
+
     def losses(self, base_tile: bool) -> Array:
         """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
 
@@ -267,6 +277,8 @@ class SettledFinger:
         Toward closing, so that an upper stop holds a torque that is not negative and a lower one a
         torque that is not positive; zero at a joint that contacts hold.
         """
+        if len(self.free) == len(self.contacts):
+            return np.zeros_like(shears)
         arms, rest = self._joint_balance(shears, base_tile)
         torques = rest - arms @ normals
         torques[list(self.free)] = 0.0

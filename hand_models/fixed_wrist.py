@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from hand_models.errors import EmptySetError
 from hand_models.finger import PHALANGES
 from hand_models.frames import Array, Indices
-from hand_models.hand import FINGERS, NAIL, NAIL_SHEAR, SettledHand, Tile
+from hand_models.hand import FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR, SettledHand, Tile
 from hand_models.spines import HalfPlane
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
@@ -68,9 +68,9 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
         torque [N·m] and motor current [A]; the shear of a finger's tiles together, the pressing of
         its tip; the palm; and, as wrench rows, what the hand holds in the directions `HELD`. Hard
         rows: tension, palm loads not negative; no tile dragged backwards; a joint's stop and a
-        frame beside its tile only push; a nail that clings neither lifts nor slips; with friction
-        in the tendons, no tension below closing, where they would stick. A nail has a column for
-        the load along it, and a limit row.
+        frame beside its tile only push; a nail that clings neither lifts nor slips nor closes its
+        finger; with friction in the tendons, no tension below closing, where they would stick. A
+        nail has a column for the load along it, and two limit rows.
     """
     maximum = settled.hand.maximum_tension
     if tension_limit is not None:
@@ -178,11 +178,11 @@ def _limit_rows(
         k += len(of)
 
     for column, nail in zip(layout.nail_columns, np.flatnonzero(settled.nails), strict=True):
-        piece = settled.nail_limit(int(nail))
-        L[k, [int(finger_of[nail]), column]] = piece.a_normal * loads[nail, 1, 1], piece.a_shear
-        l0[k] = piece.a_normal * loads[nail, 1, 0]
-        s[k] = piece.capacity
-        k += 1
+        for piece in settled.nail_limits(int(nail)):
+            L[k, [int(finger_of[nail]), column]] = piece.a_normal * loads[nail, 1, 1], piece.a_shear
+            l0[k] = piece.a_normal * loads[nail, 1, 0]
+            s[k] = piece.capacity
+            k += 1
 
     if palm.engaged:
         L[-2, -2] = L[-1, -1] = 1.0
@@ -209,29 +209,19 @@ def _hard_rows(settled: SettledHand, layout: _Layout) -> tuple[Array, Array]:
         H[k, finger] = -torque[1] / scale
         h[k] = torque[0] / scale
         k += 1
-    for column, tile in zip(layout.nail_columns, np.flatnonzero(settled.nails), strict=True):
-        own = [int(finger_of[tile]), column]
-        along, across, _ = settled.axes[tile]
-        for direction in _nail_cone(settled, int(tile)):
-            # the force's part in this direction must not be positive
-            H[k, own] = direction @ across * loads[tile, 1, 1], direction @ along
-            h[k] = -(direction @ across) * loads[tile, 1, 0]
-            k += 1
+    for column, tile, (rows, most) in zip(
+        layout.nail_columns, np.flatnonzero(settled.nails), settled.nail_rows, strict=True
+    ):
+        H[k : k + len(most), [int(finger_of[tile]), column]] = rows
+        h[k : k + len(most)] = most
+        k += len(most)
     if layout.sticking:
-        for finger in layout.engaged:
+        for finger in layout.drawing:
             H[k, finger], h[k] = -1.0, -settled.closing_tension
             k += 1
     if settled.palm.engaged:
         H[-2, -2] = H[-1, -1] = -1.0
     return H, h
-
-
-def _nail_cone(settled: SettledHand, tile: int) -> Array:
-    """Return directions (3, 3) in which a nail cannot load the rock: out of it, along it."""
-    normal = settled.nail_normals[settled.finger_of[tile]]
-    along = np.cross(normal, settled.axes[tile, 2])
-    slip = settled.hand.nail.friction * normal
-    return np.array([normal, slip + along, slip - along])
 
 
 class _Layout(NamedTuple):
@@ -245,6 +235,8 @@ class _Layout(NamedTuple):
         Tile, a_shear, a_normal, a_lateral (with its sign) and capacity of each tile's limit rows.
     engaged : tuple of int
         Fingers with a tile on rock.
+    drawing : tuple of int
+        Those and the fingers whose nail hooks.
     tips, frames : tuple of int
         Distal tiles whose phalanx presses on rock; tiles whose phalanx does so beside them.
     nail_columns : tuple of int
@@ -258,6 +250,7 @@ class _Layout(NamedTuple):
     hard: tuple[Row, ...]
     planes: tuple[Indices, Array, Array, Array, Array]
     engaged: tuple[int, ...]
+    drawing: tuple[int, ...]
     tips: tuple[int, ...]
     frames: tuple[int, ...]
     nail_columns: tuple[int, ...]
@@ -279,6 +272,7 @@ def _layout(
     nails = [tile.finger for tile in tiles if tile.contact == NAIL]
     nail_columns = range(len(columns), len(columns) + len(nails))
     columns += [f"{finger}/{NAIL}" for finger in nails]
+    drawing = sorted({*engaged, *(FINGERS.index(finger) for finger in nails)})
     limits, hard = [], []
     planes: list[tuple[int, float, float, float, float]] = []
     touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
@@ -299,8 +293,9 @@ def _layout(
     for name in TENDON_LIMITS:
         limits += [_row(finger, None, name, "limit") for finger in FINGERS]
     limits += [_row(FINGERS[i], None, "finger_shear", "limit") for i in engaged]
-    limits += [_row(tiles[i].finger, "distal", "fingertip_force", "limit") for i in tips]
-    limits += [_row(finger, NAIL, NAIL_SHEAR, "limit") for finger in nails]
+    limits += [_row(tiles[i].finger, "distal", FINGERTIP_FORCE, "limit") for i in tips]
+    for finger in nails:
+        limits += [_row(finger, NAIL, name, "limit") for name in (NAIL_SHEAR, FINGERTIP_FORCE)]
     hard += [_row(finger, None, "slack_tendon", "hard") for finger in FINGERS]
     for name, those in (("dragged_backwards", touching), ("frame_pulled", frames)):
         hard += [_row(tiles[i].finger, tiles[i].phalanx, name, "hard") for i in those]
@@ -309,8 +304,9 @@ def _layout(
     for finger in nails:
         for name, label in (("nail_lifts", ""), ("nail_slips", "+"), ("nail_slips", "-")):
             hard.append(Row(finger, NAIL, name, "hard", f"{finger}/{NAIL}/{name}{label}"))
+        hard += [_row(finger, phalanx, "joint_stop", "hard") for phalanx in PHALANGES]
     if sticking:
-        hard += [_row(FINGERS[i], None, "tendon_sticks", "hard") for i in engaged]
+        hard += [_row(FINGERS[i], None, "tendon_sticks", "hard") for i in drawing]
     if palm:
         columns += [PALM_SHEAR, PALM_PRESSING]
         limits += [Row(None, None, name, "limit", name) for name in (PALM_SHEAR, PALM_PRESSING)]
@@ -328,6 +324,7 @@ def _layout(
         tuple(hard),
         (table[:, 0].astype(np.intp), table[:, 1], table[:, 2], table[:, 3], table[:, 4]),
         engaged,
+        tuple(drawing),
         tuple(tips),
         tuple(frames),
         tuple(nail_columns),

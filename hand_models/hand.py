@@ -20,9 +20,10 @@ from typing import Final
 import numpy as np
 
 from hand_models.actuation import TendonDrive
+from hand_models.contact_states import ClosedFinger, cling, close
 from hand_models.errors import InvalidInputError
 from hand_models.finger import PHALANGES, FingerModel, SettledFinger
-from hand_models.fingernail import Fingernail
+from hand_models.fingernail import Cling, Fingernail
 from hand_models.frames import Array, Indices, Pose
 from hand_models.holds import Hold
 from hand_models.limit_pieces import HalfPlane
@@ -30,7 +31,7 @@ from hand_models.palm import shear_capacity
 from hand_models.parameters import ParameterTable, hand_table
 from hand_models.seating import Seating, seat
 from hand_models.sections import Section
-from hand_models.settling import ClosedFinger, close, intrusion, straight
+from hand_models.settling import intrusion
 from hand_models.spines import Surface
 from hand_models.structure import Structure
 
@@ -43,7 +44,10 @@ NAIL: Final = "nail"
 """The ultrashort phalanx at a fingertip, by name, and the contact of one that hooks."""
 
 NAIL_SHEAR: Final = "nail_shear"
-"""Name of the limit of a nail that clings."""
+"""Name of the limit of a nail that pulls toward its finger's base."""
+
+FINGERTIP_FORCE: Final = "fingertip_force"
+"""Name of the limit of a distal phalanx, or a nail, that presses into the rock."""
 
 OPPOSED: Final = 1e-6
 """How close to π an outer rotation counts as a pinch [rad]."""
@@ -162,6 +166,8 @@ class SettledHand:
         How far each finger's nail has turned; all the way where it does not hook [rad].
     nail_normals : ndarray, shape (4, 3)
         Out of the rock where each finger's nail hooks, in H; zero where none does.
+    nail_rows : tuple of (ndarray, ndarray)
+        H and h of `Fingernail.rows` of each nail that hooks, in the order of the tiles.
     stops : tuple of (int, int, ndarray)
         Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
     palm : Palm
@@ -181,6 +187,7 @@ class SettledHand:
     loads: Array
     nail_angles: Array
     nail_normals: Array
+    nail_rows: tuple[tuple[Array, Array], ...]
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
 
@@ -200,12 +207,22 @@ class SettledHand:
         """Which tiles are nails that hook, bool of shape (n,)."""
         return np.array([tile.contact == NAIL for tile in self.tiles])
 
-    def nail_limit(self, tile: int) -> HalfPlane:
-        """Return the limit of a nail's force along its finger, toward the base, as a half-plane."""
-        frame = self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]]
-        along, across, _ = self.axes[tile] @ -frame.along
-        return HalfPlane(
-            NAIL_SHEAR, float(along), float(across), 0.0, self.hand.structure.finger_shear
+    @cached_property
+    def holding(self) -> Array:
+        """Which tiles and nails are on rock that they hold, bool of shape (n,)."""
+        return np.logical_or(self.touching, self.nails)
+
+    def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
+        """Return the limits of a nail's force, toward its finger's base and into the rock."""
+        structure = self.hand.structure
+        base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along
+        into = np.array([0.0, 0.0, 1.0])
+        (shear, normal), (pulled, pressed) = (
+            (self.axes[tile, :2] @ direction).tolist() for direction in (base, into)
+        )
+        return (
+            HalfPlane(NAIL_SHEAR, shear, normal, 0.0, structure.finger_shear),
+            HalfPlane(FINGERTIP_FORCE, pulled, pressed, 0.0, structure.fingertip_force),
         )
 
     def tile_loads(
@@ -313,10 +330,13 @@ class SpinyHand:
         """Seat the hand on a hold that was given no place; see `hand_models.seating`."""
         return seat(self, hold, grasp)
 
-    def _section(self, frame: _Frame, hold: Hold, hand_in_hold: Pose) -> Section | None:
-        """Return the rock in a finger's plane, the proximal joint at its origin."""
+    def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
+        """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""
+        hand_in_hold = hold_in_hand.inverse()
+        frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
+        cut = hold.raw_section if grasp.fingernail else hold.section
         rotation = hand_in_hold.rotation
-        return hold.section(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
+        return cut(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
 
     def settle(
         self,
@@ -355,12 +375,14 @@ class SpinyHand:
         palm = self._settle_palm(hold, surface, grasp, hand_in_hold)
 
         frames = self.frames(grasp.outer_rotation)
+        sections = [self.section(name, hold, grasp, seating.pose) for name in FINGERS]
         closed = [
-            self._close(name, frame, hold, hand_in_hold, surface, grasp, closing)
-            for name, frame in zip(FINGERS, frames, strict=True)
+            self._close(name, section, surface, grasp, closing)
+            for name, section in zip(FINGERS, sections, strict=True)
         ]
         nail_angles = np.full(len(FINGERS), self.nail.retraction)
         nail_normals = np.zeros((len(FINGERS), 3))
+        nail_rows: list[tuple[Array, Array]] = []
         tiles: list[Tile] = []
         positions, axes, loads = [], [], []
         stops: list[tuple[int, int, Array]] = []
@@ -393,20 +415,20 @@ class SpinyHand:
             axes.append(np.stack([-along, into, across], axis=1))
             loads.append(np.stack([shears, normals], axis=1))
             if grasp.fingernail:
-                section = self._section(frame, hold, hand_in_hold)
-                pin = len(PHALANGES) * self.finger.joint_spacing
-                hook = self.nail.hook(section, (pin, 0.0))
-                angle = self.nail.retraction if hook is None else hook.angle
+                cling = self._cling(name, sections[i], finger, closing)
+                angle = nail_angles[i] if cling is None else cling.hook.angle
+                reach = self.nail.length if cling is None else cling.hook.distance
                 w = math.cos(angle) * frame.along + math.sin(angle) * up
                 v = -math.sin(angle) * frame.along + math.cos(angle) * up
-                tiles.append(Tile(name, NAIL, "none" if hook is None else NAIL))
-                positions.append((frame.joint + pin * frame.along + self.nail.length * w)[None])
+                tiles.append(Tile(name, NAIL, "none" if cling is None else NAIL))
+                positions.append((frame.joint + finger.pin[0] * frame.along + reach * w)[None])
                 axes.append(np.stack([-w, v, frame.across])[None])
-                normal = (0.0, 0.0) if hook is None else self.nail.turning_force(angle)
-                loads.append(np.array([[(0.0, 0.0), normal]]))
-                if hook is not None:
-                    nail_angles[i] = hook.angle
-                    nail_normals[i] = hook.normal[0] * frame.along + hook.normal[1] * up
+                force = (0.0, 0.0) if cling is None else cling.force
+                loads.append(np.array([[(0.0, 0.0), force]]))
+                if cling is not None:
+                    nail_angles[i], (s, t) = angle, cling.hook.normal
+                    nail_normals[i] = s * frame.along + t * up
+                    nail_rows.append((cling.H, cling.h))
             if finger.bearing:
                 stops.extend(
                     (i, j, torques[j] if contact.stop == "upper" else -torques[j])
@@ -428,6 +450,7 @@ class SpinyHand:
             loads=np.concatenate(loads),
             nail_angles=nail_angles,
             nail_normals=nail_normals,
+            nail_rows=tuple(nail_rows),
             stops=tuple(stops),
             palm=palm,
         )
@@ -435,16 +458,13 @@ class SpinyHand:
     def _close(
         self,
         name: str,
-        frame: _Frame,
-        hold: Hold,
-        hand_in_hold: Pose,
+        section: Section | None,
         surface: Surface,
         grasp: Grasp,
         closing_tension: float,
     ) -> ClosedFinger:
-        section = self._section(frame, hold, hand_in_hold)
         if grasp.fingernail:
-            closed = straight(self.finger, section)
+            closed = cling(self.finger, section)
             how = "straight, to cling with its nail"
         else:
             outer = name.startswith("outer")
@@ -459,6 +479,17 @@ class SpinyHand:
                 field="hold",
             )
         return closed
+
+    def _cling(
+        self, name: str, section: Section | None, finger: SettledFinger, closing_tension: float
+    ) -> Cling | None:
+        if self.nail.stuck(section, finger.pin):
+            raise InvalidInputError(
+                f"the hold is in the way of the nail of {name}, straight ahead; "
+                "move the hand away from the rock",
+                field="hold",
+            )
+        return self.nail.cling(section, finger, closing_tension, name.startswith("outer"))
 
     def _settle_palm(self, hold: Hold, surface: Surface, grasp: Grasp, hand_in_hold: Pose) -> Palm:
         into_rock = hand_in_hold.rotation[:, 2]

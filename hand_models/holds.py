@@ -51,6 +51,12 @@ class Hold(ABC):
             Orthonormal axes of the plane, in the hold's frame.
         """
 
+    def raw_section(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
+    ) -> Section | None:
+        """Return the same with the steps and edges that are smaller than a finger's tile."""
+        return self.section(origin, s_axis, t_axis)
+
     @abstractmethod
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         """Return how far from a point, along a unit direction, the rock begins [m].

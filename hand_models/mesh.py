@@ -4,8 +4,8 @@ Triangles are counterclockwise seen from outside the rock. They need not close: 
 side that they show. On loading they are welded, triangles without area are left out, spikes taken
 back and turned ones wound alike (`hand_models.triangles`). A finger's plane cuts them, gaps of the
 cut up to a few millimetres are bridged, wider ones end the rock there, and the cut is smoothed to
-the scale of a tile (`hand_models.smoothing`). The palm's and the base tiles' spines meet the raw
-triangles.
+the scale of a tile (`hand_models.smoothing`). The palm's and the base tiles' spines and the nails
+meet the raw triangles.
 """
 
 from __future__ import annotations
@@ -24,10 +24,12 @@ from hand_models.frames import Array, Indices
 from hand_models.holds import Hold
 from hand_models.parameters import scan_table
 from hand_models.sections import Section
-from hand_models.smoothing import Scale, within
+from hand_models.smoothing import Scale, raw_within, within
 from hand_models.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
 
 __all__ = ["Mesh", "read_mesh"]
+
+ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
 
 RAYS: Final = 5
 """Rays along each side of the palm that look which way triangles face."""
@@ -37,19 +39,26 @@ EDGE: Final = 1e-9
 
 
 def read_mesh(path: Path) -> tuple[Array, Indices]:
-    """Return vertices [m] and faces of a file (STL, PLY, OBJ, OFF and what else trimesh reads).
+    """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
 
     Raises
     ------
     InvalidInputError
         If it cannot be read, or has no triangles; the field is ``file``.
     """
-    if not path.is_file():
-        raise InvalidInputError(f"no such file: {path}", field="file")
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(f"{path}: a mesh file ends in {', '.join(ENDINGS)}", field="file")
     try:
+        if not path.is_file():
+            raise InvalidInputError(f"no such file: {path}", field="file")
         mesh = trimesh.load_mesh(str(path), process=False)
+    except InvalidInputError:
+        raise
     except OSError as error:
         raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
+    except ImportError:
+        # what is no text either, trimesh would have another package guess the encoding of
+        raise InvalidInputError(f"cannot read {path}: broken or cut short", field="file") from None
     except Exception as error:
         # every loader fails in its own way on what is no mesh
         raise InvalidInputError(f"cannot read {path}: {error}", field="file") from None
@@ -113,15 +122,23 @@ class Mesh(Hold):
         if sum(met) < 0:
             raise InvalidInputError(
                 "the triangles under the palm face away from it; their vertices must be "
-                "counterclockwise seen from outside the rock: turn every face over",
+                "counterclockwise seen from outside the rock: turn every face over, or close the "
+                "hole under the palm if it looks into the rock",
                 field="faces",
             )
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        return within(self._pieces(origin, s_axis, t_axis), self._scale)
+
+    def raw_section(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
+    ) -> Section | None:
+        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
+
+    def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
+        """Return the cut through the triangles, small gaps bridged."""
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
-        scale = self._scale
-        pieces = cut(self.triangles, o, s, t, scale.reach)
-        return within(bridge(pieces, scale.bridged_gap), scale)
+        return bridge(cut(self.triangles, o, s, t, self._scale.reach), self._scale.bridged_gap)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         return self._facing(np.asarray(direction, dtype=float)).entry(point)

@@ -63,10 +63,14 @@ class PolylineSection(Section):
     pieces : sequence of ndarray, shape (n, 2)
         Points (s, t) in order, each unlike the one before it; a closed piece ends where it begins.
         Where an open one ends, rock ends: nothing is touched beyond [m].
+    faceted : bool, optional
+        Whether the points are corners of the rock, not places on a smooth curve, so that what rests
+        on a corner touches there and not at the lowest place of a fit.
     """
 
-    def __init__(self, pieces: Sequence[Array]) -> None:
+    def __init__(self, pieces: Sequence[Array], *, faceted: bool = False) -> None:
         self.pieces = tuple(pieces)
+        self._faceted = faceted
         self._points = np.concatenate(pieces)
         ends = np.cumsum([len(piece) for piece in pieces])
         self._pieces = list(zip([0, *ends[:-1].tolist()], ends.tolist(), strict=True))
@@ -141,14 +145,7 @@ class PolylineSection(Section):
         return min(float(own.min()), math.sqrt(float((beside**2 + away[:, 1] ** 2).min())))
 
     def normal(self, point: Vector2) -> Vector2:
-        index, part, _ = self._nearest(np.array([point]))
-        i, u = int(index[0]), float(part[0])
-        ends = [
-            corner if corner.any() else self._outward[i]
-            for corner in (self._corner_out[i], self._corner_in[i])
-        ]
-        blend = (1.0 - u) * ends[0] / np.hypot(*ends[0]) + u * ends[1] / np.hypot(*ends[1])
-        s, t = blend / np.hypot(*blend)
+        s, t = self._outward[int(self._nearest(np.array([point]))[0][0])]
         return float(s), float(t)
 
     # Distances ----------------------------------------------------------------------------------
@@ -232,8 +229,8 @@ class PolylineSection(Section):
     ) -> Rest:
         """Return where along a face that rests at an angle it touches.
 
-        That is the lowest point of a parabola fitted to the rock near the place that it meets, or
-        the middle of the stretch that touches if it is longer than that.
+        That is the lowest point of a parabola fitted to the rock near the place that it meets (the
+        place itself, of facets), or the middle of the stretch that touches if that is longer.
         """
         u, v = math.cos(met.angle), math.sin(met.angle)
         first, last = next((a, b) for a, b in self._pieces if met.vertex < b)
@@ -252,7 +249,10 @@ class PolylineSection(Section):
         if met.end is not None and far - near < FITTED:
             return Rest(met.angle, met.end)
         short = far - near < 2.0 * FITTED
-        place = _lowest(along, gap, i) if short else 0.5 * (near + far)
+        if short:
+            place = float(along[i]) if self._faceted else _lowest(along, gap, i)
+        else:
+            place = 0.5 * (near + far)
         return Rest(met.angle, min(max(place, start), end))
 
 

@@ -4,7 +4,8 @@ An outline is a polyline of points (x, z) in the hold's frame, z into the rock, 
 along y. With one for each finger the rock has four strips: from y = 0 to half-way between an inner
 and an outer finger's plane goes that of an inner finger, and beyond that of an outer one (left is
 +y, as in H). A finger is on the strip over which its base is. What a caller draws is raw rock: as
-the cut through a mesh it is smoothed to the scale of a tile (`hand_models.smoothing`).
+the cut through a mesh it is smoothed to the scale of a tile (`hand_models.smoothing`), but not
+under fingers that cling with their nails.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from hand_models.frames import Array
 from hand_models.holds import PARALLEL, Hold
 from hand_models.parameters import hand_table, scan_table
 from hand_models.sections import Section
-from hand_models.smoothing import Scale, within
+from hand_models.smoothing import Scale, raw_within, within
 
 __all__ = ["STRIPS", "Profile"]
 
@@ -45,13 +46,14 @@ class Profile(Hold):
     ------
     InvalidInputError
         If a strip is missing, or an outline has fewer than two points, numbers that are not finite,
-        crosses itself or begins and ends at the same x; the field is ``points`` or ``profiles``.
+        crosses itself, winds or begins and ends at the same x; the field is ``points`` or
+        ``profiles``.
     """
 
     shape = "profile"
 
     def __init__(self, points: ArrayLike | Mapping[str, ArrayLike]) -> None:
-        largest = scan_table().scalar("scan", "largest")
+        largest = scan_table().scalar("scan", "largest_outline")
         if isinstance(points, Mapping):
             if set(points) != set(STRIPS):
                 raise InvalidInputError(
@@ -78,6 +80,15 @@ class Profile(Hold):
         ]
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        return within(self._pieces(origin, s_axis, t_axis), self._scale)
+
+    def raw_section(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
+    ) -> Section | None:
+        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
+
+    def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
+        """Return the outline in a plane, rock on its left."""
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
         M = np.array([[s[0], t[0]], [s[2], t[2]]])
         outline = self._outline(float(o[1]))
@@ -85,23 +96,24 @@ class Profile(Hold):
         if abs(determinant) < PARALLEL:
             return self._along_axis(o, s, t)
         pieces = np.linalg.solve(M, (outline - o[[0, 2]]).T).T
-        return within([pieces if determinant > 0.0 else pieces[::-1]], self._scale)
+        return [pieces if determinant > 0.0 else pieces[::-1]]
 
-    def _along_axis(self, o: Array, s: Array, t: Array) -> Section | None:
+    def _along_axis(self, o: Array, s: Array, t: Array) -> list[Array]:
         """Return the straight rock in a plane that holds the direction of drawing."""
         depth = self.entry(o, t)
         if not math.isfinite(depth):
-            return None
+            return []
         # the direction of drawing, in the plane, through the place where the rock begins
         along = np.array([s[1], t[1]]) / math.hypot(s[1], t[1])
         along = along if along[0] >= 0.0 else -along
-        ends = np.outer([-2.0, 2.0], along * self._scale.reach) + np.array([0.0, depth])
-        return within([ends], self._scale)
+        return [np.outer([-2.0, 2.0], along * self._scale.reach) + np.array([0.0, depth])]
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         p, d = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
         outline = self._outline(float(p[1]))
         ray = d[[0, 2]]
+        if math.hypot(*ray) < PARALLEL:
+            return math.inf
         start, step = outline[:-1] - p[[0, 2]], np.diff(outline, axis=0)
         # start + u step = λ ray
         across = step[:, 0] * ray[1] - step[:, 1] * ray[0]
@@ -134,7 +146,8 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     bad = np.flatnonzero(~(np.abs(outline) <= largest).all(axis=1))
     if len(bad):
         raise InvalidInputError(
-            f"numbers must be finite and at most {largest:g} m, got {outline[bad[0]].tolist()}",
+            f"numbers must be finite and at most {largest:g} (metres), "
+            f"got {outline[bad[0]].tolist()}",
             field=f"{field}[{bad[0]}]",
         )
     if outline[0, 0] == outline[-1, 0]:
@@ -144,6 +157,14 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     if outline[0, 0] > outline[-1, 0]:
         outline = outline[::-1]
     outline = outline[np.append(True, (np.diff(outline, axis=0) != 0.0).any(axis=1))]
+    length = float(np.hypot(*np.diff(outline, axis=0).T).sum())
+    across, scale = float(np.ptp(outline, axis=0).max()), Scale.default()
+    if length * 2.0 * scale.reach > scale.longest * across:
+        raise InvalidInputError(
+            f"{length:.3g} m long but {across:.3g} m across; at most "
+            f"{0.5 * scale.longest / scale.reach:g} times that is possible",
+            field=field,
+        )
     crossing = _crossing(outline)
     if crossing is not None:
         raise InvalidInputError(
@@ -161,15 +182,22 @@ def _crossing(outline: Array) -> int | None:
     back = (_turn(step[:-1], step[1:]) == 0.0) & ((step[:-1] * step[1:]).sum(axis=1) < 0.0)
     if back.any():
         return int(back.argmax())
-    for i in range(len(step) - 2):
-        later = slice(i + 2, None)
-        near = ((low[later] <= high[i]) & (high[later] >= low[i])).all(axis=1)
-        theirs = _turn(step[i], start[later] - start[i]) * _turn(step[i], end[later] - start[i])
-        mine = _turn(step[later], start[i] - start[later]) * _turn(
-            step[later], end[i] - start[later]
+    # of segments in order of their least x, those that follow up to its greatest may meet one
+    order = np.argsort(low[:, 0], kind="stable")
+    following = np.searchsorted(low[order, 0], high[order, 0], side="right")
+    for place in np.flatnonzero(following - np.arange(len(order)) > 1):
+        i = order[place]
+        others = order[place + 1 : following[place]]
+        others = others[(low[others, 1] <= high[i, 1]) & (high[others, 1] >= low[i, 1])]
+        others = others[np.abs(others - i) > 1]
+        if not len(others):
+            continue
+        theirs = _turn(step[i], start[others] - start[i]) * _turn(step[i], end[others] - start[i])
+        mine = _turn(step[others], start[i] - start[others]) * _turn(
+            step[others], end[i] - start[others]
         )
-        if (near & (theirs <= 0.0) & (mine <= 0.0)).any():
-            return i
+        if ((theirs <= 0.0) & (mine <= 0.0)).any():
+            return int(i)
     return None
 
 

@@ -26,11 +26,12 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import savgol_filter
 from scipy.spatial import cKDTree
 
+from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Indices
 from hand_models.parameters import hand_table, scan_table
 from hand_models.polyline import PolylineSection
 
-__all__ = ["Scale", "smooth", "within"]
+__all__ = ["Scale", "raw_within", "smooth", "within"]
 
 STANDS_OUT: Final = 1e-5
 """How far raw points may stand out of a raised curve [m]."""
@@ -56,12 +57,15 @@ class Scale:
         Open ends so near each other are joined; shorter pieces are left out.
     reach : float
         How far from a finger's base rock is of interest.
+    longest : float
+        Length of the rock that may be there.
     """
 
     tile: float
     spacing: float
     bridged_gap: float
     reach: float
+    longest: float
 
     @classmethod
     @cache
@@ -73,6 +77,7 @@ class Scale:
             spacing=table.scalar("cut", "spacing"),
             bridged_gap=table.scalar("cut", "bridged_gap"),
             reach=table.scalar("cut", "reach"),
+            longest=table.scalar("cut", "longest"),
         )
 
 
@@ -90,7 +95,7 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     ndarray, shape (m, 2), or None
         None if the polyline is debris.
     """
-    points = points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))]
+    points = _distinct(points)
     lengths = np.hypot(*np.diff(points, axis=0).T)
     total = float(lengths.sum())
     if total < scale.bridged_gap:
@@ -153,10 +158,40 @@ def within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
     -------
     PolylineSection or None
         None if no rock is in reach.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is too long to be a surface of rock; the field is ``hold``.
     """
-    curves = [smooth(run, scale) for piece in pieces for run in _runs(piece, scale.reach)]
+    curves = [smooth(run, scale) for run in _reached(pieces, scale)]
     reached = [curve for curve in curves if curve is not None]
     return PolylineSection(reached) if reached else None
+
+
+def raw_within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
+    """Return the same as `within`, debris left out but not smoothed: what a nail can feel."""
+    runs = [_distinct(run) for run in _reached(pieces, scale)]
+    reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= scale.bridged_gap]
+    return PolylineSection(reached, faceted=True) if reached else None
+
+
+def _distinct(points: Array) -> Array:
+    """Return a polyline without points that are as the one before."""
+    return np.asarray(points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))])
+
+
+def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
+    """Return the parts of polylines within the square |s|, |t| ≤ reach."""
+    runs = [run for piece in pieces for run in _runs(piece, scale.reach)]
+    length = sum(float(np.hypot(*np.diff(run, axis=0).T).sum()) for run in runs)
+    if length > scale.longest:
+        raise InvalidInputError(
+            f"its outline is {length:.3g} m long within {scale.reach:g} m of a finger's base; "
+            f"at most {scale.longest:g} m is possible: take noise and spikes out",
+            field="hold",
+        )
+    return runs
 
 
 def _runs(piece: Array, reach: float) -> list[Array]:

@@ -45,7 +45,8 @@ def weld(triangles: Triangles) -> Triangles:
 def wound_alike(triangles: Triangles) -> Triangles:
     """Return triangles of which no two neighbours run along their edge in the same direction.
 
-    In every connected part the fewer triangles are turned over.
+    In every connected part the fewer triangles are turned over. Edges of more than two triangles
+    part the surface.
 
     Raises
     ------
@@ -77,13 +78,15 @@ def wound_alike(triangles: Triangles) -> Triangles:
 
 
 def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
-    """Return pairs of triangles that share an edge, and whether they are wound alike."""
+    """Return pairs of triangles that alone share an edge, and whether they are wound alike."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(faces)), 3)
     names = _edge_names(edges[:, 0], edges[:, 1], int(faces.max()) + 1)
     order = np.argsort(names, kind="stable")
     names, owner, ascending = names[order], owner[order], (edges[:, 0] < edges[:, 1])[order]
-    pairs = np.flatnonzero(names[:-1] == names[1:])
+    # where three or more meet, as where boulders touch, none is the other's neighbour
+    alike = np.concatenate([[False], names[:-1] == names[1:], [False]])
+    pairs = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
     return owner[pairs], owner[pairs + 1], ascending[pairs] != ascending[pairs + 1]
 
 

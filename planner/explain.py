@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.hand import NAIL, SettledHand
+from hand_models.hand import FINGERS, NAIL, SettledHand
 from planner.plan import Certificate, HandPlan, LimitName
 from planner.program import WRENCH_UNIT
 from planner.stance import Stance
@@ -24,6 +24,7 @@ MANNERS: Final = {
     "palm_shear": " in shear",
     "palm_pressing": " in pressing",
     "finger_shear": " in shear together",
+    "nail_shear": " along its finger",
     "fingertip_force": " in pressing",
 }
 """How a limit is loaded."""
@@ -145,11 +146,19 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
         stretch = stance.robot.stretch(place.limb, body @ place.pose)
         if stretch > 1.0:
             found.append(f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes")
-        tiles = int(hand.touching.sum())
+        tiles = int(hand.holding.sum())
         if not tiles and not hand.palm.engaged:
             found.append(f"{place.limb}: touches nothing, so it carries nothing")
         elif not tiles:
             found.append(f"{place.limb}: no finger touches rock, only the palm does")
+        idle = [
+            name for i, name in enumerate(FINGERS) if not hand.holding[hand.finger_of == i].any()
+        ]
+        if tiles and idle and not place.grasp.fingernail:
+            found.append(f"{place.limb}: {', '.join(idle)} touch no rock")
+        nails = int(hand.nails.sum())
+        if place.grasp.fingernail and 0 < nails < len(FINGERS):
+            found.append(f"{place.limb}: {nails} of {len(FINGERS)} nails hook")
         if place.grasp.palm and not hand.palm.engaged and tiles:
             found.append(f"{place.limb}: no palm tile is within its spines' travel of the rock")
     return tuple(found)

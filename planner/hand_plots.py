@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from hand_models.finger import PHALANGES, Contact, SettledFinger
 from hand_models.frames import Array
-from hand_models.hand import FINGERS, SettledHand
+from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.polyline import PolylineSection
 from hand_models.sections import Section
 from hand_models.wrench_space import WrenchSpace
@@ -42,6 +42,7 @@ CONTACTS: Final = {
     "face": ("tab:green", "tile's face"),
     "edge": ("tab:orange", "tile's edge"),
     "frame": ("tab:purple", "bare frame"),
+    "nail": ("tab:red", "fingernail"),
     "none": ("0.55", "no contact"),
 }
 ROCK: Final = "0.88"
@@ -63,6 +64,9 @@ GROUND: Final = 41
 
 SHADES: Final = 15
 """Of the rock's depth, each of 1 mm at least."""
+
+FLAT: Final = 1e-6
+"""A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
 
 AROUND: Final = 0.19
 """Half the side of the view from above [m]."""
@@ -139,9 +143,8 @@ def _draw_finger(
     finger = settled.fingers[index]
     model = finger.model
     low, high = limits
-    in_hold = settled.seating.pose.inverse()
-    section = settled.hold.section(
-        in_hold.apply(frame.joint), in_hold.rotation @ frame.along, in_hold.rotation[:, 2]
+    section = settled.hand.section(
+        FINGERS[index], settled.hold, settled.grasp, settled.seating.pose
     )
     if section is not None:
         _draw_rock(axes, section, low, high)
@@ -156,7 +159,9 @@ def _draw_finger(
         if contact.kind != "none":
             place = MM * np.array(contact.point(model.tile_height))
             axes.plot(*place, "o", color="black", markersize=4, zorder=5)
-            _draw_force(axes, place, contact, loads[tiles[phalanx]], largest)
+            _draw_force(axes, place, contact.angle, loads[tiles[phalanx]], largest)
+    if NAIL in tiles:
+        _draw_nail(axes, settled, index, tiles[NAIL], loads[tiles[NAIL]], largest)
     axes.annotate(
         "",
         (low[0] + 8.0 + ARROW, low[1] + 8.0),
@@ -175,6 +180,22 @@ def _draw_finger(
     )
     axes.title.set_fontsize(10)
     axes.set_aspect("equal", adjustable="box")
+
+
+def _draw_nail(
+    axes: Axes, settled: SettledHand, index: int, row: int, load: Array, largest: float
+) -> None:
+    pin, angle = np.array(settled.fingers[index].pin), float(settled.nail_angles[index])
+    w = np.array([math.cos(angle), math.sin(angle)])
+    kind = settled.tiles[row].contact
+    tip = pin + settled.hand.nail.length * w
+    axes.plot(*(MM * np.array([pin, tip])).T, color=CONTACTS[kind][0], linewidth=3)
+    if kind == NAIL:
+        frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
+        away = settled.positions[row] - frame.joint
+        place = MM * np.array([away @ frame.along, away[2]])
+        axes.plot(*place, "o", color="black", markersize=4, zorder=5)
+        _draw_force(axes, place, angle, load, largest)
 
 
 def _chain(finger: SettledFinger) -> Array:
@@ -219,8 +240,8 @@ def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
     axes.plot([-MM * hand.outer_reach, 0.0], [0.0, 0.0], color="0.25", lw=2.0)
 
 
-def _draw_force(axes: Axes, place: Array, contact: Contact, load: Array, largest: float) -> None:
-    u = np.array([math.cos(contact.angle), math.sin(contact.angle)])
+def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: float) -> None:
+    u = np.array([math.cos(angle), math.sin(angle)])
     force = -load[0] * u + load[1] * np.array([-u[1], u[0]])
     end = place + ARROW * force / largest
     if np.hypot(*force) > 0.02 * largest:
@@ -318,4 +339,8 @@ def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
         xlabel=f"${a}$ [{unit_a}]",
         ylabel=f"${b}$ [{unit_b}]",
     )
+    if np.ptp(points[:, 0]) < FLAT:
+        axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)
+    if np.ptp(points[:, 1]) < FLAT:
+        axes.set_ylim(points[0, 1] - 1.0, points[0, 1] + 1.0)
     axes.grid(alpha=0.3)

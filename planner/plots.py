@@ -15,7 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from hand_models.frames import Array, Pose
-from hand_models.hand import SettledHand
+from hand_models.hand import NAIL, SettledHand
 from planner.plan import Plan
 from planner.route import RouteResult
 from planner.solve import settle
@@ -102,7 +102,7 @@ def _draw_view(
         axes.fill(*flat(corners).T, facecolor="0.85", edgecolor="0.3", linewidth=1.0)
         for chain in _finger_chains(settled):
             axes.plot(*flat(place.apply(chain)).T, color="0.3", linewidth=1.5)
-        touching = settled.positions[settled.touching]
+        touching = settled.positions[settled.holding]
         if len(touching):
             axes.plot(*flat(place.apply(touching)).T, ".", color="black", markersize=4)
         x, y = flat(place.position)
@@ -181,13 +181,15 @@ def _finger_chains(settled: SettledHand) -> list[Array]:
 def _draw_tiles(axes: Axes, plan: Plan) -> None:
     """Draw the utilisation of every tile and palm as a table of colours."""
     hands = plan.hands or ()
+    clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
+    columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
     names, rows = [], []
     for hand in hands:
         for finger in hand.fingers:
             used = {tile.phalanx: tile for tile in finger.tiles}
             row = [
                 used[p].utilisation if p in used and used[p].contact != "none" else np.nan
-                for p in PHALANX_COLUMNS
+                for p in columns
             ]
             rows.append([*row, np.nan])
             names.append(
@@ -200,11 +202,11 @@ def _draw_tiles(axes: Axes, plan: Plan) -> None:
         axes.set_axis_off()
         return
     values = np.array(rows)
-    top = Normalize(0.0, max(1.0, float(np.nanmax(values))))
+    top = Normalize(0.0, float(np.nanmax(values, initial=1.0)))
     image = axes.imshow(
         np.ma.masked_invalid(values), cmap=COLOURS, norm=top, aspect="auto", interpolation="none"
     )
-    axes.set_xticks(range(5), [*PHALANX_COLUMNS, "palm"])
+    axes.set_xticks(range(len(columns) + 1), [*columns, "palm"])
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.tick_params(length=0)
     for (i, j), value in np.ndenumerate(values):

@@ -45,9 +45,12 @@ def read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> 
     capacities = np.array([p.capacity for p in pieces])
     magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
     used = np.where(settled.touching, (magnitudes @ planes.T / capacities).max(axis=1), 0.0)
-    limits = {int(t): (settled.nail_limit(int(t)),) for t in np.flatnonzero(settled.nails)}
-    for t, (limit,) in limits.items():
-        used[t] = (limit.a_shear * loads[t, 0] + limit.a_normal * loads[t, 1]) / limit.capacity
+    limits = {int(t): settled.nail_limits(int(t)) for t in np.flatnonzero(settled.nails)}
+    for t, own_limits in limits.items():
+        used[t] = max(
+            (limit.a_shear * loads[t, 0] + limit.a_normal * loads[t, 1]) / limit.capacity
+            for limit in own_limits
+        )
     used = np.maximum(used, 0.0)
     drive = settled.hand.drive
     losses = (1.0 - settled.hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0)

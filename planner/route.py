@@ -236,5 +236,5 @@ def _must_touch(stage: Stage) -> None:
     stance = stage.question.stance
     hand = next(hand for hand in stance.hands if hand.limb == stage.limb)
     settled = settle(hand, stance)
-    if not (settled.touching.any() or settled.palm.engaged):
+    if not (settled.holding.any() or settled.palm.engaged):
         raise InvalidInputError(f"{hand.limb} touches nothing there", field="hold")

@@ -310,7 +310,7 @@ class _Answer:
         elif self.certificate is not None:
             status = "infeasible"
             verified = True
-            touching = any(h.touching.any() or h.palm.engaged for h in self.settled)
+            touching = any(h.holding.any() or h.palm.engaged for h in self.settled)
             reason = shortfall_sentence(self.certificate, touching)
         else:
             reason = f"the solver gave no usable answer ({self.outcome.status})"

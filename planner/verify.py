@@ -176,7 +176,8 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             drag += model.shear_gain * (tension - hand.closing_tension)
             shear = np.append(drag if base.contact != "none" else 0.0, shear)
             normal = np.append(0.0, normal)
-        if hand.hand.finger.friction > 0.0 and any(finger.touching):
+        hooked = planned.tiles[-1].contact == NAIL
+        if hand.hand.finger.friction > 0.0 and (any(finger.touching) or hooked):
             slack = hand.closing_tension - tension
             if slack > allowed:
                 found.append(
@@ -196,15 +197,7 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
                 found.append(f"{name} carries {t:.6g}, {n:.6g} N, not what the plan says")
             if t < -allowed:
                 found.append(f"{name} would be dragged backwards with {-t:.3g} N")
-            force = (
-                tile.shear * tile.shear_axis
-                + tile.normal * tile.normal_axis
-                + tile.lateral * tile.lateral_axis
-            )
-            if not np.abs(force - tile.force).max() <= allowed:
-                found.append(f"{name}: force and loads disagree")
-            if tile.contact == "none" and np.abs(tile.force).max() > 0.0:
-                found.append(f"{name} carries a load but touches nothing")
+            _check_force(found, name, tile, allowed)
             wrench += np.concatenate([tile.force, np.cross(tile.position, tile.force)])
             touches = tile.contact in ("face", "edge")
             if not touches and n < -allowed:
@@ -224,6 +217,19 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
     worst = max(worst, _check_held(found, hand, plan, allowed))
     _compare(found, limb, worst, plan.utilisation)
     return worst
+
+
+def _check_force(found: list[str], name: str, tile: TileLoad, allowed: float) -> None:
+    """Check that a force is the sum of its loads, and that something is there to bear it."""
+    force = (
+        tile.shear * tile.shear_axis
+        + tile.normal * tile.normal_axis
+        + tile.lateral * tile.lateral_axis
+    )
+    if not np.abs(force - tile.force).max() <= allowed:
+        found.append(f"{name}: force and loads disagree")
+    if tile.contact == "none" and np.abs(tile.force).max() > 0.0:
+        found.append(f"{name} carries a load but touches nothing")
 
 
 def _check_drive(
@@ -284,25 +290,37 @@ def _check_nail(
     limb: str,
     allowed: float,
 ) -> float:
-    """Check a nail that clings: its balance about its pin, its friction; return its utilisation."""
+    """Check a nail: balance about its pin and the joints, friction; return its utilisation."""
     name = f"{limb}: nail of {planned.name}"
+    _check_force(found, name, tile, allowed)
     if tile.contact != NAIL:
-        if np.abs(tile.force).max() > 0.0:
-            found.append(f"{name} carries a load but touches nothing")
         return 0.0
     index = FINGERS.index(planned.name)
     frame, nail = hand.hand.frames(hand.grasp.outer_rotation)[index], hand.hand.nail
+    model, structure = hand.hand.finger, hand.hand.structure
     x, z = _nail_arm(hand, planned, tile.position)
     along, into = float(tile.force @ frame.along), float(tile.force[2])
+    local = planned.tendon_tension
+    if planned.name.startswith("outer"):
+        local *= 1.0 - model.friction
+    # about the joints from the base outward, then about the nail's pin
+    for i, (radius, preload) in enumerate(
+        zip(model.pulley_radii, model.joint_preload, strict=True)
+    ):
+        far = (len(model.pulley_radii) - i) * model.joint_spacing
+        closing = local * radius - preload - ((far + x) * into - z * along)
+        if closing > allowed * far:
+            found.append(f"{name} lets joint {i + 1} of its finger close, by {closing:.3g} N·m")
+        local *= 1.0 - model.friction
     held = nail.preload + nail.stiffness * math.atan2(z, x)
-    turning = planned.tendon_tension * nail.pulley_radius - held - (x * into - z * along)
-    if not abs(turning) <= allowed * nail.length:
+    turning = local * nail.pulley_radius - held - (x * into - z * along)
+    if not abs(turning) <= allowed * math.hypot(x, z):
         found.append(f"{name} is out of balance by {turning:.3g} N·m")
     pressed = -float(tile.force @ hand.nail_normals[index])
     dragged = float(np.linalg.norm(tile.force + pressed * hand.nail_normals[index]))
     if pressed < -allowed or dragged > nail.friction * pressed + allowed:
         found.append(f"{name} would slip: {dragged:.3g} N along rock pressed with {pressed:.3g} N")
-    used = -along / hand.hand.structure.finger_shear
+    used = max(-along / structure.finger_shear, into / structure.fingertip_force)
     _compare(found, name, used, tile.utilisation)
     return used
 

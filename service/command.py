@@ -103,8 +103,8 @@ def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
     STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance: boulders, overhang, slab, wall, wall-300, wall-700. ROUTE is the same of a
-    climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
+    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-700. ROUTE is the same
+    of a climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.

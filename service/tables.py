@@ -139,13 +139,13 @@ def table_of(*names: str) -> Table:
 
 def _hand_table(hands: Iterable[Hand]) -> Table:
     table = table_of("hand")
-    for name in (*AXES, "palm\nshear", "palm\npress", "util"):
+    for name in (*AXES, "hand\nutil", "palm\nshear", "palm\npress"):
         table.add_column(name, justify="right")
     for hand in hands:
         force = hand.palm.force
         cells = [_fixed(value, 0) for value in hand.wrench[:3]]
         cells += [_fixed(value, 1) for value in hand.wrench[3:]]
-        cells += [_fixed(-force[0], 0), _fixed(force[2], 0), _fixed(hand.utilisation, 2)]
+        cells += [_fixed(hand.utilisation, 2), _fixed(-force[0], 0), _fixed(force[2], 0)]
         table.add_row(hand.limb, *cells)
     return table
 

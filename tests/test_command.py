@@ -140,7 +140,7 @@ def test_a_stance_from_standard_input(
     assert result(capfd)["id"] == "wall"
 
 
-@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab", "boulders"])
+@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab", "boulders", "ledge"])
 def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert name in bundled()
     assert run(["plan", name, "--json"]) in (DONE, OVERLOADED)

@@ -234,6 +234,35 @@ def test_a_strip_with_one_side_is_refused():
     assert caught.value.field == "faces"
 
 
+@pytest.mark.parametrize("order", range(5))
+def test_where_three_triangles_meet_none_turns_another(order):
+    # two boxes that touch along an edge, and a fin on an edge of one; in any order
+    box = trimesh.creation.box((0.3, 0.3, 0.2))
+    corners = np.asarray(box.vertices)
+    vertices = np.vstack([corners, corners + np.array([0.3, 0.0, 0.2]), [[-0.3, 0.0, -0.2]]])
+    corner = np.flatnonzero((corners[:, [0, 2]] < 0.0).all(axis=1))
+    faces = np.vstack([box.faces, box.faces + 8, [[*corner, 16]]])
+    order = np.random.default_rng(order).permutation(len(faces))
+    np.testing.assert_array_equal(
+        wound_alike(weld(Triangles(vertices, faces[order]))).faces,
+        weld(Triangles(vertices, faces[order])).faces,
+    )
+
+
+def test_a_cut_without_end_is_refused():
+    rng = np.random.default_rng(0)
+    soup = rng.uniform([-0.2, -0.2, 0.0], [0.2, 0.2, 0.2], (3000, 3))
+    faces = np.arange(3000).reshape(-1, 3)
+    faces = np.where(
+        np.cross(*(soup[faces[:, i]] - soup[faces[:, 0]] for i in (1, 2)))[:, 2:] > 0.0,
+        faces[:, ::-1],
+        faces,
+    )
+    with pytest.raises(InvalidInputError, match="at most 4 m is possible") as caught:
+        HAND.settle(Mesh(soup, faces), ROCK)
+    assert caught.value.field == "hold"
+
+
 def test_triangles_that_share_no_vertices_are_welded():
     vertices, faces = cylinder_mesh(0.3, 128)
     soup = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
@@ -326,12 +355,24 @@ def test_files_are_read(tmp_path, ending):
     np.testing.assert_allclose(got.positions, want.positions, atol=1e-5)
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no mesh at all", b"solid x\nendsolid x\n"])
-def test_what_is_no_mesh_is_refused(tmp_path, content):
-    path = tmp_path / "rock.stl"
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("rock.stl", None, "no such file"),
+        ("rock.stl", b"", "rock.stl"),
+        ("rock.stl", b"no mesh at all", "rock.stl"),
+        ("rock.stl", b"solid x\nendsolid x\n", "rock.stl"),
+        ("rock.stl", b"\0" * 80 + b"\xff" * 500, "broken or cut short"),
+        ("rock", b"solid x", "ends in .stl, .ply, .obj, .off"),
+        (".", None, "ends in .stl, .ply, .obj, .off"),
+        ("rock" * 100 + ".stl", None, "File name too long"),
+    ],
+)
+def test_what_is_no_mesh_is_refused(tmp_path, name, content, words):
+    path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InvalidInputError) as caught:
         read_mesh(path)
     assert caught.value.field == "file"
-    assert "rock.stl" in caught.value.message
+    assert words in caught.value.message

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from hands import HAND, ROCK
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rocks import distance, random_axes, random_profile
+from scipy.optimize import lsq_linear
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane
 from hand_models.profile import STRIPS, Profile
@@ -108,11 +110,12 @@ def test_a_section_never_leaves_raw_rock_outside(seed):
         ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "points", "2 to 5000 points"),
         ([[0.0, 0.0], [1.0]], "points", "two numbers"),
         ([[0.0, 0.0], [0.1, math.nan]], "points[1]", "finite"),
-        ([[0.0, 0.0], [300.0, 0.0]], "points[1]", "at most 100 m"),
+        ([[0.0, 0.0], [300.0, 0.0]], "points[1]", "at most 10 "),
         ([[0.0, 0.0], [0.1, 0.1], [0.0, 0.2]], "points", "another x"),
         ([[-0.1, 0.0], [0.1, 0.1], [0.1, 0.0], [-0.1, 0.1], [0.2, 0.3]], "points", "crosses"),
         ([[-0.1, 0.0], [0.2, 0.0], [0.1, 0.0], [0.3, 0.1]], "points", "crosses"),
         ([[-0.1, 0.0], [0.1, 0.1], [0.1, 0.0], [-0.1, 0.0], [0.2, 0.3]], "points", "crosses"),
+        (np.column_stack([np.arange(50) / 100, np.arange(50) % 2]), "points", "at most 10 times"),
         ({"outer_left": [[0.0, 0.0], [0.1, 0.0]]}, "profiles", "one outline for each of"),
         (
             {name: [[0.0, 0.0], [0.1, 0.0]][: 1 + (name != "inner_right")] for name in STRIPS},
@@ -125,3 +128,33 @@ def test_impossible_outlines_are_refused_by_field(points, field, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
         Profile(points)
     assert caught.value.field == field
+
+
+@settings(max_examples=300, deadline=None)
+@given(seeds)
+def test_an_outline_is_refused_if_and_only_if_two_of_its_pieces_meet(seed):
+    rng = np.random.default_rng(seed)
+    points = np.round(rng.uniform(-1.0, 1.0, (rng.integers(3, 8), 2)) * 3.0) / 3.0
+    points = points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))]
+    assume(points[0, 0] != points[-1, 0])
+    pieces = [(points[i], points[i + 1]) for i in range(len(points) - 1)]
+    meet = any(
+        gap(*one, *other) < 1e-9 if j > i + 1 else turns_back(*one, other[1])
+        for (i, one), (j, other) in itertools.combinations(enumerate(pieces), 2)
+    )
+    if meet:
+        with pytest.raises(InvalidInputError, match="crosses"):
+            Profile(points)
+    else:
+        Profile(points)
+
+
+def gap(a, b, c, d):
+    """Least distance between two straight pieces, by quadratic programming over a square."""
+    basis = np.column_stack([b - a, c - d])
+    return math.sqrt(2.0 * lsq_linear(basis, c - a, (0.0, 1.0), method="bvls", tol=1e-15).cost)
+
+
+def turns_back(a, b, c):
+    one, other = b - a, c - b
+    return one[0] * other[1] == one[1] * other[0] and float(one @ other) < 0.0

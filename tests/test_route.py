@@ -193,6 +193,7 @@ def test_every_hand_of_the_route_is_within_its_limbs_reach(route):
         ("wall", "optimal"),
         ("overhang", "optimal"),
         ("slab", "optimal"),
+        ("ledge", "optimal"),
     ],
 )
 def test_what_the_bundled_stances_come_to(name: str, status: str):

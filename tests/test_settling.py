@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold, random_mesh, random_profile
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface
+from hand_models.contact_states import close, stays
 from hand_models.finger import SettledFinger
 from hand_models.profile import Profile
 from hand_models.sections import RoundSection
-from hand_models.settling import PATTERNS, close, posture, settle, stays
+from hand_models.settling import PATTERNS, posture, settle
 
 MODEL = HAND.finger
 DEEPEST = 1e-4

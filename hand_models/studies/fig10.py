@@ -235,7 +235,7 @@ def _claims_of_the_curve(
             "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
             surface.shear_limit,
             of_trials.shear_limit,
-            abs(of_trials.shear_limit - surface.shear_limit) <= surface.shear_scatter,
+            abs(of_trials.shear_limit - surface.shear_limit) <= error,
             role="calibration",
         ),
         Claim(
