@@ -74,7 +74,7 @@ def test_with_equal_axes_it_is_a_sphere(rotation: float):
     assert same.seating.rule == ball.seating.rule
     # a phalanx that swings back balances on a sketch of the ellipsoid
     np.testing.assert_allclose(same.positions, ball.positions, atol=1e-5)
-    np.testing.assert_allclose(same.loads, ball.loads, atol=0.02)
+    np.testing.assert_allclose(same.loads, ball.loads, atol=0.05)
     assert same.palm.engaged == ball.palm.engaged
 
 
