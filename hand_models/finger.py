@@ -165,6 +165,13 @@ class Contact:
             self.joint[1] + self.along * sine + height * cosine,
         )
 
+    def end(self, spacing: float) -> tuple[float, float]:
+        """Return the place (x, z) of the next joint, ``spacing`` from this one [m]."""
+        return (
+            self.joint[0] + spacing * math.cos(self.angle),
+            self.joint[1] + spacing * math.sin(self.angle),
+        )
+
 
 @dataclass(frozen=True)
 class SettledFinger:
@@ -213,12 +220,12 @@ class SettledFinger:
     @property
     def pin(self) -> tuple[float, float]:
         """(x, z) of the fingernail's pin in F, at the end of the last phalanx [m]."""
-        u, v = self.directions[-1]
-        x, z = self.contacts[-1].joint
-        return (
-            x + self.model.joint_spacing * float(u),
-            z + self.model.joint_spacing * float(v),
-        )
+        return self.contacts[-1].end(self.model.joint_spacing)
+
+    @property
+    def chain(self) -> Array:
+        """The finger's joints and its end in (x, z) of F, shape (4, 2) [m]."""
+        return np.array([*(contact.joint for contact in self.contacts), self.pin])
 
     def losses(self, base_tile: bool) -> Array:
         """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).

@@ -261,6 +261,13 @@ class _Frame:
     across: Array
 
 
+def _cut(frame: _Frame, hold: Hold, grasp: Grasp, hand_in_hold: Pose) -> Section | None:
+    """Return the rock in the plane of a finger's frame, raw under one that clings."""
+    cut = hold.raw_section if grasp.fingernail else hold.section
+    rotation = hand_in_hold.rotation
+    return cut(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
+
+
 class SpinyHand:
     """The hand's geometry and mechanics.
 
@@ -332,11 +339,8 @@ class SpinyHand:
 
     def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
         """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""
-        hand_in_hold = hold_in_hand.inverse()
         frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
-        cut = hold.raw_section if grasp.fingernail else hold.section
-        rotation = hand_in_hold.rotation
-        return cut(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
+        return _cut(frame, hold, grasp, hold_in_hand.inverse())
 
     def settle(
         self,
@@ -375,7 +379,7 @@ class SpinyHand:
         palm = self._settle_palm(hold, surface, grasp, hand_in_hold)
 
         frames = self.frames(grasp.outer_rotation)
-        sections = [self.section(name, hold, grasp, seating.pose) for name in FINGERS]
+        sections = [_cut(frame, hold, grasp, hand_in_hold) for frame in frames]
         closed = [
             self._close(name, section, surface, grasp, closing)
             for name, section in zip(FINGERS, sections, strict=True)

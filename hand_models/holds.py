@@ -64,12 +64,12 @@ class Hold(ABC):
         Negative where the point is inside; infinite where the line misses the rock.
         """
 
-    @abstractmethod
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
         """Return depth of the centre [m] and radius [m] of the crest's circle at y = ``offset``.
 
         None where the plane at that offset meets nothing round.
         """
+        return None
 
     def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
         """Return the point (x, z) at y = ``offset`` where rock runs at an angle from x toward z.
@@ -102,9 +102,6 @@ class Plane(Hold):
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         slope = float(np.asarray(direction)[2])
         return -float(np.asarray(point)[2]) / slope if slope > PARALLEL else math.inf
-
-    def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        return None
 
 
 class _Extruded(Hold):
@@ -306,9 +303,6 @@ class Ellipsoid(Hold):
         a, b = float(d @ d), float(p @ d)
         discriminant = b**2 - a * (float(p @ p) - 1.0)
         return (-b - math.sqrt(discriminant)) / a if discriminant >= 0.0 else math.inf
-
-    def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        return None
 
     def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
         a, b, c = self.semi_axes

@@ -21,10 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Indices
-from hand_models.holds import Hold
+from hand_models.outlined import OutlinedHold
 from hand_models.parameters import scan_table
-from hand_models.sections import Section
-from hand_models.smoothing import Scale, raw_within, within
 from hand_models.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
 
 __all__ = ["Mesh", "read_mesh"]
@@ -67,7 +65,7 @@ def read_mesh(path: Path) -> tuple[Array, Indices]:
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.intp)
 
 
-class Mesh(Hold):
+class Mesh(OutlinedHold):
     """Triangles of rock.
 
     Parameters
@@ -93,13 +91,13 @@ class Mesh(Hold):
     shape = "mesh"
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        super().__init__()
         table = scan_table()
         given = _checked(vertices, faces, table.scalar("scan", "largest"))
         welded = weld(given)
         if not len(welded.faces):
             raise InvalidInputError("no triangle has an area", field="faces")
         self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
-        self._scale = Scale.default()
         self._view: _View | None = None
         self._check_place(table.scalar("scan", "near"), table.vector("scan", "view"))
 
@@ -127,14 +125,6 @@ class Mesh(Hold):
                 field="faces",
             )
 
-    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        return within(self._pieces(origin, s_axis, t_axis), self._scale)
-
-    def raw_section(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
-    ) -> Section | None:
-        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
-
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the cut through the triangles, small gaps bridged."""
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
@@ -142,9 +132,6 @@ class Mesh(Hold):
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         return self._facing(np.asarray(direction, dtype=float)).entry(point)
-
-    def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        return None
 
     def _facing(self, direction: Array) -> _View:
         """Return the triangles as seen along a direction; the last such view is kept."""

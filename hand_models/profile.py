@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
-from hand_models.holds import PARALLEL, Hold
+from hand_models.holds import PARALLEL
+from hand_models.outlined import OutlinedHold
 from hand_models.parameters import hand_table, scan_table
-from hand_models.sections import Section
-from hand_models.smoothing import Scale, raw_within, within
+from hand_models.smoothing import Scale
 
 __all__ = ["STRIPS", "Profile"]
 
@@ -33,7 +33,7 @@ MOST_POINTS: Final = 5000
 """Points of an outline, at most."""
 
 
-class Profile(Hold):
+class Profile(OutlinedHold):
     """Rock drawn out along y.
 
     Parameters
@@ -53,6 +53,7 @@ class Profile(Hold):
     shape = "profile"
 
     def __init__(self, points: ArrayLike | Mapping[str, ArrayLike]) -> None:
+        super().__init__()
         largest = scan_table().scalar("scan", "largest_outline")
         if isinstance(points, Mapping):
             if set(points) != set(STRIPS):
@@ -69,7 +70,6 @@ class Profile(Hold):
         hand = hand_table()
         inner = hand.vector("fingers", "inner_joint")[1]
         self._half_way = 0.5 * (inner + hand.vector("fingers", "outer_axis")[1])
-        self._scale = Scale.default()
 
     def _outline(self, y: float) -> Array:
         """Return the outline of the strip at y."""
@@ -78,14 +78,6 @@ class Profile(Hold):
         return self.outlines[
             int(np.searchsorted([-self._half_way, 0.0, self._half_way], -y, side="right"))
         ]
-
-    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        return within(self._pieces(origin, s_axis, t_axis), self._scale)
-
-    def raw_section(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
-    ) -> Section | None:
-        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
 
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the outline in a plane, rock on its left."""
@@ -129,9 +121,6 @@ class Profile(Hold):
             if entering[last]:
                 return float(where[last])
         return float(where[entering & ~behind].min(initial=math.inf))
-
-    def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        return None
 
 
 def _checked(points: ArrayLike, field: str, largest: float) -> Array:

@@ -110,13 +110,13 @@ def settle(
     contacts = list(laid)
     before = 0.0
     if laid:
-        before, joint = laid[-1].angle, _next_joint(model, laid[-1])
+        before, joint = laid[-1].angle, laid[-1].end(model.joint_spacing)
     ranges = list(zip(model.joint_lower, model.joint_upper, strict=True))
     for lower, upper in ranges[len(laid) :]:
         contact = _lay(model, section, joint, before + lower, before + upper)
         contacts.append(contact)
         before = contact.angle
-        joint = _next_joint(model, contact)
+        joint = contact.end(model.joint_spacing)
     return SettledFinger(model, tuple(contacts))
 
 
@@ -158,7 +158,7 @@ def held(
 
     It is held there by the spines of its tile, if they reach the rock.
     """
-    joint = _next_joint(model, laid[-1]) if laid else (0.0, 0.0)
+    joint = laid[-1].end(model.joint_spacing) if laid else (0.0, 0.0)
     reaching = _reaching(model, section, angle, joint)
     return settle(model, section, (0.0, 0.0), [*laid, reaching])
 
@@ -171,13 +171,6 @@ def _reaching(model: FingerModel, section: Section, angle: float, joint: Vector2
     if 0.0 <= gaps[nearer] <= model.spine_travel:
         return edges[nearer]
     return Contact(angle, joint, model.tile_centre, "none", "balance")
-
-
-def _next_joint(model: FingerModel, contact: Contact) -> Vector2:
-    return (
-        contact.joint[0] + model.joint_spacing * math.cos(contact.angle),
-        contact.joint[1] + model.joint_spacing * math.sin(contact.angle),
-    )
 
 
 def posture(model: FingerModel, section: Section | None, pattern: Pattern) -> SettledFinger | None:
@@ -193,7 +186,7 @@ def posture(model: FingerModel, section: Section | None, pattern: Pattern) -> Se
         contacts.append(
             Contact(before + limits[i], joint, model.tile_centre, "none", pattern.stops[i])
         )
-        joint, before = _next_joint(model, contacts[-1]), contacts[-1].angle
+        joint, before = contacts[-1].end(model.joint_spacing), contacts[-1].angle
     for link, bearing in zip(_links(pattern.stops), pattern.bearing, strict=True):
         if section is None:
             return None
@@ -201,7 +194,7 @@ def posture(model: FingerModel, section: Section | None, pattern: Pattern) -> Se
         if turned is None:
             return None
         contacts += turned
-        joint, before = _next_joint(model, contacts[-1]), contacts[-1].angle
+        joint, before = contacts[-1].end(model.joint_spacing), contacts[-1].angle
     finger = SettledFinger(model, tuple(contacts))
     return finger if is_clear(finger, section) else None
 
@@ -226,7 +219,7 @@ def _turn(
     # in the frame of the link's first phalanx: angle and joint of each, up to the one that bears
     angles, joints = [0.0], [(0.0, 0.0)]
     for i in link[1:]:
-        there = _next_joint(model, Contact(angles[-1], joints[-1], 0.0, "none"))
+        there = Contact(angles[-1], joints[-1], 0.0, "none").end(model.joint_spacing)
         angles.append(angles[-1] + limits[i])
         joints.append(there)
     k = bearing - link.start
@@ -252,7 +245,7 @@ def _turn(
             contacts.append(_bearing(model, section, own, joint, stop))
         else:
             contacts.append(Contact(turned, joint, model.tile_centre, "none", stop))
-        joint = _next_joint(model, contacts[-1])
+        joint = contacts[-1].end(model.joint_spacing)
     return contacts
 
 
@@ -262,7 +255,7 @@ def straight(model: FingerModel, section: Section | None) -> SettledFinger | Non
     joint = (0.0, 0.0)
     for _ in range(JOINTS):
         contacts.append(Contact(0.0, joint, model.tile_centre, "none", "balance"))
-        joint = _next_joint(model, contacts[-1])
+        joint = contacts[-1].end(model.joint_spacing)
     finger = SettledFinger(model, tuple(contacts))
     return finger if is_clear(finger, section) else None
 
@@ -274,7 +267,7 @@ def intrusion(model: FingerModel, section: Section, *, straight: bool = False) -
         angle += 0.0 if straight else lower
         clearance = section.face_clearance(joint, *model.tile_range, model.tile_height, angle)
         deepest = max(deepest, -clearance)
-        joint = _next_joint(model, Contact(angle, joint, 0.0, "none"))
+        joint = Contact(angle, joint, 0.0, "none").end(model.joint_spacing)
     return deepest
 
 

@@ -200,8 +200,7 @@ def _draw_nail(
 
 def _chain(finger: SettledFinger) -> Array:
     """Return a finger's joints and its tip in (x, z) of F, shape (4, 2) [mm]."""
-    tip = _along(finger.contacts[-1], finger.model.joint_spacing, 0.0)
-    return MM * np.array([*(contact.joint for contact in finger.contacts), tip])
+    return MM * finger.chain
 
 
 def _along(contact: Contact, along: float, height: float) -> tuple[float, float]:

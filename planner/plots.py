@@ -164,16 +164,7 @@ def _finger_chains(settled: SettledHand) -> list[Array]:
     up = np.array([0.0, 0.0, 1.0])
     frames = settled.hand.frames(settled.grasp.outer_rotation)
     for frame, finger in zip(frames, settled.fingers, strict=True):
-        points = [contact.joint for contact in finger.contacts]
-        last = finger.contacts[-1]
-        spacing = finger.model.joint_spacing
-        points.append(
-            (
-                last.joint[0] + spacing * float(np.cos(last.angle)),
-                last.joint[1] + spacing * float(np.sin(last.angle)),
-            )
-        )
-        flat = np.array(points)
+        flat = finger.chain
         chains.append(frame.joint + flat[:, :1] * frame.along + flat[:, 1:] * up)
     return chains
 

@@ -295,17 +295,41 @@ def demo(picture: Path, as_json: bool) -> int:
     return status
 
 
+def _folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    return click.option(
+        "-o",
+        "--output",
+        "folder",
+        type=click.Path(path_type=Path, file_okay=False),
+        required=True,
+        metavar="DIR",
+        help=text,
+    )
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard error while the work lasts; yields what tells it done and total."""
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _filling_folder() -> Iterator[None]:
+    """Turn what goes wrong in writing a folder into one line about it."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+
+
 @crux.command()
 @click.argument("route")
-@click.option(
-    "-o",
-    "--output",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    required=True,
-    metavar="DIR",
-    help="Where the table, the picture and the summary go.",
-)
+@_folder_option("Where the table, the picture and the summary go.")
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
@@ -315,24 +339,16 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
 
     ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
     """
-    from rich.progress import Progress
-
     from planner.report import summary, write_report
     from planner.route import evaluate
     from service import questions
     from service.climb import print_route
 
     climb = questions.route(read_route(route))
-    screen = console(stderr=True)
-    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task(f"planning {climb.name}", total=None)
-        result = evaluate(
-            climb, workers, lambda done, total: bar.update(task, completed=done, total=total)
-        )
-    try:
+    with _progress(f"planning {climb.name}") as tell:
+        result = evaluate(climb, workers, tell)
+    with _filling_folder():
         files = write_report(result, folder)
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
     if as_json:
         _say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
     else:
@@ -344,35 +360,18 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
 
 @crux.command()
 @click.argument("name")
-@click.option(
-    "-o",
-    "--output",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    required=True,
-    metavar="DIR",
-    help="Where result.json and the pictures go.",
-)
+@_folder_option("Where result.json and the pictures go.")
 @json_option
 def study(name: str, folder: Path, as_json: bool) -> None:
     """Run an experiment of the paper again, and hold its claims against the model.
 
     NAME is that of the figure: fig06, fig07, fig10. The exit status is 0 whatever the claims say.
     """
-    from rich.progress import Progress
-
     from hand_models import studies
     from service.studies import print_study
 
-    screen = console(stderr=True)
-    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task(name, total=None)
-        try:
-            result, files = studies.run_study(
-                name, folder, lambda done, total: bar.update(task, completed=done, total=total)
-            )
-        except OSError as error:
-            raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+    with _filling_folder(), _progress(name) as tell:
+        result, files = studies.run_study(name, folder, tell)
     if as_json:
         _say(studies.as_json(result) | {"files": [str(path) for path in files]})
     else:

@@ -1,0 +1,33 @@
+"""Holds that a finger's plane cuts in outlines: raw for nails, at a tile's scale for fingers."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from numpy.typing import ArrayLike
+
+from hand_models.frames import Array
+from hand_models.holds import Hold
+from hand_models.sections import Section
+from hand_models.smoothing import Scale, raw_within, within
+
+__all__ = ["OutlinedHold"]
+
+
+class OutlinedHold(Hold):
+    """Rock that is known by raw polylines in each plane."""
+
+    def __init__(self) -> None:
+        self._scale = Scale.default()
+
+    @abstractmethod
+    def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
+        """Return the raw outlines in a plane, rock on their left; arguments as of `section`."""
+
+    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        return within(self._pieces(origin, s_axis, t_axis), self._scale)
+
+    def raw_section(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
+    ) -> Section | None:
+        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
