@@ -11,27 +11,19 @@ and so are the loads of the motors and of the structure.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from hand_models.errors import EmptySetError
-from hand_models.finger import PHALANGES
 from hand_models.frames import Array, Indices
-from hand_models.hand import FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR, SettledHand, Tile
-from hand_models.spines import HalfPlane
+from hand_models.hand import FINGERS, SettledHand
+from hand_models.row_layout import RowLayout, row_layout
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
 
 __all__ = ["TensionLimit", "parallelepiped", "tension_limits", "wrench_space"]
-
-PALM_SHEAR = "palm_shear"
-PALM_PRESSING = "palm_pressing"
-HAND_LOAD = "hand_load"
-TENDON_LIMITS = ("tendon_tension", "motor_torque", "motor_current")
-"""Limits of each tendon, in the order of their rows."""
 
 
 class TensionLimit(NamedTuple):
@@ -81,7 +73,7 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
     engaged = [i for i in range(fingers) if touching[finger_of == i].any()]
     reacting = engaged if settled.grasp.lateral else []
     palm = settled.palm
-    layout = _layout(
+    layout = row_layout(
         settled.tiles,
         tuple(engaged),
         tuple(reacting),
@@ -134,7 +126,7 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
 
 
 def _limit_rows(
-    settled: SettledHand, layout: _Layout, lateral_column: Indices, maximum: float
+    settled: SettledHand, layout: RowLayout, lateral_column: Indices, maximum: float
 ) -> tuple[Array, Array, Array]:
     """Return L, l0 and s of all limit rows but the last, those of the whole hand's force."""
     finger_of, loads, palm = settled.finger_of, settled.loads, settled.palm
@@ -190,7 +182,7 @@ def _limit_rows(
     return L, l0, s
 
 
-def _hard_rows(settled: SettledHand, layout: _Layout) -> tuple[Array, Array]:
+def _hard_rows(settled: SettledHand, layout: RowLayout) -> tuple[Array, Array]:
     """Return H and h."""
     finger_of, loads = settled.finger_of, settled.loads
     nh = len(layout.hard)
@@ -222,119 +214,6 @@ def _hard_rows(settled: SettledHand, layout: _Layout) -> tuple[Array, Array]:
     if settled.palm.engaged:
         H[-2, -2] = H[-1, -1] = -1.0
     return H, h
-
-
-class _Layout(NamedTuple):
-    """Names and constant coefficients, which only depend on what touches.
-
-    Attributes
-    ----------
-    columns : tuple of str
-    limits, hard : tuple of Row
-    planes : tuple of ndarray
-        Tile, a_shear, a_normal, a_lateral (with its sign) and capacity of each tile's limit rows.
-    engaged : tuple of int
-        Fingers with a tile on rock.
-    drawing : tuple of int
-        Those and the fingers whose nail hooks.
-    tips, frames : tuple of int
-        Distal tiles whose phalanx presses on rock; tiles whose phalanx does so beside them.
-    nail_columns : tuple of int
-        Of the loads along the nails that hook.
-    sticking : bool
-        Whether the tendons have friction, so that they must not be slackened.
-    """
-
-    columns: tuple[str, ...]
-    limits: tuple[Row, ...]
-    hard: tuple[Row, ...]
-    planes: tuple[Indices, Array, Array, Array, Array]
-    engaged: tuple[int, ...]
-    drawing: tuple[int, ...]
-    tips: tuple[int, ...]
-    frames: tuple[int, ...]
-    nail_columns: tuple[int, ...]
-    sticking: bool
-
-
-@lru_cache(maxsize=512)
-def _layout(
-    tiles: tuple[Tile, ...],
-    engaged: tuple[int, ...],
-    reacting: tuple[int, ...],
-    pieces: tuple[HalfPlane, ...],
-    stops: tuple[tuple[int, int], ...],
-    palm: bool,
-    sticking: bool,
-) -> _Layout:
-    columns = [f"{finger}/tension" for finger in FINGERS]
-    columns += [f"{FINGERS[i]}/lateral" for i in reacting]
-    nails = [tile.finger for tile in tiles if tile.contact == NAIL]
-    nail_columns = range(len(columns), len(columns) + len(nails))
-    columns += [f"{finger}/{NAIL}" for finger in nails]
-    drawing = sorted({*engaged, *(FINGERS.index(finger) for finger in nails)})
-    limits, hard = [], []
-    planes: list[tuple[int, float, float, float, float]] = []
-    touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
-    frames = [i for i, tile in enumerate(tiles) if tile.contact == "frame"]
-    tips = [i for i, t in enumerate(tiles) if t.phalanx == "distal" and t.contact != "none"]
-    for i in touching:
-        finger, phalanx = tiles[i].finger, tiles[i].phalanx
-        pulls = 0
-        for piece in pieces:
-            pulls += piece.limit == "pull_off"
-            label = f"{finger}/{phalanx}/{piece.limit}" + (f"_{pulls}" if pulls > 1 else "")
-            signs = (("+", 1.0), ("-", -1.0)) if FINGERS.index(finger) in reacting else (("", 0.0),)
-            for sign, factor in signs:
-                limits.append(Row(finger, phalanx, piece.limit, "limit", label + sign))
-                planes.append(
-                    (i, piece.a_shear, piece.a_normal, factor * piece.a_lateral, piece.capacity)
-                )
-    for name in TENDON_LIMITS:
-        limits += [_row(finger, None, name, "limit") for finger in FINGERS]
-    limits += [_row(FINGERS[i], None, "finger_shear", "limit") for i in engaged]
-    limits += [_row(tiles[i].finger, "distal", FINGERTIP_FORCE, "limit") for i in tips]
-    for finger in nails:
-        limits += [_row(finger, NAIL, name, "limit") for name in (NAIL_SHEAR, FINGERTIP_FORCE)]
-    hard += [_row(finger, None, "slack_tendon", "hard") for finger in FINGERS]
-    for name, those in (("dragged_backwards", touching), ("frame_pulled", frames)):
-        hard += [_row(tiles[i].finger, tiles[i].phalanx, name, "hard") for i in those]
-    for finger_index, joint in stops:
-        hard.append(_row(FINGERS[finger_index], PHALANGES[joint], "joint_stop", "hard"))
-    for finger in nails:
-        for name, label in (("nail_lifts", ""), ("nail_slips", "+"), ("nail_slips", "-")):
-            hard.append(Row(finger, NAIL, name, "hard", f"{finger}/{NAIL}/{name}{label}"))
-        hard += [_row(finger, phalanx, "joint_stop", "hard") for phalanx in PHALANGES]
-    if sticking:
-        hard += [_row(FINGERS[i], None, "tendon_sticks", "hard") for i in drawing]
-    if palm:
-        columns += [PALM_SHEAR, PALM_PRESSING]
-        limits += [Row(None, None, name, "limit", name) for name in (PALM_SHEAR, PALM_PRESSING)]
-        hard += [
-            Row(None, None, f"{name}_reversed", "hard", f"{name}_reversed")
-            for name in (PALM_SHEAR, PALM_PRESSING)
-        ]
-    limits += [
-        Row(None, None, HAND_LOAD, "limit", f"{HAND_LOAD}/{k + 1}") for k in range(len(HELD))
-    ]
-    table = np.array(planes).reshape(-1, 5)
-    return _Layout(
-        tuple(columns),
-        tuple(limits),
-        tuple(hard),
-        (table[:, 0].astype(np.intp), table[:, 1], table[:, 2], table[:, 3], table[:, 4]),
-        engaged,
-        tuple(drawing),
-        tuple(tips),
-        tuple(frames),
-        tuple(nail_columns),
-        sticking,
-    )
-
-
-def _row(finger: str, phalanx: str | None, limit: str, kind: Literal["limit", "hard"]) -> Row:
-    label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
-    return Row(finger, phalanx, limit, kind, label)
 
 
 def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -27,7 +27,7 @@ from hand_models.fingernail import Cling, Fingernail
 from hand_models.frames import Array, Indices, Pose
 from hand_models.holds import Hold
 from hand_models.limit_pieces import HalfPlane
-from hand_models.palm import shear_capacity
+from hand_models.palm import PalmTendon, shear_capacity
 from hand_models.parameters import ParameterTable, hand_table
 from hand_models.seating import Seating, seat
 from hand_models.sections import Section
@@ -35,7 +35,17 @@ from hand_models.settling import intrusion
 from hand_models.spines import Surface
 from hand_models.structure import Structure
 
-__all__ = ["FINGERS", "Grasp", "Palm", "Seating", "SettledHand", "SpinyHand", "Tile", "spiny_hand"]
+__all__ = [
+    "FINGERS",
+    "FingerFrame",
+    "Grasp",
+    "Palm",
+    "Seating",
+    "SettledHand",
+    "SpinyHand",
+    "Tile",
+    "spiny_hand",
+]
 
 FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
 """Order of every list of four tensions; left is +y of H."""
@@ -253,7 +263,7 @@ class SettledHand:
 
 
 @dataclass(frozen=True)
-class _Frame:
+class FingerFrame:
     """A finger's frame in H: the proximal joint, and unit vectors along and across the finger."""
 
     joint: Array
@@ -261,7 +271,7 @@ class _Frame:
     across: Array
 
 
-def _cut(frame: _Frame, hold: Hold, grasp: Grasp, hand_in_hold: Pose) -> Section | None:
+def _cut(frame: FingerFrame, hold: Hold, grasp: Grasp, hand_in_hold: Pose) -> Section | None:
     """Return the rock in the plane of a finger's frame, raw under one that clings."""
     cut = hold.raw_section if grasp.fingernail else hold.section
     rotation = hand_in_hold.rotation
@@ -289,9 +299,19 @@ class SpinyHand:
         self.structure = Structure.from_table(table)
         self.nail = Fingernail.from_table(table)
         self.mass = table.scalar("hand", "mass")
-        self.maximum_tension = table.scalar("tendon", "maximum_tension")
-        self.closing_tension = table.scalar("tendon", "closing_tension")
+        self.maximum_tension = table.positive("tendon", "maximum_tension")
+        self.closing_tension = table.positive("tendon", "closing_tension")
+        if self.closing_tension > self.maximum_tension:
+            raise InvalidInputError(
+                f"must be at most the tendon's {self.maximum_tension:g} N, "
+                f"got {self.closing_tension:g}",
+                field="tendon.closing_tension",
+            )
+        self.tendon_friction = table.scalar("tendon", "holding_friction")
         self.spine_travel = table.scalar("tile", "spine_travel")
+        self.lateral_stiffness = table.scalar("tile", "lateral_stiffness")
+        self.bending_stiffness = table.scalar("beam", "bending_stiffness")
+        self.torsional_stiffness = table.scalar("beam", "torsional_stiffness")
         self.seated_contact = table.scalar("finger", "seated_contact")
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))
@@ -306,19 +326,27 @@ class SpinyHand:
             ]
         )
         self.palm_tile_size = np.array(table.vector("palm", "tile_size"))
-        self.palm_length = table.scalar("palm", "length")
+        self.palm_length = table.positive("palm", "length")
         self.palm_friction = table.scalar("palm", "pulley_friction")
         self.palm_own_friction = table.scalar("palm", "own_pulley_friction")
         self.palm_spring = table.scalar("palm", "spring_stiffness")
         self.palm_contact = table.vector("palm", "contact_stiffness")
-        self.palm_pressing = table.scalar("palm", "pressing_limit")
+        self.palm_pressing = table.positive("palm", "pressing_limit")
+        self.palm_pressing_stiffness = table.scalar("palm", "pressing_stiffness")
         if len(self.palm_contact) != len(self.palm_tiles):
             raise InvalidInputError(
                 f"one number for each of the {len(self.palm_tiles)} tiles",
                 field="palm.contact_stiffness",
             )
+        try:
+            PalmTendon(
+                self.palm_contact, self.palm_spring, self.palm_friction, self.palm_own_friction
+            )
+        except InvalidInputError as error:
+            entry = str(error.field).replace("friction", "pulley_friction")
+            raise InvalidInputError(error.message, field=f"palm.{entry}") from None
 
-    def frames(self, outer_rotation: float) -> tuple[_Frame, ...]:
+    def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""
         frames = []
         for name in FINGERS:
@@ -330,7 +358,7 @@ class SpinyHand:
                 along = np.array([math.cos(outer_rotation), side * math.sin(outer_rotation), 0.0])
                 joint = self.outer_axis * mirror + self.outer_reach * along
             across = np.array([-along[1], along[0], 0.0])
-            frames.append(_Frame(joint, along, across))
+            frames.append(FingerFrame(joint, along, across))
         return tuple(frames)
 
     def seat(self, hold: Hold, grasp: Grasp) -> Seating:
@@ -525,7 +553,13 @@ class SpinyHand:
         )
 
 
-@cache
-def spiny_hand() -> SpinyHand:
-    """Return the SpinyHand of the bundled parameter file."""
-    return SpinyHand()
+@lru_cache(maxsize=32)
+def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
+    """Return the SpinyHand of a table, built once; of the bundled one by default.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is missing or impossible.
+    """
+    return SpinyHand(table)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.frames import Array
 from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_space import WrenchSpace
 from planner.plan import FingerPlan, HandPlan, PalmPlan, TileLoad
 

@@ -13,9 +13,10 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
 from hand_models.errors import InvalidInputError
-from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, wrench_space
+from hand_models.fixed_wrist import wrench_space
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
+from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
 from planner.explain import limit_sentence, shortfall_sentence, warnings

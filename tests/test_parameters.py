@@ -27,7 +27,7 @@ ENTRIES = [
     for section, name, quantity in table
 ]
 
-SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1", "A", "N·m/A", "m/s²"}
+SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1", "A", "N·m/A", "m/s²", "N·m²"}
 
 PRINTED = {
     # from the SpinyHand paper: mass and tension (Section 2), springs (3.2), palm (4), pulleys (4.2)
@@ -38,6 +38,7 @@ PRINTED = {
     ("tile", "spring_stiffness"): (11500.0, "N/m"),
     ("tile", "pulley_ratio"): (2.0, "1"),
     ("tile", "spine_travel"): (0.005, "m"),
+    ("tendon", "holding_friction"): (0.34, "1"),
     ("palm", "length"): (0.11, "m"),
     ("palm", "pulley_friction"): (0.34, "1"),
     # gear (Section 2), driver (9.1); strengths (Sections 2 and 3.2)

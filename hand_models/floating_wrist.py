@@ -1,0 +1,286 @@
+"""A hand whose motors stand still while its wrist gives way: its WrenchSpace (Eqs. 9–13, 17).
+
+A twist ξ of the wrist loads every tile, and what the hand holds is everything that some twist gives
+without a tile letting go. That set is not convex and not a polyhedron. Linearised at a wrist pose
+ξ₀, with the contacts' places as they are there, it is one:
+
+    w = o + V ξ = Σ_tiles W_t(ξ₀) f_t(ξ),    f_t(ξ) = f_t(ξ₀) + ∂f_t/∂ξ (ξ − ξ₀),
+
+with rows like those of a fixed wrist. The palm carries only where it moves against the rock, so
+each of its ways of carrying is a set of its own. A tendon's stick and slip stay as they are at ξ₀.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.compliant_finger import STEP
+from hand_models.compliant_hand import CompliantHand, HandLoads
+from hand_models.frames import Array, Indices
+from hand_models.hand import FINGERS
+from hand_models.resettling import Numbers
+from hand_models.row_layout import RowLayout, row_layout
+from hand_models.structure import HELD
+from hand_models.wrench_space import Row, WrenchSpace
+
+__all__ = ["WRIST", "FloatingWrist", "PalmMode", "Verdict"]
+
+WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
+"""Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
+
+RANGE_ROWS: Final = tuple(
+    Row(None, None, "wrist_range", "hard", f"wrist_range/{name.split('/')[1]}{sign}")
+    for sign in "+-"
+    for name in WRIST
+)
+"""Hard rows of a set that is linearised for a part of the wrist's poses only."""
+
+PALM_ROWS: Final = 1e5
+"""Newtons per metre by which rows of the palm's travel are made commensurate."""
+
+PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
+"""How a palm carries: not at all, by moving toward −x, into the rock, or both."""
+
+
+class Verdict(NamedTuple):
+    """How near its limits a hand is at m twists of its wrist.
+
+    Attributes
+    ----------
+    utilisation : ndarray, shape (m,)
+        The largest of all limit rows; infinite where a phalanx finds no rock.
+    limiting : ndarray of int, shape (m,)
+        That row.
+    violation : ndarray, shape (m,)
+        By how much the hard rows are broken at most; not above zero where they hold [N].
+    """
+
+    utilisation: Array
+    limiting: Indices
+    violation: Array
+
+    @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Whether nothing lets go, shape (m,)."""
+        return (self.utilisation <= 1.0) & (self.violation <= 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class FloatingWrist:
+    """The limits of a compliant hand.
+
+    Attributes
+    ----------
+    hand : CompliantHand
+    tension_limit : float, optional
+        A caller's cap on every tendon [N]; the hand's own maximum if that is less.
+    """
+
+    hand: CompliantHand
+    tension_limit: float | None = None
+
+    @cached_property
+    def layout(self) -> RowLayout:
+        """Names and coefficients of the rows."""
+        settled = self.hand.settled
+        engaged = [i for i in range(len(FINGERS)) if settled.touching[settled.finger_of == i].any()]
+        return row_layout(
+            settled.tiles,
+            tuple(engaged),
+            tuple(engaged) if settled.grasp.lateral else (),
+            settled.surface.pieces(),
+            tuple((i, j) for i, j, _ in settled.stops),
+            bool(settled.palm.engaged),
+            False,
+        )
+
+    @property
+    def limits(self) -> tuple[Row, ...]:
+        """Limit rows; the last `HELD` ones are wrench rows."""
+        return self.layout.limits
+
+    @cached_property
+    def _limit_map(self) -> tuple[Array, Array, Array]:
+        """(P, p, s): loads of the limit rows but the wrench rows are P e + p, capacities s.
+
+        e as of `_elements`: shears, normals, laterals, tensions, palm.
+        """
+        settled, layout = self.hand.settled, self.layout
+        n = len(settled.tiles)
+        rows = len(layout.limits) - len(HELD)
+        P, p, s = np.zeros((rows, 3 * n + len(FINGERS) + 2)), np.zeros(rows), np.empty(rows)
+        tile, a_shear, a_normal, a_lateral, capacity = layout.planes
+        k = len(tile)
+        index = np.arange(k)
+        P[index, tile], P[index, n + tile], P[index, 2 * n + tile] = a_shear, a_normal, a_lateral
+        s[:k] = capacity
+        drive, most = settled.hand.drive, settled.hand.maximum_tension
+        if self.tension_limit is not None:
+            most = min(most, self.tension_limit)
+        tendon = np.arange(len(FINGERS))
+        for per_newton, at_zero, most_of in (
+            (1.0, 0.0, most),
+            (drive.torque_per_newton, 0.0, drive.maximum_torque),
+            (drive.current_per_newton, drive.no_load_current, drive.maximum_current),
+        ):
+            P[k + tendon, 3 * n + tendon], p[k + tendon], s[k + tendon] = (
+                per_newton,
+                at_zero,
+                most_of,
+            )
+            k += len(tendon)
+        structure = settled.hand.structure
+        for i in layout.engaged:
+            P[k, np.flatnonzero(settled.finger_of == i)] = 1.0
+            s[k] = structure.finger_shear
+            k += 1
+        for t in layout.tips:
+            P[k, n + t], s[k] = 1.0, structure.fingertip_force
+            k += 1
+        if settled.palm.engaged:
+            P[-2, -2] = P[-1, -1] = 1.0
+            s[-2:] = settled.palm.shear_limit, settled.palm.pressing_limit
+        return P, p, s
+
+    @cached_property
+    def _hard_map(self) -> Array:
+        """Q: hard rows of tendons, tiles, frames and stops are Q (e, stop torques) ≤ 0."""
+        settled, layout = self.hand.settled, self.layout
+        n = len(settled.tiles)
+        size = 3 * n + len(FINGERS) + 2
+        those = [
+            *(3 * n + np.arange(len(FINGERS))),
+            *np.flatnonzero(settled.touching),
+            *(n + t for t in layout.frames),
+        ]
+        Q = np.zeros((len(those) + len(settled.stops), size + len(settled.stops)))
+        Q[np.arange(len(those)), those] = -1.0
+        for k, (_, _, torque) in enumerate(settled.stops):
+            # in newtons of tension, so that rows stay commensurate
+            Q[len(those) + k, size + k] = -1.0 / max(abs(float(torque[1])), 1e-6)
+        return Q
+
+    def judge(self, twists: Array) -> Verdict:
+        """Return how near its limits the hand is at some twists of the wrist, shape (m, 6)."""
+        loads = self.hand.loads(twists)
+        P, p, s = self._limit_map
+        D = HELD / self.hand.settled.hand.structure.hand_load
+        e = _elements(loads)
+        with np.errstate(invalid="ignore"):
+            used = np.concatenate(
+                [(e @ P.T + p) / s, self.hand.wrenches(loads)[:, :3] @ D.T], axis=1
+            )
+            broken = np.concatenate([e, loads.stop_torques], axis=1) @ self._hard_map.T
+        used = np.where(loads.reached[:, None], used, np.inf)
+        broken = np.where(loads.reached[:, None], broken, np.inf)
+        return Verdict(used.max(axis=1), used.argmax(axis=1), broken.max(axis=1, initial=-np.inf))
+
+    def palm_modes(self) -> tuple[PalmMode, ...]:
+        """Return the ways in which the palm can carry."""
+        if not self.hand.settled.palm.engaged:
+            return ("off",)
+        return ("off", "drags", "presses", "drags_and_presses")
+
+    def linearised(
+        self,
+        twist: ArrayLike | None = None,
+        palm: PalmMode = "off",
+        within: ArrayLike | None = None,
+    ) -> WrenchSpace:
+        """Return the set linearised at a wrist pose.
+
+        Parameters
+        ----------
+        twist : array_like, shape (6,), optional
+            ξ₀ [m, rad]; at rest by default.
+        palm : {'off', 'drags', 'presses', 'drags_and_presses'}
+            How the palm carries.
+        within : array_like, shape (6,), optional
+            How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
+
+        Returns
+        -------
+        WrenchSpace
+            Columns `WRIST`; rows as of a fixed wrist, with hard rows that keep the palm's way of
+            carrying, and the wrist within its range.
+        """
+        hand, settled, layout = self.hand, self.hand.settled, self.layout
+        at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
+        dragging = palm in ("drags", "drags_and_presses")
+        pressing = palm in ("presses", "drags_and_presses")
+        steps = at + 1j * STEP * np.eye(6)
+        loads = hand.loads(steps)
+        free = hand.palm_loads(steps)
+        loads = loads._replace(palm=free * np.array([dragging, pressing]))
+        e = _elements(loads)
+        slope = e.imag.T / STEP
+        start = e[0].real - slope @ at
+        P, p, s = self._limit_map
+        P_hard = self._hard_map
+        torques = loads.stop_torques
+        torque_slope = torques.imag.T / STEP
+        torque_start = torques[0].real - torque_slope @ at
+        H = P_hard @ np.vstack([slope, torque_slope])
+        h = -P_hard @ np.concatenate([start, torque_start])
+        if settled.palm.engaged:
+            # a palm that carries moves against the rock; one that does not, away from it
+            palm_slope = free.imag.T / STEP / _stiffnesses(hand)[:, None]
+            palm_start = free[0].real / _stiffnesses(hand) - palm_slope @ at
+            signs = np.where([dragging, pressing], -1.0, 1.0)
+            H = np.vstack([H, signs[:, None] * palm_slope * PALM_ROWS])
+            h = np.concatenate([h, -signs * palm_start * PALM_ROWS])
+        rows = layout.limits + layout.hard
+        if within is not None:
+            reach = np.asarray(within, dtype=float)
+            sides = np.vstack([np.diag(1.0 / reach), -np.diag(1.0 / reach)])
+            H, h = np.vstack([H, sides]), np.concatenate([h, 1.0 + sides @ at])
+            rows += RANGE_ROWS
+
+        units = _units(loads)
+        palm_units = _palm_units(settled.palm.centre)
+        W = np.hstack([units[0].T, units[1].T, units[2].T, np.zeros((6, len(FINGERS))), palm_units])
+        origin, generators = W @ start, W @ slope
+        D = np.zeros((len(HELD), 6))
+        D[:, :3] = HELD
+        held = np.full(len(D), settled.hand.structure.hand_load)
+        return WrenchSpace(
+            origin=origin,
+            generators=generators,
+            columns=WRIST,
+            rows=rows,
+            L=np.vstack([P @ slope, D @ generators]),
+            l0=np.concatenate([P @ start + p, D @ origin]),
+            s=np.concatenate([s, held]),
+            H=H,
+            h=h,
+            D=D,
+        )
+
+
+def _elements(loads: HandLoads) -> Numbers:
+    """Return shears, normals, laterals, tensions and palm loads, shape (m, 3 n + 6)."""
+    return np.concatenate(
+        [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm], axis=1
+    )
+
+
+def _stiffnesses(hand: CompliantHand) -> Array:
+    return np.array([hand.palm_shear_stiffness, hand.palm_pressing_stiffness])
+
+
+def _units(loads: HandLoads) -> Array:
+    """Return the wrench of a unit of each tile's shear, normal and lateral load, (3, n, 6)."""
+    axes, positions = loads.axes[0].real, loads.positions[0].real
+    units = np.concatenate([axes, np.cross(positions[:, None, :], axes)], axis=2)
+    return np.asarray(units.transpose(1, 0, 2))
+
+
+def _palm_units(centre: Array) -> Array:
+    """Return the wrenches of a unit of palm shear and of palm pressing, shape (6, 2)."""
+    x, y, z = centre
+    return np.array([[-1.0, 0.0, 0.0, 0.0, -z, y], [0.0, 0.0, 1.0, y, -x, 0.0]]).T
