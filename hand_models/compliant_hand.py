@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.compliant_finger import STEP, CompliantFinger, FingerLoads
 from hand_models.errors import InvalidInputError, UnsupportedError
 from hand_models.finger import PHALANGES
-from hand_models.frames import Array
+from hand_models.frames import Array, Indices
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.palm import share_load
 from hand_models.resettling import Numbers
@@ -167,7 +167,6 @@ class CompliantHand:
     def loads(self, twists: Numbers) -> HandLoads:
         """Return every load at some twists of the wrist, shape (m, 6) [m, rad]."""
         m, settled = len(twists), self.settled
-        v, turn = twists[:, :3], twists[:, 3:]
         n = len(settled.tiles)
         kind = twists.dtype
         shears, normals, laterals = (np.zeros((m, n), dtype=kind) for _ in range(3))
@@ -181,8 +180,7 @@ class CompliantHand:
             reached &= found.reached
             shears[:, own] = found.shears
             tensions[:, i] = found.tensions[:, 0]
-            moved = [_moved(settled.positions[t], v, turn) @ frame.across for t in own]
-            laterals[:, own] = np.stack(moved, axis=-1) @ self._across[i].T
+            laterals[:, own] = self.lateral_loads(i, twists)
             phalanges = own[-len(PHALANGES) :]
             normals[:, phalanges] = found.normals
             positions[:, phalanges] = (
@@ -209,6 +207,16 @@ class CompliantHand:
         """Return the loads of one finger in its plane at some twists of the wrist."""
         x, z, turned, base_slip = self._base(i, twists[:, :3], twists[:, 3:])
         return self.fingers[i].loads(x, z, turned, base_slip)
+
+    def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
+        """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
+        v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
+        moved = [_moved(self.settled.positions[t], v, turn) @ across for t in self.tiles_of(i)]
+        return np.asarray(np.stack(moved, axis=-1) @ self._across[i].T)
+
+    def tiles_of(self, i: int) -> Indices:
+        """Return the tiles of a finger."""
+        return self._own[i]
 
     def _base(self, i: int, v: Numbers, turn: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
         """Return how the base of a finger moves in its plane, and its base tile along the rock."""

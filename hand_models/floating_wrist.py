@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hand_models.compliant_finger import STEP
 from hand_models.compliant_hand import CompliantHand, HandLoads
@@ -27,47 +27,18 @@ from hand_models.resettling import Numbers
 from hand_models.row_layout import RowLayout, row_layout
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
+from hand_models.wrist_pose import Evaluation, Verdict, range_rows
 
-__all__ = ["WRIST", "FloatingWrist", "PalmMode", "Verdict"]
+__all__ = ["WRIST", "FloatingWrist", "PalmMode"]
 
 WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
 """Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
-
-RANGE_ROWS: Final = tuple(
-    Row(None, None, "wrist_range", "hard", f"wrist_range/{name.split('/')[1]}{sign}")
-    for sign in "+-"
-    for name in WRIST
-)
-"""Hard rows of a set that is linearised for a part of the wrist's poses only."""
 
 PALM_ROWS: Final = 1e5
 """Newtons per metre by which rows of the palm's travel are made commensurate."""
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
 """How a palm carries: not at all, by moving toward −x, into the rock, or both."""
-
-
-class Verdict(NamedTuple):
-    """How near its limits a hand is at m twists of its wrist.
-
-    Attributes
-    ----------
-    utilisation : ndarray, shape (m,)
-        The largest of all limit rows; infinite where a phalanx finds no rock.
-    limiting : ndarray of int, shape (m,)
-        That row.
-    violation : ndarray, shape (m,)
-        By how much the hard rows are broken at most; not above zero where they hold [N].
-    """
-
-    utilisation: Array
-    limiting: Indices
-    violation: Array
-
-    @property
-    def holds(self) -> NDArray[np.bool_]:
-        """Whether nothing lets go, shape (m,)."""
-        return (self.utilisation <= 1.0) & (self.violation <= 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,18 +138,49 @@ class FloatingWrist:
 
     def judge(self, twists: Array) -> Verdict:
         """Return how near its limits the hand is at some twists of the wrist, shape (m, 6)."""
+        return self.evaluate(twists).verdict
+
+    def evaluate(self, twists: Array) -> Evaluation:
+        """Return wrenches and limits at some twists of the wrist, shape (m, 6)."""
         loads = self.hand.loads(twists)
         P, p, s = self._limit_map
         D = HELD / self.hand.settled.hand.structure.hand_load
-        e = _elements(loads)
+        e, wrenches = _elements(loads), self.hand.wrenches(loads)
         with np.errstate(invalid="ignore"):
-            used = np.concatenate(
-                [(e @ P.T + p) / s, self.hand.wrenches(loads)[:, :3] @ D.T], axis=1
-            )
+            used = np.concatenate([(e @ P.T + p) / s, wrenches[:, :3] @ D.T], axis=1)
             broken = np.concatenate([e, loads.stop_torques], axis=1) @ self._hard_map.T
         used = np.where(loads.reached[:, None], used, np.inf)
         broken = np.where(loads.reached[:, None], broken, np.inf)
-        return Verdict(used.max(axis=1), used.argmax(axis=1), broken.max(axis=1, initial=-np.inf))
+        verdict = Verdict(
+            used.max(axis=1), used.argmax(axis=1), broken.max(axis=1, initial=-np.inf)
+        )
+        return Evaluation(wrenches, verdict)
+
+    def sieve(self, twists: Array) -> Indices:
+        """Return which twists pass the limits of each finger's tiles, one finger after another."""
+        left = np.arange(len(twists))
+        tile, a_shear, a_normal, a_lateral, capacity = self.layout.planes
+        for i in self.layout.engaged:
+            own = self.hand.tiles_of(i)
+            mine = np.isin(tile, own)
+            loads = self.hand.finger_loads(i, twists[left])
+            e = np.concatenate(
+                [loads.shears, loads.normals, self.hand.lateral_loads(i, twists[left])], axis=1
+            )
+            n, m = len(own), loads.normals.shape[1]
+            place = tile[mine] - own[0]
+            rows = np.arange(int(mine.sum()))
+            P = np.zeros((len(rows), e.shape[1]))
+            P[rows, place] = a_shear[mine]
+            # a base tile has no normal load
+            bears = place >= n - m
+            P[rows[bears], n + place[bears] - (n - m)] = a_normal[mine][bears]
+            P[rows, n + m + place] = a_lateral[mine]
+            with np.errstate(invalid="ignore"):
+                holds = loads.reached & ((e @ P.T <= capacity[mine]).all(axis=1))
+                holds &= (loads.shears >= 0.0).all(axis=1)
+            left = left[holds]
+        return left
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
         """Return the ways in which the palm can carry."""
@@ -236,10 +238,8 @@ class FloatingWrist:
             h = np.concatenate([h, -signs * palm_start * PALM_ROWS])
         rows = layout.limits + layout.hard
         if within is not None:
-            reach = np.asarray(within, dtype=float)
-            sides = np.vstack([np.diag(1.0 / reach), -np.diag(1.0 / reach)])
-            H, h = np.vstack([H, sides]), np.concatenate([h, 1.0 + sides @ at])
-            rows += RANGE_ROWS
+            sides, most, names = range_rows(WRIST, at, within)
+            H, h, rows = np.vstack([H, sides]), np.concatenate([h, most]), rows + names
 
         units = _units(loads)
         palm_units = _palm_units(settled.palm.centre)

@@ -1,0 +1,181 @@
+"""How far a compliant grasp can be loaded in a direction: successive linear programs.
+
+The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses of the
+wrist at which nothing lets go. About a pose everything is linear: a linear program over a small box
+gives the next pose, and the box grows or shrinks with how well the program foretold what happened.
+Near the maximum, which is most often a corner of as many limits as the pose has components, the
+poses converge quadratically. The set is not convex: the maximum is a local one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+
+from hand_models.errors import EmptySetError, SolverError
+from hand_models.frames import Array
+from hand_models.wrench_space import Row, WrenchSpace
+from hand_models.wrist_pose import CompliantGrasp, Evaluation
+
+__all__ = ["Farthest", "farthest", "pose_units"]
+
+UNITS: Final = {"v": 1e-3, "w": 1e-2}
+"""By which displacements and turns of a wrist are measured [m, rad]."""
+
+FIRST_BOX: Final = 1.0
+LARGEST_BOX: Final = 4.0
+SMALLEST_BOX: Final = 1e-9
+"""Half width of the box about a pose, in `UNITS`: at first, at most, and when to end."""
+
+ROUNDS: Final = 60
+SHORTFALL: Final = 1e3
+"""What a limit exceeded by the whole of its capacity counts, in newtons of d · w."""
+
+CLOSE: Final = 1e-6
+"""Change of the objective at which the poses have converged, relative to its size."""
+
+KEPT: Final = 1e-5
+"""By what share of its capacity a limit may be exceeded at the pose found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Farthest:
+    """Where a grasp lets go in a direction.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (d,)
+        Pose of the wrist [m, rad].
+    wrench : ndarray, shape (6,)
+        On the rock there [N, N·m].
+    reach : float
+        d · w.
+    limiting : Row or None
+        The limit that is nearest; None if hard rows alone end the way.
+    rounds : int
+        Linear programs solved.
+    """
+
+    twist: Array
+    wrench: Array
+    reach: float
+    limiting: Row | None
+    rounds: int
+
+
+def pose_units(columns: tuple[str, ...]) -> Array:
+    """Return by what each component of a pose is measured, from its name [m, rad]."""
+    return np.array([UNITS[name.split("/")[1][0]] for name in columns])
+
+
+def farthest(
+    grasp: CompliantGrasp,
+    direction: ArrayLike,
+    start: ArrayLike | None = None,
+    below: tuple[Array, Array] | None = None,
+) -> Farthest:
+    """Return the wrench farthest in a direction at which nothing lets go.
+
+    Parameters
+    ----------
+    grasp : CompliantGrasp
+    direction : array_like, shape (6,)
+        d.
+    start : array_like, shape (d,), optional
+        Pose to begin at; rest by default.
+    below : tuple of ndarray, shapes (k, 6) and (k,), optional
+        (G, g): only wrenches with G w ≤ g.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near the way taken holds.
+    SolverError
+        If a linear program fails.
+    """
+    d = np.asarray(direction, dtype=float)
+    space = grasp.linearised(start)
+    units = pose_units(space.columns)
+    at = np.zeros(len(units)) if start is None else np.asarray(start, dtype=float)
+    merit, found = _merit(grasp, at, d, below)
+    box, rounds = FIRST_BOX, 0
+    while rounds < ROUNDS and box > SMALLEST_BOX:
+        rounds += 1
+        step, foretold = _step(space, d, at, box * units, units, below)
+        tried = at + step
+        gained, there = _merit(grasp, tried, d, below)
+        promised = foretold - merit
+        if promised <= CLOSE * max(1.0, abs(merit)):
+            break
+        if gained > merit:
+            size = np.abs(step / units).max()
+            if gained - merit > 0.75 * promised:
+                box = min(2.0 * max(box, size), LARGEST_BOX)
+            at, merit, found = tried, gained, there
+            space = grasp.linearised(at)
+        else:
+            box = 0.25 * min(box, float(np.abs(step / units).max()))
+    verdict = found.verdict
+    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
+    if excess > KEPT:
+        raise EmptySetError(
+            f"no pose of the wrist holds near the way to this wrench: limits are exceeded by "
+            f"{100 * excess:.2g} %"
+        )
+    binding = float(verdict.utilisation[0]) >= 1.0 - KEPT
+    return Farthest(
+        twist=at,
+        wrench=found.wrenches[0],
+        reach=float(d @ found.wrenches[0]),
+        limiting=grasp.limits[int(verdict.limiting[0])] if binding else None,
+        rounds=rounds,
+    )
+
+
+def _merit(
+    grasp: CompliantGrasp, at: Array, d: Array, below: tuple[Array, Array] | None
+) -> tuple[float, Evaluation]:
+    """Return d · w less what is exceeded, at a pose."""
+    found = grasp.evaluate(at[None])
+    excess = max(float(found.verdict.utilisation[0]) - 1.0, float(found.verdict.violation[0]), 0.0)
+    if below is not None:
+        G, g = below
+        excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))
+    if not np.isfinite(excess):
+        return -np.inf, found
+    return float(d @ found.wrenches[0]) - SHORTFALL * excess, found
+
+
+def _step(
+    space: WrenchSpace,
+    d: Array,
+    at: Array,
+    half_widths: Array,
+    units: Array,
+    below: tuple[Array, Array] | None,
+) -> tuple[Array, float]:
+    """Return the best step within a box by the linear model, and the merit that it foretells."""
+    # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
+    rows = [space.L / space.s[:, None], space.H]
+    most: list[Array] = [np.asarray(1.0 - space.l0 / space.s), space.h]
+    if below is not None:
+        G, g = below
+        rows.append(np.asarray(G @ space.generators))
+        most.append(np.asarray(g - G @ space.origin))
+    A: Array = np.vstack(rows)
+    b: Array = np.concatenate(most) - A @ at
+    gain = d @ space.generators
+    result = linprog(
+        np.append(-gain * units, SHORTFALL),
+        A_ub=np.column_stack([A * units, -np.ones(len(b))]),
+        b_ub=b,
+        bounds=[*zip(-half_widths / units, half_widths / units, strict=True), (0.0, None)],
+        method="highs",
+    )
+    if result.status != 0 or result.x is None or result.fun is None:
+        raise SolverError(f"farthest: {result.message}")
+    return result.x[:-1] * units, float(d @ space.wrench(at)) - float(result.fun)

@@ -1,0 +1,350 @@
+"""The floating-wrist wrench space by search over poses of the wrist (Fig. 9).
+
+A grid of poses is tried, those at which nothing lets go are kept, and the hull of their wrenches is
+the wrench space. As in the paper the search space is first reduced: its axes are those of the
+ellipsoid about the set linearised at rest, and its range along each grows or shrinks with sparse
+grids until it just covers the poses that hold. The outermost poses are then pushed along rays from
+the middle until something lets go, so that the hull's corners lie on the boundary, and each tells
+which phalanx of which finger fails there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from hand_models.errors import EmptySetError, SolverError
+from hand_models.frames import Array, Indices
+from hand_models.wrench_space import SCALE, Row, WrenchSpace
+from hand_models.wrist_limit import pose_units
+from hand_models.wrist_pose import CompliantGrasp, Verdict
+
+__all__ = ["PLANAR", "SearchBox", "WristSearch", "boundary", "search", "search_box"]
+
+PLANAR: Final = (0, 2, 4)
+"""Components F_x, F_z, M_y of a wrench, of a grasp that moves in a plane."""
+
+Progress = Callable[[int, int], None]
+
+CHUNK: Final = 50_000
+"""Poses that are evaluated at once."""
+
+SPARSE: Final = {3: 13, 6: 5}
+"""Poses per axis of the grids that find the range, by how many axes there are."""
+
+RESIZES: Final = 6
+"""How often the range is adapted at most."""
+
+HALVINGS: Final = 30
+"""Of the rays' lengths."""
+
+EXTREMES: Final = 1024
+"""Directions in which extreme wrenches are kept where a full hull would be too large."""
+
+NEWTON_STEPS: Final = 50
+
+
+@dataclass(frozen=True, eq=False)
+class SearchBox:
+    """Poses ``centre + axes · t`` with |t_i| ≤ range_i.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (d,)
+        A pose that holds [m, rad].
+    axes : ndarray, shape (d, d)
+        A column for each axis [m, rad].
+    range : ndarray, shape (d,)
+    """
+
+    centre: Array
+    axes: Array
+    range: Array
+
+    def poses(self, t: Array) -> Array:
+        """Return poses of coordinates t, shape (m, d)."""
+        return np.asarray(self.centre + t @ self.axes.T)
+
+    def grid(self, per_axis: int, start: int, end: int) -> Array:
+        """Return coordinates of the grid's poses from one number to another, shape (m, d)."""
+        d = len(self.centre)
+        numbers = np.unravel_index(np.arange(start, end), (per_axis,) * d)
+        steps = np.stack(numbers, axis=-1) * (2.0 / (per_axis - 1)) - 1.0
+        return np.asarray(steps * self.range)
+
+
+@dataclass(frozen=True, eq=False)
+class WristSearch:
+    """The wrenches found.
+
+    Attributes
+    ----------
+    box : SearchBox
+    tried, held : int
+        Poses of the grid; those of them at which nothing lets go.
+    poses, wrenches : ndarray, shapes (n, d) and (n, 6)
+        On the boundary: extreme wrenches, and where the wrist is then [m, rad, N, N·m].
+    limiting : tuple of Row, length n
+        What lets go there first.
+    components : tuple of int
+        Of a wrench, those that the grasp's poses span.
+    """
+
+    box: SearchBox
+    tried: int
+    held: int
+    poses: Array
+    wrenches: Array
+    limiting: tuple[Row | None, ...]
+    components: tuple[int, ...]
+
+    @cached_property
+    def hull(self) -> ConvexHull:
+        """The hull of the wrenches, in newtons (moments over a length, `SCALE`)."""
+        components = list(self.components)
+        return ConvexHull(self.wrenches[:, components] * SCALE[components])
+
+    def support(self, direction: ArrayLike) -> float:
+        """Return max { d · w } over the hull, d of shape (6,)."""
+        return float((self.wrenches @ np.asarray(direction, dtype=float)).max())
+
+
+def search_box(grasp: CompliantGrasp) -> SearchBox:
+    """Return where to search: the ellipsoid about the linearised set, its range by sparse grids.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near rest holds.
+    """
+    space = grasp.linearised()
+    centre, axes = _ellipsoid(space)
+    found = grasp.evaluate(centre[None])
+    if not found.verdict.holds[0]:
+        centre = np.zeros(len(centre))
+    box = SearchBox(centre, axes, _range(space, centre, axes))
+    per_axis = SPARSE[len(centre)]
+    for _ in range(RESIZES):
+        t = box.grid(per_axis, 0, per_axis ** len(centre))
+        t = t[grasp.sieve(box.poses(t))]
+        held = t[grasp.evaluate(box.poses(t)).verdict.holds]
+        if not len(held):
+            box = SearchBox(box.centre, box.axes, 0.5 * box.range)
+            continue
+        step = 2.0 * box.range / (per_axis - 1)
+        outermost = np.abs(held).max(axis=0)
+        # a layer more than holds: outward while the outermost holds, inward where none does
+        wanted = np.minimum(outermost + step, 1.5 * box.range)
+        settled = bool((np.abs(wanted - box.range) <= 0.5 * step).all())
+        box = SearchBox(box.centre, box.axes, wanted)
+        if settled:
+            break
+    return box
+
+
+def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = None) -> WristSearch:
+    """Return the wrench space found by a grid of poses.
+
+    Parameters
+    ----------
+    grasp : CompliantGrasp
+    per_axis : int
+        Poses along each axis.
+    progress : callable, optional
+        Told how many poses are done, of how many.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose of the grid holds.
+    """
+    box = search_box(grasp)
+    d = len(box.centre)
+    components = PLANAR if d == len(PLANAR) else tuple(range(6))
+    total = per_axis**d
+    extremes = _Extremes(components)
+    held = 0
+    for start in range(0, total, CHUNK):
+        if progress is not None:
+            progress(start, total)
+        t = box.grid(per_axis, start, min(start + CHUNK, total))
+        t = t[grasp.sieve(box.poses(t))]
+        found = grasp.evaluate(box.poses(t))
+        good = found.verdict.holds
+        held += int(good.sum())
+        extremes.add(t[good], found.wrenches[good])
+    if progress is not None:
+        progress(total, total)
+    if not held:
+        raise EmptySetError(f"none of {total} poses of the wrist holds")
+    return _pushed(grasp, box, extremes.coordinates(), total, held, components)
+
+
+class _Extremes:
+    """The outermost of wrenches that come in chunks: corners of their hull, or many of them."""
+
+    def __init__(self, components: tuple[int, ...]) -> None:
+        self._components = list(components)
+        self._directions = _sphere(EXTREMES, len(components)) if len(components) > 3 else None
+        self._t: list[Array] = []
+        self._wrenches: list[Array] = []
+
+    def add(self, t: Array, wrenches: Array) -> None:
+        """Take the outermost of some more."""
+        scaled = (wrenches * SCALE)[:, self._components]
+        some: Indices = np.arange(len(t))
+        if self._directions is not None:
+            some = _outermost(scaled, self._directions)
+        elif len(t) > len(self._components) + 1:
+            some = ConvexHull(scaled).vertices.astype(np.intp)
+        self._t.append(t[some])
+        self._wrenches.append(scaled[some])
+
+    def coordinates(self) -> Array:
+        """Return the coordinates of the outermost."""
+        t, scaled = np.concatenate(self._t), np.concatenate(self._wrenches)
+        if self._directions is None:
+            return t[ConvexHull(scaled).vertices]
+        return t[_outermost(scaled, self._directions)]
+
+
+def _outermost(points: Array, directions: Array) -> Indices:
+    """Return which points are farthest in some direction."""
+    if not len(points):
+        return np.zeros(0, dtype=np.intp)
+    return np.unique([int((points @ d).argmax()) for d in directions]).astype(np.intp)
+
+
+def boundary(grasp: CompliantGrasp, box: SearchBox, rays: int) -> WristSearch:
+    """Return the wrench space by rays from the middle of a box, evenly spread over its axes.
+
+    Finer than a grid of as many poses where the poses that hold are seen from the middle.
+    """
+    d = len(box.centre)
+    components = PLANAR if d == len(PLANAR) else tuple(range(6))
+    t = _sphere(rays, d) * box.range
+    return _pushed(grasp, box, t, 0, 0, components)
+
+
+def _pushed(
+    grasp: CompliantGrasp,
+    box: SearchBox,
+    corners: Array,
+    tried: int,
+    held: int,
+    components: tuple[int, ...],
+) -> WristSearch:
+    """Return the boundary poses on the rays through some coordinates."""
+    t, verdict = _to_boundary(grasp, box, corners)
+    poses = box.poses(t)
+    wrenches = grasp.evaluate(poses).wrenches
+    names = grasp.limits
+    limiting = tuple(names[int(i)] if i >= 0 else None for i in verdict)
+    return WristSearch(box, tried, held, poses, wrenches, limiting, components)
+
+
+def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array, Indices]:
+    """Push coordinates along rays from the middle until something lets go.
+
+    Returns
+    -------
+    t : ndarray, shape (n, d)
+        The last that hold.
+    limiting : ndarray of int, shape (n,)
+        The limit row that is exceeded beyond; −1 where it is a hard row.
+    """
+    low = np.zeros(len(t))
+    high = np.ones(len(t))
+    for _ in range(RESIZES):
+        holds = grasp.evaluate(box.poses(t * high[:, None])).verdict.holds
+        if not holds.any():
+            break
+        low = np.where(holds, high, low)
+        high = np.where(holds, 1.5 * high, high)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        holds = grasp.evaluate(box.poses(t * middle[:, None])).verdict.holds
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    beyond: Verdict = grasp.evaluate(box.poses(t * high[:, None])).verdict
+    limiting = np.where(beyond.utilisation > 1.0, beyond.limiting, -1)
+    return t * low[:, None], limiting
+
+
+def _sphere(n: int, d: int) -> Array:
+    """Return n unit vectors in d dimensions, evenly spread and always the same."""
+    uniform = qmc.Halton(d, scramble=True, rng=0).random(n)
+    normal = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _ellipsoid(space: WrenchSpace) -> tuple[Array, Array]:
+    """Return the analytic centre of { y : A y ≤ b } and the axes of its Dikin ellipsoid.
+
+    The least of −Σ log(b − A y), by damped Newton steps from a point inside.
+
+    Raises
+    ------
+    EmptySetError
+        If there is no point inside.
+    """
+    units = pose_units(space.columns)
+    A, b = space.A * units, space.b
+    size = np.linalg.norm(A, axis=1)
+    keep = size > 0.0
+    A, b = A[keep] / size[keep, None], b[keep] / size[keep]
+    d = A.shape[1]
+    # the centre of the largest ball inside
+    result = linprog(
+        np.append(np.zeros(d), -1.0),
+        A_ub=np.column_stack([A, np.ones(len(b))]),
+        b_ub=b,
+        bounds=[(None, None)] * d + [(None, 1e3)],
+        method="highs",
+    )
+    if result.status != 0 or result.x is None:
+        raise SolverError(f"search: {result.message}")
+    if not result.x[-1] > 0.0:
+        raise EmptySetError("no pose of the wrist near rest holds: the preload alone is too much")
+    y = result.x[:-1]
+    hessian = np.eye(d)
+    for _ in range(NEWTON_STEPS):
+        gap = b - A @ y
+        gradient = A.T @ (1.0 / gap)
+        hessian = (A / gap[:, None] ** 2).T @ A
+        step = -np.linalg.solve(hessian, gradient)
+        decrement = float(np.sqrt(-gradient @ step))
+        y = y + step / (1.0 + decrement)
+        if decrement < 1e-9:
+            break
+    lengths, directions = np.linalg.eigh(hessian)
+    return y * units, units[:, None] * directions / np.sqrt(lengths)
+
+
+def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
+    """Return how far the linearised set reaches along each axis from the centre."""
+    A, b = space.A @ axes, space.b - space.A @ centre
+    reach = []
+    for i in range(len(centre)):
+        ends = []
+        for sign in (1.0, -1.0):
+            result = linprog(
+                -sign * np.eye(len(centre))[i],
+                A_ub=A,
+                b_ub=b,
+                bounds=[(None, None)] * len(centre),
+                method="highs",
+            )
+            if result.status != 0 or result.fun is None:
+                raise SolverError(f"search: {result.message}")
+            ends.append(-float(result.fun))
+        reach.append(max(ends))
+    return np.array(reach)
