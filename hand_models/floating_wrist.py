@@ -50,10 +50,13 @@ class FloatingWrist:
     hand : CompliantHand
     tension_limit : float, optional
         A caller's cap on every tendon [N]; the hand's own maximum if that is less.
+    palm : {'off', 'drags', 'presses', 'drags_and_presses'}
+        How the palm carries in linearised sets, if nothing else is said.
     """
 
     hand: CompliantHand
     tension_limit: float | None = None
+    palm: PalmMode = "off"
 
     @cached_property
     def layout(self) -> RowLayout:
@@ -191,7 +194,7 @@ class FloatingWrist:
     def linearised(
         self,
         twist: ArrayLike | None = None,
-        palm: PalmMode = "off",
+        palm: PalmMode | None = None,
         within: ArrayLike | None = None,
     ) -> WrenchSpace:
         """Return the set linearised at a wrist pose.
@@ -200,8 +203,8 @@ class FloatingWrist:
         ----------
         twist : array_like, shape (6,), optional
             ξ₀ [m, rad]; at rest by default.
-        palm : {'off', 'drags', 'presses', 'drags_and_presses'}
-            How the palm carries.
+        palm : {'off', 'drags', 'presses', 'drags_and_presses'}, optional
+            How the palm carries; the attribute of that name by default.
         within : array_like, shape (6,), optional
             How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
 
@@ -213,6 +216,7 @@ class FloatingWrist:
         """
         hand, settled, layout = self.hand, self.hand.settled, self.layout
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
+        palm = palm or self.palm
         dragging = palm in ("drags", "drags_and_presses")
         pressing = palm in ("presses", "drags_and_presses")
         steps = at + 1j * STEP * np.eye(6)

@@ -21,7 +21,7 @@ from hand_models.frames import Array
 from hand_models.wrench_space import Row, WrenchSpace
 from hand_models.wrist_pose import CompliantGrasp, Evaluation
 
-__all__ = ["Farthest", "farthest", "pose_units"]
+__all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
 UNITS: Final = {"v": 1e-3, "w": 1e-2}
 """By which displacements and turns of a wrist are measured [m, rad]."""
@@ -134,6 +134,30 @@ def farthest(
         limiting=grasp.limits[int(verdict.limiting[0])] if binding else None,
         rounds=rounds,
     )
+
+
+def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, float]:
+    """Return the pose of a linearised set with the largest d · w, and that; None, −∞ if empty.
+
+    Raises
+    ------
+    SolverError
+        If the linear program fails.
+    """
+    units = pose_units(space.columns)
+    result = linprog(
+        -(direction @ space.generators) * units,
+        A_ub=space.A * units,
+        b_ub=space.b,
+        bounds=[(None, None)] * len(units),
+        method="highs",
+    )
+    if result.status == 2:
+        return None, -np.inf
+    if result.status != 0 or result.x is None:
+        raise SolverError(f"extreme of a linearised set: {result.message}")
+    pose = result.x * units
+    return pose, float(direction @ space.wrench(pose))
 
 
 def _merit(
