@@ -75,15 +75,7 @@ class TendonDrive:
         InvalidInputError
             If a number is missing or impossible.
         """
-
-        def positive(section: str, name: str) -> float:
-            value = table.scalar(section, name)
-            if not value > 0.0:
-                raise InvalidInputError(
-                    f"must be above 0, got {value:g}", field=f"{section}.{name}"
-                )
-            return value
-
+        positive = table.positive
         drive = cls(
             gear_ratio=positive("motor", "gear_ratio"),
             efficiency=positive("motor", "efficiency"),

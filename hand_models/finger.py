@@ -86,10 +86,10 @@ class FingerModel:
         contact = table.scalar("tile", "contact_stiffness")
         spring = table.scalar("tile", "spring_stiffness")
         model = cls(
-            joint_spacing=table.scalar("finger", "joint_spacing"),
+            joint_spacing=table.positive("finger", "joint_spacing"),
             tile_height=table.scalar("finger", "tile_height"),
             tile_centre=table.scalar("finger", "tile_centre"),
-            tile_length=table.scalar("finger", "tile_length"),
+            tile_length=table.positive("finger", "tile_length"),
             pulley_radii=table.vector("finger", "pulley_radii"),
             joint_stiffness=table.vector("finger", "joint_stiffness"),
             joint_preload=table.vector("finger", "joint_preload"),
@@ -117,6 +117,24 @@ class FingerModel:
             )
         if model.shear_gain <= 0.0:
             raise InvalidInputError("stiffnesses must be above 0", field="tile.contact_stiffness")
+        if not min(model.pulley_radii) > 0.0:
+            raise InvalidInputError(
+                f"must be above 0 m, got {list(model.pulley_radii)}", field="finger.pulley_radii"
+            )
+        begin, end = model.tile_range
+        if not 0.0 <= begin < end <= model.joint_spacing:
+            raise InvalidInputError(
+                f"a tile must lie on its phalanx, from 0 to {model.joint_spacing:g} m, "
+                f"got {begin:g} to {end:g}",
+                field="finger.tile_centre",
+            )
+        for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True):
+            if not -math.pi <= lower < upper <= math.pi:
+                raise InvalidInputError(
+                    "must be above finger.joint_lower, both within half a turn, "
+                    f"got {upper:g} over {lower:g} rad",
+                    field="finger.joint_upper",
+                )
         return model
 
     @property

@@ -41,8 +41,8 @@ PLANE: Final = ("wrist/vx", "wrist/vz", "wrist/wy")
 OWN: Final = {
     "tile_height": "finger",
     "pulley_radii": "finger",
-    "joint_preload": "finger",
     "seated_contact": "finger",
+    "engagement": "tile",
 }
 """Entries of ``[gripper]`` that stand for the hand's own, and their section there."""
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Indices
 from hand_models.outlined import OutlinedHold
-from hand_models.parameters import scan_table
+from hand_models.parameters import ParameterTable, scan_table
 from hand_models.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
 
 __all__ = ["Mesh", "read_mesh"]
@@ -74,6 +74,8 @@ class Mesh(OutlinedHold):
         In the hold's frame [m].
     faces : array_like of int, shape (m, 3)
         Vertices of each triangle, counterclockwise from outside the rock.
+    hand : ParameterTable, optional
+        As of `OutlinedHold`.
 
     Attributes
     ----------
@@ -90,8 +92,10 @@ class Mesh(OutlinedHold):
 
     shape = "mesh"
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
-        super().__init__()
+    def __init__(
+        self, vertices: ArrayLike, faces: ArrayLike, hand: ParameterTable | None = None
+    ) -> None:
+        super().__init__(hand)
         table = scan_table()
         given = _checked(vertices, faces, table.scalar("scan", "largest"))
         welded = weld(given)

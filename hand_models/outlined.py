@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.frames import Array
 from hand_models.holds import Hold
+from hand_models.parameters import ParameterTable
 from hand_models.sections import Section
 from hand_models.smoothing import Scale, raw_within, within
 
@@ -15,10 +16,17 @@ __all__ = ["OutlinedHold"]
 
 
 class OutlinedHold(Hold):
-    """Rock that is known by raw polylines in each plane."""
+    """Rock that is known by raw polylines in each plane.
 
-    def __init__(self) -> None:
-        self._scale = Scale.default()
+    Parameters
+    ----------
+    hand : ParameterTable, optional
+        All numbers of the hand that is to grip it, the bundled ones by default: its tiles' length
+        is the scale to which the rock is smoothed for its fingers.
+    """
+
+    def __init__(self, hand: ParameterTable | None = None) -> None:
+        self._scale = Scale.of(hand)
 
     @abstractmethod
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:

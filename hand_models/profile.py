@@ -21,7 +21,7 @@ from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
 from hand_models.holds import PARALLEL
 from hand_models.outlined import OutlinedHold
-from hand_models.parameters import hand_table, scan_table
+from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.smoothing import Scale
 
 __all__ = ["STRIPS", "Profile"]
@@ -41,6 +41,8 @@ class Profile(OutlinedHold):
     points : array_like, shape (n, 2), or mapping of str to array_like
         The outline (x, z) of all rock, or one for each of `STRIPS`. Rock is on the side of larger
         z: on the left going from the end with smaller x to that with larger x [m].
+    hand : ParameterTable, optional
+        As of `OutlinedHold`; the strips lie under its fingers.
 
     Raises
     ------
@@ -52,8 +54,12 @@ class Profile(OutlinedHold):
 
     shape = "profile"
 
-    def __init__(self, points: ArrayLike | Mapping[str, ArrayLike]) -> None:
-        super().__init__()
+    def __init__(
+        self,
+        points: ArrayLike | Mapping[str, ArrayLike],
+        hand: ParameterTable | None = None,
+    ) -> None:
+        super().__init__(hand)
         largest = scan_table().scalar("scan", "largest_outline")
         if isinstance(points, Mapping):
             if set(points) != set(STRIPS):
@@ -67,7 +73,7 @@ class Profile(OutlinedHold):
             )
         else:
             self.outlines = (_checked(points, "points", largest),)
-        hand = hand_table()
+        hand = hand or hand_table()
         inner = hand.vector("fingers", "inner_joint")[1]
         self._half_way = 0.5 * (inner + hand.vector("fingers", "outer_axis")[1])
 
@@ -147,7 +153,7 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
         outline = outline[::-1]
     outline = outline[np.append(True, (np.diff(outline, axis=0) != 0.0).any(axis=1))]
     length = float(np.hypot(*np.diff(outline, axis=0).T).sum())
-    across, scale = float(np.ptp(outline, axis=0).max()), Scale.default()
+    across, scale = float(np.ptp(outline, axis=0).max()), Scale.of()
     if length * 2.0 * scale.reach > scale.longest * across:
         raise InvalidInputError(
             f"{length:.3g} m long but {across:.3g} m across; at most "

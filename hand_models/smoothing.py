@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Final, Literal
 
 import numpy as np
@@ -28,7 +27,7 @@ from scipy.spatial import cKDTree
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Indices
-from hand_models.parameters import hand_table, scan_table
+from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.polyline import PolylineSection
 
 __all__ = ["Scale", "raw_within", "smooth", "within"]
@@ -68,16 +67,27 @@ class Scale:
     longest: float
 
     @classmethod
-    @cache
-    def default(cls) -> Scale:
-        """Return the scale of the bundled parameter files."""
-        table = scan_table()
+    def of(cls, hand: ParameterTable | None = None) -> Scale:
+        """Return the scale of a hand that grips, of the bundled one by default.
+
+        A hand whose finger, nail and half a palm reach farther than ``scan.toml`` says has rock
+        that is as much larger.
+        """
+        hand, table = hand or hand_table(), scan_table()
+        usual = table.scalar("cut", "reach")
+        reach = max(
+            usual,
+            len(hand.vector("finger", "pulley_radii")) * hand.scalar("finger", "joint_spacing")
+            + hand.scalar("finger", "tile_height")
+            + hand.scalar("nail", "length")
+            + 0.5 * hand.scalar("palm", "length"),
+        )
         return cls(
-            tile=hand_table().scalar("finger", "tile_length"),
+            tile=hand.scalar("finger", "tile_length"),
             spacing=table.scalar("cut", "spacing"),
             bridged_gap=table.scalar("cut", "bridged_gap"),
-            reach=table.scalar("cut", "reach"),
-            longest=table.scalar("cut", "longest"),
+            reach=reach,
+            longest=table.scalar("cut", "longest") * (reach / usual),
         )
 
 

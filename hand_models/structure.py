@@ -19,7 +19,6 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
 from hand_models.parameters import ParameterTable
 
@@ -85,14 +84,9 @@ class Structure:
             If a number is missing or not above zero.
         """
         numbers = {
-            name: table.scalar("structure", name)
+            name: table.positive("structure", name)
             for name in ("finger_shear", "fingertip_force", "held_mass", "standard_gravity")
         }
-        for name, value in numbers.items():
-            if not value > 0.0:
-                raise InvalidInputError(
-                    f"must be above 0, got {value:g}", field=f"structure.{name}"
-                )
         return cls(
             finger_shear=numbers["finger_shear"],
             fingertip_force=numbers["fingertip_force"],

@@ -32,11 +32,12 @@ SMALLEST_BOX: Final = 1e-9
 """Half width of the box about a pose, in `UNITS`: at first, at most, and when to end."""
 
 ROUNDS: Final = 60
-SHORTFALL: Final = 1e3
-"""What a limit exceeded by the whole of its capacity counts, in newtons of d · w."""
+WEIGHTS: Final = (1e3, 1e4, 1e5)
+"""What a limit exceeded by the whole of its capacity counts, in units of d · w: the next if the
+last left one exceeded."""
 
 CLOSE: Final = 1e-6
-"""Change of the objective at which the poses have converged, relative to its size."""
+"""Promise of a linear program at which the poses have converged, relative to the objective."""
 
 KEPT: Final = 1e-5
 """By what share of its capacity a limit may be exceeded at the pose found."""
@@ -98,34 +99,21 @@ def farthest(
         If a linear program fails.
     """
     d = np.asarray(direction, dtype=float)
-    space = grasp.linearised(start)
-    units = pose_units(space.columns)
+    units = pose_units(grasp.linearised(start).columns)
     at = np.zeros(len(units)) if start is None else np.asarray(start, dtype=float)
-    merit, found = _merit(grasp, at, d, below)
-    box, rounds = FIRST_BOX, 0
-    while rounds < ROUNDS and box > SMALLEST_BOX:
-        rounds += 1
-        step, foretold = _step(space, d, at, box * units, units, below)
-        tried = at + step
-        gained, there = _merit(grasp, tried, d, below)
-        promised = foretold - merit
-        if promised <= CLOSE * max(1.0, abs(merit)):
+    rounds, excess = 0, np.inf
+    for weight in WEIGHTS:
+        at, found, taken = _climb(grasp, d, at, units, below, weight)
+        rounds += taken
+        excess = _excess(found, below)
+        if excess <= KEPT:
             break
-        if gained > merit:
-            size = np.abs(step / units).max()
-            if gained - merit > 0.75 * promised:
-                box = min(2.0 * max(box, size), LARGEST_BOX)
-            at, merit, found = tried, gained, there
-            space = grasp.linearised(at)
-        else:
-            box = 0.25 * min(box, float(np.abs(step / units).max()))
-    verdict = found.verdict
-    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
     if excess > KEPT:
         raise EmptySetError(
-            f"no pose of the wrist holds near the way to this wrench: limits are exceeded by "
-            f"{100 * excess:.2g} %"
+            "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
+            f"{100.0 * excess:.2g} %"
         )
+    verdict = found.verdict
     binding = float(verdict.utilisation[0]) >= 1.0 - KEPT
     return Farthest(
         twist=at,
@@ -160,18 +148,52 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
     return pose, float(direction @ space.wrench(pose))
 
 
-def _merit(
-    grasp: CompliantGrasp, at: Array, d: Array, below: tuple[Array, Array] | None
-) -> tuple[float, Evaluation]:
-    """Return d · w less what is exceeded, at a pose."""
+def _climb(
+    grasp: CompliantGrasp,
+    d: Array,
+    at: Array,
+    units: Array,
+    below: tuple[Array, Array] | None,
+    weight: float,
+) -> tuple[Array, Evaluation, int]:
+    """Follow linear programs from a pose until they promise nothing more; also their number."""
+    space = grasp.linearised(at)
     found = grasp.evaluate(at[None])
-    excess = max(float(found.verdict.utilisation[0]) - 1.0, float(found.verdict.violation[0]), 0.0)
+    merit = _merit(found, d, below, weight)
+    box, rounds = FIRST_BOX, 0
+    while rounds < ROUNDS and box > SMALLEST_BOX:
+        rounds += 1
+        step, foretold = _step(space, d, at, box * units, units, below, weight)
+        promised = foretold - merit
+        if promised <= CLOSE * max(1.0, abs(merit)):
+            break
+        there = grasp.evaluate((at + step)[None])
+        gained = _merit(there, d, below, weight) - merit
+        size = float(np.abs(step / units).max())
+        if gained <= 0.0:
+            box = 0.25 * min(box, size)
+            continue
+        if gained > 0.75 * promised:
+            box = min(2.0 * max(box, size), LARGEST_BOX)
+        at, found, merit = at + step, there, merit + gained
+        space = grasp.linearised(at)
+    return at, found, rounds
+
+
+def _excess(found: Evaluation, below: tuple[Array, Array] | None) -> float:
+    """Return by what share a limit is exceeded, or a hard row in newtons; the most of all."""
+    verdict = found.verdict
+    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]), 0.0)
     if below is not None:
         G, g = below
         excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))
-    if not np.isfinite(excess):
-        return -np.inf, found
-    return float(d @ found.wrenches[0]) - SHORTFALL * excess, found
+    return excess
+
+
+def _merit(found: Evaluation, d: Array, below: tuple[Array, Array] | None, weight: float) -> float:
+    """Return d · w less what is exceeded."""
+    excess = _excess(found, below)
+    return float(d @ found.wrenches[0]) - weight * excess if np.isfinite(excess) else -np.inf
 
 
 def _step(
@@ -181,6 +203,7 @@ def _step(
     half_widths: Array,
     units: Array,
     below: tuple[Array, Array] | None,
+    weight: float,
 ) -> tuple[Array, float]:
     """Return the best step within a box by the linear model, and the merit that it foretells."""
     # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
@@ -194,7 +217,7 @@ def _step(
     b: Array = np.concatenate(most) - A @ at
     gain = d @ space.generators
     result = linprog(
-        np.append(-gain * units, SHORTFALL),
+        np.append(-gain * units, weight),
         A_ub=np.column_stack([A * units, -np.ones(len(b))]),
         b_ub=b,
         bounds=[*zip(-half_widths / units, half_widths / units, strict=True), (0.0, None)],

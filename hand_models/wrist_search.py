@@ -28,7 +28,7 @@ from hand_models.wrench_space import SCALE, Row, WrenchSpace
 from hand_models.wrist_limit import pose_units
 from hand_models.wrist_pose import CompliantGrasp, Verdict
 
-__all__ = ["PLANAR", "SearchBox", "WristSearch", "boundary", "search", "search_box"]
+__all__ = ["PLANAR", "SearchBox", "WristSearch", "boundary", "linear_box", "search", "search_box"]
 
 PLANAR: Final = (0, 2, 4)
 """Components F_x, F_z, M_y of a wrench, of a grasp that moves in a plane."""
@@ -118,8 +118,8 @@ class WristSearch:
         return float((self.wrenches @ np.asarray(direction, dtype=float)).max())
 
 
-def search_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return where to search: the ellipsoid about the linearised set, its range by sparse grids.
+def linear_box(grasp: CompliantGrasp) -> SearchBox:
+    """Return the ellipsoid about the set linearised at rest, its range that set's.
 
     Raises
     ------
@@ -128,10 +128,21 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
     """
     space = grasp.linearised()
     centre, axes = _ellipsoid(space)
-    found = grasp.evaluate(centre[None])
-    if not found.verdict.holds[0]:
+    if not grasp.evaluate(centre[None]).verdict.holds[0]:
         centre = np.zeros(len(centre))
-    box = SearchBox(centre, axes, _range(space, centre, axes))
+    return SearchBox(centre, axes, _range(space, centre, axes))
+
+
+def search_box(grasp: CompliantGrasp) -> SearchBox:
+    """Return where to search: the ellipsoid about the linearised set, its range by sparse grids.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near rest holds.
+    """
+    box = linear_box(grasp)
+    centre = box.centre
     per_axis = SPARSE[len(centre)]
     for _ in range(RESIZES):
         t = box.grid(per_axis, 0, per_axis ** len(centre))
@@ -281,7 +292,7 @@ def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array
 
 def _sphere(n: int, d: int) -> Array:
     """Return n unit vectors in d dimensions, evenly spread and always the same."""
-    uniform = qmc.Halton(d, scramble=True, rng=0).random(n)
+    uniform = qmc.Halton(d, scramble=False).random(n + 1)[1:]
     normal = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 

@@ -27,7 +27,7 @@ ENTRIES = [
     for section, name, quantity in table
 ]
 
-SI = {"m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1", "A", "N·m/A", "m/s²", "N·m²"}
+SI = {"m", "1/m", "kg", "N", "N/m", "N·m/rad", "N·m", "rad", "1", "A", "N·m/A", "m/s²", "N·m²"}
 
 PRINTED = {
     # from the SpinyHand paper: mass and tension (Section 2), springs (3.2), palm (4), pulleys (4.2)

@@ -2,21 +2,22 @@
 
 The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those of a tile's
 spines in ``spines.toml``, those of reading scanned rock in ``scan.toml``, those of the paper's
-experiments in ``experiments.toml``, beside this file. A caller's own file in the same form may
-replace some or all of them.
+experiments in ``experiments.toml``, beside this file. A caller's own file in the form of
+``hand.toml`` may replace some or all of the hand's (`hand_models.parameters.own`).
 """
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from textwrap import shorten
+from typing import Any, Final, Literal
 
 import msgspec
-import numpy as np
 
 from hand_models.errors import InvalidInputError
 
@@ -31,6 +32,12 @@ __all__ = [
 ]
 
 Source = Literal["paper", "measured", "calibrated", "assumed"]
+
+ENTRY: Final = "{ value, unit, source, note (optional) }"
+"""Form of an entry."""
+
+LONGEST_QUOTE: Final = 200
+"""Characters of a complaint about an entry: it may quote it."""
 
 
 class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,11 +62,12 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ParameterTable:
-    """Quantities by section and name.
+    """Quantities by section and name. Tables of the same content are equal.
 
     Parameters
     ----------
     sections : mapping of str to mapping of str to Quantity
+        Not to be changed any more.
     """
 
     def __init__(self, sections: Mapping[str, Mapping[str, Quantity]]) -> None:
@@ -75,21 +83,38 @@ class ParameterTable:
             If the text is not TOML or an entry is not a quantity of finite numbers.
         """
         try:
-            raw: dict[str, Any] = tomllib.loads(text)
-            table = cls(msgspec.convert(raw, dict[str, dict[str, Quantity]]))
-        except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+            return cls.of(tomllib.loads(text))
+        except (tomllib.TOMLDecodeError, InvalidInputError) as error:
             raise InvalidInputError(str(error), field=origin) from None
-        for section, name, quantity in table:
-            if not np.isfinite(quantity.value).all():
-                raise InvalidInputError(
-                    f"{section}.{name} must be finite, got {quantity.value}", field=origin
-                )
-        return table
+
+    @classmethod
+    def of(cls, raw: Mapping[str, Any]) -> ParameterTable:
+        """Take quantities as TOML or JSON has them.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is not a quantity of finite numbers; the field is its section and name.
+        """
+        sections: dict[str, dict[str, Quantity]] = {}
+        for section, entries in raw.items():
+            if not isinstance(entries, Mapping):
+                raise InvalidInputError("a section of entries is needed", field=section)
+            sections[section] = {
+                name: _quantity(entry, f"{section}.{name}") for name, entry in entries.items()
+            }
+        return cls(sections)
 
     @classmethod
     def load(cls, path: Path) -> ParameterTable:
-        """Read a parameter file from disk."""
-        return cls.read(path.read_text(encoding="utf-8"), str(path))
+        """Read a parameter file from disk; raises what `read` raises, also if there is none."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
+        except UnicodeDecodeError:
+            raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
+        return cls.read(text, str(path))
 
     def quantity(self, section: str, name: str) -> Quantity:
         """Return one quantity.
@@ -111,6 +136,13 @@ class ParameterTable:
             raise InvalidInputError("one number is needed, not a list", field=f"{section}.{name}")
         return float(value)
 
+    def positive(self, section: str, name: str) -> float:
+        """Return a single number in SI units; refuse one that is not above 0."""
+        value = self.scalar(section, name)
+        if not value > 0.0:
+            raise InvalidInputError(f"must be above 0, got {value:g}", field=f"{section}.{name}")
+        return value
+
     def vector(self, section: str, name: str) -> tuple[float, ...]:
         """Return a list of numbers in SI units."""
         value = self.quantity(section, name).value
@@ -129,6 +161,44 @@ class ParameterTable:
         for section, name, quantity in other:
             sections.setdefault(section, {})[name] = quantity
         return ParameterTable(sections)
+
+    def difference(self, other: ParameterTable) -> ParameterTable:
+        """Return the entries whose values are not those of ``other``."""
+        sections: dict[str, dict[str, Quantity]] = {}
+        for section, name, quantity in self:
+            theirs = other.sections.get(section, {}).get(name)
+            if theirs is None or theirs.value != quantity.value:
+                sections.setdefault(section, {})[name] = quantity
+        return ParameterTable(sections)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ParameterTable) and self.sections == other.sections
+
+    def __hash__(self) -> int:
+        # equal tables have equal names and values, in whatever order
+        return hash(
+            frozenset(
+                (section, name, tuple(q.value) if isinstance(q.value, list) else q.value)
+                for section, name, q in self
+            )
+        )
+
+
+def _quantity(raw: Any, field: str) -> Quantity:
+    try:
+        quantity = msgspec.convert(raw, Quantity)
+    except msgspec.ValidationError as error:
+        complaint = shorten(str(error).replace("`", ""), LONGEST_QUOTE, placeholder=" …")
+        raise InvalidInputError(
+            f"{complaint[:1].lower()}{complaint[1:]}; an entry is {ENTRY}", field=field
+        ) from None
+    value = quantity.value
+    numbers = enumerate(value) if isinstance(value, list) else [(None, value)]
+    for i, number in numbers:
+        if not math.isfinite(number):
+            place = f"{field}.value" if i is None else f"{field}.value[{i}]"
+            raise InvalidInputError(f"must be finite, got {number}", field=place)
+    return quantity
 
 
 def _bundled(name: str) -> ParameterTable:

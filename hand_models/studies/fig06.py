@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from hand_models.palm import share_load
+from hand_models.parameters import ParameterTable
 from hand_models.studies import Claim, Progress, StudyResult, save_picture
 from hand_models.studies.hard_stop import PalmExperiment
 
@@ -29,9 +30,9 @@ EXACT: Final = 1e-9
 """Relative difference that still counts as the same."""
 
 
-def run(progress: Progress) -> StudyResult:
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Load every pair of springs with and without friction."""
-    experiment = PalmExperiment.from_tables()
+    experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
     pairs = list(itertools.combinations(numbers, 2))
     ordered = [order for pair in pairs for order in (pair, pair[::-1])]
@@ -85,14 +86,19 @@ def _curve(experiment: PalmExperiment, pair: tuple[int, int]) -> dict[str, Any]:
     }
 
 
-def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[tuple[int, int]]) -> float:
-    """Return the k_p at which the least gain of all pairs is the printed one [N/m]."""
+def _least_gain_is_printed(
+    experiment: PalmExperiment, pairs: list[tuple[int, int]]
+) -> float | None:
+    """Return the k_p at which the least gain of all pairs is the printed one [N/m], if any is."""
 
     def excess(stiffness: float) -> float:
         softer = experiment.with_preload(stiffness)
         return min(softer.gain(pair) for pair in pairs) - PRINTED_GAIN
 
-    return float(brentq(excess, float(SPRING_RANGE[0]), float(SPRING_RANGE[-1])))
+    softest, stiffest = float(SPRING_RANGE[0]), float(SPRING_RANGE[-1])
+    if excess(softest) < 0.0 or excess(stiffest) > 0.0:
+        return None
+    return float(brentq(excess, softest, stiffest))
 
 
 def _claims(
@@ -246,7 +252,7 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
     used = 1e-3 * result.data["preload_stiffness"]
     over_springs.axvline(used, color="0.4", linestyle="--", linewidth=1.0)
     over_springs.set(
-        xlabel="preload springs, k_p [N/mm]; dashed: calibrated",
+        xlabel="preload springs, k_p [N/mm]; dashed: the hand's",
         ylabel="gain by friction [%]; red: printed",
         title=f"gain at μ = {result.data['friction']:g}",
         ylim=(0.0, None),

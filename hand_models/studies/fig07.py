@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
-from hand_models.parameters import experiment_table
+from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies import Claim, Progress, StudyResult, save_picture
 from hand_models.studies.hard_stop import PalmExperiment
 
@@ -26,12 +26,15 @@ VARIANTS: Final = {"tiles": False, "tiles and palm": True}
 SIGNIFICANT: Final = 0.05
 """Probability by chance below which a rank correlation counts."""
 
+ALIKE: Final = 1e-9
+"""Gains that differ by less are the same."""
+
 Sequence4 = tuple[int, ...]
 
 
-def run(progress: Progress) -> StudyResult:
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Load every sequence (mirror images once) with and without friction, for several k_p."""
-    experiment = PalmExperiment.from_tables()
+    experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
     sequences = [s for s in itertools.product(numbers, repeat=TILES) if s <= s[::-1]]
     tried = experiment_table().vector("load_sharing", "springs_tried")
@@ -158,7 +161,10 @@ def _claims(
 def _discrepancy_correlations(
     experiment: PalmExperiment, configurations: list[dict[str, Any]], variant: str
 ) -> dict[str, tuple[float, float]]:
-    """Return Spearman's rank correlation of gain with two measures of discrepancy, and its p."""
+    """Return Spearman's rank correlation of gain with two measures of discrepancy, and its p.
+
+    Gains that are all alike, as those of pulleys without friction are, correlate with nothing.
+    """
     gains = [c["gain"][variant] for c in configurations]
     springs = np.array(experiment.springs)
     stiffness = [springs[np.array(c["springs"]) - 1] for c in configurations]
@@ -166,6 +172,8 @@ def _discrepancy_correlations(
         "mean/softest": [k.mean() / k.min() for k in stiffness],
         "deviation/mean": [k.std() / k.mean() for k in stiffness],
     }
+    if np.ptp(gains) <= ALIKE:
+        return dict.fromkeys(measures, (0.0, 1.0))
     found = {}
     for what, values in measures.items():
         answer = spearmanr(values, gains)

@@ -21,6 +21,7 @@ from scipy.spatial import ConvexHull
 
 from hand_models.frames import Array
 from hand_models.limit_pieces import bounds_gap, reach
+from hand_models.parameters import ParameterTable
 from hand_models.spine_array import SpineArray, statistics
 from hand_models.spine_calibration import (
     LEAST_SPINES,
@@ -63,8 +64,11 @@ COUNTS: Final = (1, 2, 4, 8)
 """Half-planes for which the gap is told."""
 
 
-def run(progress: Progress) -> StudyResult:
-    """Simulate the trials, the table of strengths and the surface."""
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
+    """Simulate the trials, the table of strengths and the surface.
+
+    They are of one tile's spines and of the rock, so no number of the hand's matters.
+    """
     surface, array = Surface.named(PRESET), SpineArray.named(PRESET)
     steps = 4
     progress(0, steps)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hand_models.palm import share_load
-from hand_models.parameters import experiment_table, hand_table
+from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["PalmExperiment"]
 
@@ -36,9 +36,8 @@ class PalmExperiment:
     friction: float
 
     @classmethod
-    def from_tables(cls) -> PalmExperiment:
-        """Take the numbers from ``experiments.toml`` and ``hand.toml``."""
-        hand = hand_table()
+    def from_tables(cls, hand: ParameterTable) -> PalmExperiment:
+        """Take the springs from ``experiments.toml``, the palm from a hand's table."""
         return cls(
             springs=experiment_table().vector("load_sharing", "contact_springs"),
             preload_stiffness=hand.scalar("palm", "spring_stiffness"),

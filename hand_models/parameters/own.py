@@ -1,0 +1,116 @@
+"""A hand of the caller's own: some entries in place of the bundled hand's.
+
+An entry must be one that the bundled table has, in its unit and of its shape, and of a sign that it
+can have. What only several numbers together make impossible, the models that read them refuse.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from textwrap import shorten
+from typing import Final
+
+import numpy as np
+
+from hand_models.errors import InvalidInputError
+from hand_models.parameters import LONGEST_QUOTE, ParameterTable, Quantity, hand_table
+
+__all__ = ["load_own_hand", "own_hand"]
+
+LARGEST: Final = {"m": 1.0, "rad": 2.0 * math.pi}
+"""By unit, what no number of a hand exceeds; larger ones are in millimetres or degrees."""
+
+LARGEST_FACTOR: Final = 1e4
+"""How many times the bundled number, or one, any other may be: beyond, arithmetic loses its
+digits."""
+
+
+def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTable:
+    """Read a hand's own entries from a file, and check them.
+
+    Parameters
+    ----------
+    path : Path
+        TOML in the form of ``hand.toml``, with none but the entries that differ.
+    base : ParameterTable, optional
+        The hand that they are to change; the bundled one by default.
+
+    Returns
+    -------
+    ParameterTable
+        The file's entries alone; `own_hand` makes a hand of them.
+
+    Raises
+    ------
+    InvalidInputError
+        In one line that names file, entry and value.
+    """
+    own = ParameterTable.load(path)
+    try:
+        own_hand(own, base)
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), field=str(path)) from None
+    return own
+
+
+def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> ParameterTable:
+    """Return all numbers of a hand, some of them the caller's own.
+
+    Parameters
+    ----------
+    own : ParameterTable
+        Entries that differ.
+    base : ParameterTable, optional
+        All others; the bundled hand's by default.
+
+    Raises
+    ------
+    InvalidInputError
+        If an entry is unknown, in another unit, of another shape, or of a sign or size that it
+        cannot have; the field is its section and name.
+    """
+    bundled = hand_table()
+    for section, entries in own.sections.items():
+        if section not in bundled.sections:
+            raise InvalidInputError(
+                f"unknown section; {_known(section, bundled.sections)}", field=section
+            )
+        known = bundled.sections[section]
+        for name, quantity in entries.items():
+            field = f"{section}.{name}"
+            if name not in known:
+                raise InvalidInputError(f"unknown entry; {_known(name, known)}", field=field)
+            _check(quantity, known[name], field)
+    return (base or bundled).replaced(own)
+
+
+def _known(given: str, known: Iterable[str]) -> str:
+    """List the known names, those first that are like the given one."""
+    names = list(known)
+    like = difflib.get_close_matches(given, names)
+    return f"known are {', '.join([*like, *(name for name in names if name not in like)])}"
+
+
+def _check(own: Quantity, bundled: Quantity, field: str) -> None:
+    """Refuse a number that cannot stand in the place of a bundled one."""
+    got, usual = np.asarray(own.value, dtype=float), np.asarray(bundled.value, dtype=float)
+    if got.shape != usual.shape:
+        needed = f"a list of {usual.size} numbers" if usual.ndim else "one number"
+        shown = own.value if got.size <= usual.size else f"a list of {got.size}"
+        raise InvalidInputError(f"{needed} is needed, got {shown}", field=field)
+    if own.unit != bundled.unit:
+        unit = shorten(own.unit, LONGEST_QUOTE, placeholder=" …")
+        raise InvalidInputError(
+            f"must be in {bundled.unit!r}, got {own.value} in {unit!r}", field=field
+        )
+    # no bundled length is zero, but a coordinate may be, and then has either sign
+    coordinate = own.unit == "m" and usual.min() == 0.0
+    largest = LARGEST.get(own.unit, LARGEST_FACTOR * max(float(np.abs(usual).max()), 1.0))
+    least = 0.0 if usual.min() >= 0.0 and not coordinate else -largest
+    if not (least <= got.min() and got.max() <= largest):
+        raise InvalidInputError(
+            f"must be from {least:.4g} to {largest:.4g} {own.unit}, got {own.value}", field=field
+        )

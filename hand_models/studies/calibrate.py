@@ -1,0 +1,405 @@
+"""The open question: one set of numbers for Fig. 12 and for the extents of Fig. 13 at once.
+
+Least squares from the recorded set, over what of the gripper is not published, each number within
+what is plausible. Residuals are in tolerances: a tenth of a value, or 0.3 N, for the ends of
+Fig. 12's lines, a tenth for the extents in force, a quarter for that in moment. Their third powers
+are fitted, so that the worst count most.
+
+Which numbers the data fix is read off the Jacobian J at the end: with errors of a tolerance each
+and with the plausible ranges as what is known beforehand, the variance of a number is the diagonal
+of (JᵀJ + R)⁻¹. Then some numbers are held at the hand's own values and the rest fitted again: what
+the data exclude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.optimize import brentq, least_squares
+
+from hand_models.errors import CruxError, SolverError
+from hand_models.finger import PHALANGES
+from hand_models.frames import Array
+from hand_models.gripper import Gripper, gripper_table
+from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
+from hand_models.studies import Claim, Progress, StudyResult, save_picture
+from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
+from hand_models.wrist_search import boundary, linear_box
+
+__all__ = ["plot", "run"]
+
+FORCE_TOLERANCE: Final = 0.3
+RELATIVE_TOLERANCE: Final = 0.1
+MOMENT_TOLERANCE: Final = 0.25
+"""Of Fig. 12's values [N] and relative; of the extents in force; of that in moment."""
+
+RAYS: Final = 3000
+"""Of the wrench space's boundary."""
+
+POWER: Final = 3
+"""To which residuals are raised, sign kept."""
+
+STEP: Final = 2e-3
+"""Of finite differences, in plausible ranges."""
+
+FITS: Final = 25
+REFITS: Final = 10
+"""Evaluations of the Jacobian at most, of the fit and of those with a number held."""
+
+HOPELESS: Final = 30.0
+"""Residual where a set of numbers gives no gripper that holds."""
+
+BEFOREHAND: Final = 1.0 / np.sqrt(12.0)
+"""Standard deviation of a number that may be anywhere in its plausible range, over that range."""
+
+FIXED: Final = 0.5
+"""A number counts as fixed by the data if they leave this share of what was unknown beforehand."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number to be found: its entry in the gripper's table, and its plausible range."""
+
+    label: str
+    section: str
+    entry: str
+    index: int | None
+    low: float
+    high: float
+    unit: str
+
+
+def numbers() -> tuple[Number, ...]:
+    """Return the numbers to be found."""
+    ranges = experiment_table().sections["calibration"]
+
+    def of(label: str, section: str, entry: str, index: int | None, name: str) -> Number:
+        quantity = ranges[name]
+        assert isinstance(quantity.value, list)
+        low, high = quantity.value
+        return Number(label, section, entry, index, low, high, quantity.unit)
+
+    found = [
+        of(name, "gripper", name, None, name)
+        for name in ("base_half_spacing", "added_radius", "origin_height")
+    ]
+    found += [of(name, "finger", name, None, name) for name in ("tile_height", "seated_contact")]
+    found += [
+        of(f"pulley_radii[{i}]", "finger", "pulley_radii", i, name)
+        for i, name in ((1, "middle_radius"), (2, "distal_radius"))
+    ]
+    for section, entry in (
+        ("tile", "engagement"),
+        ("gripper", "contact_stiffness"),
+    ):
+        found += [of(f"{entry}[{i}]", section, entry, i, entry) for i in range(len(PHALANGES))]
+    return (*found, *(of(n, "gripper", n, None, n) for n in ("shear_limit", "pull_off_slope")))
+
+
+class Fit:
+    """Residuals of the fifteen data over the numbers, each in plausible ranges from 0 to 1."""
+
+    def __init__(self, table: ParameterTable) -> None:
+        self.table = table
+        self.numbers = numbers()
+        self.low = np.array([number.low for number in self.numbers])
+        self.width = np.array([number.high for number in self.numbers]) - self.low
+        data = experiment_table()
+        self.tension = data.scalar("fig12", "tension")
+        self.diameter = data.scalar("fig12", "diameter")
+        self.pull = data.scalar("fig12", "pull")
+        self.labels: list[str] = []
+        values: list[float] = []
+        for end in ("unloaded", "pulled"):
+            for kind in ("shear", "normal"):
+                values += data.vector("fig12", f"{kind}_{end}")
+                self.labels += [f"{phalanx} {kind}, {end}" for phalanx in PHALANGES]
+        forces = np.array(values)
+        far = [data.scalar("fig13", name) for name in ("force_x", "force_z", "moment")]
+        self.labels += ["extent of F_x", "extent of F_z", "extent of M_y"]
+        self.wanted = np.concatenate([forces, far])
+        share = np.array([RELATIVE_TOLERANCE, RELATIVE_TOLERANCE, MOMENT_TOLERANCE])
+        self.tolerance = np.concatenate(
+            [
+                np.maximum(RELATIVE_TOLERANCE * np.abs(forces), FORCE_TOLERANCE),
+                share * np.abs(np.array(far)),
+            ]
+        )
+
+    def start(self) -> Array:
+        """Return where the table is."""
+        now = [_value(self.table, number) for number in self.numbers]
+        return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
+
+    def values(self, x: Array) -> Array:
+        """Return the numbers in SI units."""
+        return np.asarray(self.low + self.width * x)
+
+    def gripper(self, x: Array) -> Gripper:
+        """Return the gripper of some numbers."""
+        table = self.table
+        for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
+            table = _with(table, number, value)
+        return Gripper(self.diameter, self.tension, table=table)
+
+    def model(self, x: Array) -> Array:
+        """Return what the model has for the fifteen data, shape (15,) [N, N·m].
+
+        Raises
+        ------
+        CruxError
+            If the fingers do not lie on the surface, or nothing holds.
+        """
+        gripper = self.gripper(x)
+        found: list[float] = []
+        for pull in (0.0, self.pull):
+            loads, _ = gripper.finger_loads(pulled_pose(gripper, pull)[None])
+            found += [*loads.shears[0], *loads.normals[0]]
+        space = boundary(gripper, linear_box(gripper), RAYS)
+        return np.array([*found, *extents(cut(in_paper_signs(space.wrenches)))])
+
+    def residuals(self, x: Array) -> Array:
+        """Return how many tolerances each datum is off, shape (15,)."""
+        try:
+            return np.asarray((self.model(x) - self.wanted) / self.tolerance)
+        except CruxError:
+            return np.full(len(self.wanted), HOPELESS)
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the residuals' slopes over plausible ranges, shape (15, n)."""
+        columns = []
+        for i in range(len(x)):
+            ends = [np.clip(x[i] + side * STEP, 0.0, 1.0) for side in (1.0, -1.0)]
+            there = [self.residuals(np.concatenate([x[:i], [end], x[i + 1 :]])) for end in ends]
+            columns.append((there[0] - there[1]) / (ends[0] - ends[1]))
+        return np.column_stack(columns)
+
+    def fitted(self, x: Array, held: tuple[int, ...], rounds: int, tick: Any) -> Array:
+        """Return the numbers that fit best, some of them held."""
+        free = np.array([i for i in range(len(x)) if i not in held])
+
+        def cubes(part: Array) -> Array:
+            tick()
+            whole = x.copy()
+            whole[free] = part
+            found = self.residuals(whole)
+            return np.asarray(np.sign(found) * np.abs(found) ** POWER)
+
+        best = least_squares(
+            cubes,
+            np.clip(x[free], STEP, 1.0 - STEP),
+            bounds=(0.0, 1.0),
+            diff_step=np.full(len(free), STEP),
+            max_nfev=rounds,
+        )
+        whole = x.copy()
+        whole[free] = best.x
+        return whole
+
+
+def pulled_pose(gripper: Gripper, pull: float) -> Array:
+    """Return the pose (x, z, ω_y) at which a symmetric pull along −z is balanced, shape (3,).
+
+    Raises
+    ------
+    SolverError
+        If no pose does.
+    """
+
+    def excess(z: float) -> float:
+        return float(gripper.evaluate(np.array([[0.0, z, 0.0]])).wrenches[0, 2]) + pull
+
+    reach = 1e-3 / 8.0
+    for _ in range(6):
+        low, high = excess(-reach), excess(0.5 * reach)
+        if low * high < 0.0:
+            return np.array([0.0, float(brentq(excess, -reach, 0.5 * reach, xtol=1e-12)), 0.0])
+        reach *= 2.0
+    raise SolverError(f"no pose of the gripper balances a pull of {pull:g} N")
+
+
+def _value(table: ParameterTable, number: Number) -> float:
+    if number.index is None:
+        return table.scalar(number.section, number.entry)
+    return table.vector(number.section, number.entry)[number.index]
+
+
+def _with(table: ParameterTable, number: Number, value: float) -> ParameterTable:
+    old = table.quantity(number.section, number.entry)
+    new: float | list[float] = value
+    if number.index is not None:
+        new = list(table.vector(number.section, number.entry))
+        new[number.index] = value
+    quantity = Quantity(new, old.unit, "calibrated", "study calibrate")
+    return table.replaced(ParameterTable({number.section: {number.entry: quantity}}))
+
+
+HELD: Final = (
+    ("tile_height",),
+    ("added_radius",),
+    ("origin_height",),
+    ("base_half_spacing",),
+    ("engagement[0]", "engagement[1]", "engagement[2]"),
+    ("contact_stiffness[0]", "contact_stiffness[1]", "contact_stiffness[2]"),
+    ("pulley_radii[1]", "pulley_radii[2]"),
+)
+"""Numbers that are held at the hand's own in turn."""
+
+
+def _own(fit: Fit) -> Array:
+    """Return the numbers as they are on the hand, shape (n,); of the rig alone, as fitted."""
+    hand = hand_table()
+    joints = hand.vector("fingers", "inner_joint")
+    axis, reach = hand.vector("fingers", "outer_axis"), hand.scalar("fingers", "outer_reach")
+    own = {
+        "base_half_spacing": 0.5 * (joints[0] - (axis[0] - reach)),
+        "added_radius": 0.0,
+        "origin_height": -joints[2],
+        "tile_height": hand.scalar("finger", "tile_height"),
+        "seated_contact": hand.scalar("finger", "seated_contact"),
+    }
+    own |= {f"contact_stiffness[{i}]": hand.scalar("tile", "contact_stiffness") for i in range(3)}
+    for entry, section in (
+        ("pulley_radii", "finger"),
+        ("engagement", "tile"),
+    ):
+        own |= {f"{entry}[{i}]": v for i, v in enumerate(hand.vector(section, entry))}
+    now = fit.values(fit.start())
+    return np.array([own.get(n.label, now[i]) for i, n in enumerate(fit.numbers)])
+
+
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
+    """Fit the gripper's numbers again, and see which of them the data fix."""
+    fit = Fit(gripper_table(hand))
+    n = len(fit.numbers)
+    total = FITS * (n + 1) + 2 * n + len(HELD) * REFITS * n
+    done = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        progress(min(done, total - 1), total)
+
+    start = fit.start()
+    before = fit.residuals(start)
+    x = fit.fitted(start, (), FITS, tick)
+    after = fit.residuals(x)
+    if np.abs(after).max() > np.abs(before).max():
+        x, after = start, before
+    done = FITS * (n + 1)
+    jacobian = fit.jacobian(x)
+    spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(n) / BEFOREHAND**2)))
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    own = _own(fit)
+    held = []
+    for k, labels in enumerate(HELD):
+        done = FITS * (n + 1) + 2 * n + k * REFITS * n
+        those = tuple(i for i, number in enumerate(fit.numbers) if number.label in labels)
+        fixed = x.copy()
+        fixed[list(those)] = ((own - fit.low) / fit.width)[list(those)]
+        again = fit.fitted(fixed, those, REFITS, tick)
+        found = fit.residuals(again)
+        held.append(
+            {
+                "held": list(labels),
+                "at": [float(own[i]) for i in those],
+                "worst": float(np.abs(found).max()),
+                "datum": fit.labels[int(np.abs(found).argmax())],
+                "root_mean_square": float(np.sqrt((found**2).mean())),
+            }
+        )
+    progress(total, total)
+    at = fit.values(x)
+    hand_residuals = fit.residuals((own - fit.low) / fit.width)
+    data: dict[str, Any] = {
+        "residuals": [
+            {"datum": label, "wanted": w, "model": w + r * t, "tolerances_off": r}
+            for label, w, t, r in zip(
+                fit.labels,
+                fit.wanted.tolist(),
+                fit.tolerance.tolist(),
+                after.tolist(),
+                strict=True,
+            )
+        ],
+        "numbers": [
+            {
+                "name": number.label,
+                "unit": number.unit,
+                "recorded": float(was),
+                "fitted": float(value),
+                "hand": float(mine),
+                "plausible": [number.low, number.high],
+                "standard_error": float(error * width),
+                "share_of_range": float(error),
+                "left_unknown": float(error / BEFOREHAND),
+                "fixed_by_data": bool(error <= FIXED * BEFOREHAND),
+            }
+            for number, was, value, mine, error, width in zip(
+                fit.numbers, fit.values(start), at, own, spread, fit.width, strict=True
+            )
+        ],
+        "singular_values": values.tolist(),
+        "held": held,
+        "worst_before": float(np.abs(before).max()),
+        "worst_after": float(np.abs(after).max()),
+        "worst_with_the_hands_numbers": float(np.abs(hand_residuals).max()),
+    }
+    claims = tuple(
+        Claim(
+            f"{label} ({'Fig. 13' if label.startswith('extent') else 'Fig. 12'})",
+            float(w),
+            float(w + r * t),
+            bool(abs(r) <= 1.0),
+            role="calibration",
+        )
+        for label, w, t, r in zip(fit.labels, fit.wanted, fit.tolerance, after, strict=True)
+    )
+    return StudyResult("calibrate", "one set of numbers for Figs. 12 and 13", data, claims)
+
+
+def plot(result: StudyResult, folder: Path) -> list[Path]:
+    """Draw residuals, what the data fix, and what they exclude."""
+    figure = Figure(figsize=(16.0, 6.0), layout="constrained")
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.2, 1.0))
+    residuals = result.data["residuals"]
+    places = np.arange(len(residuals))[::-1]
+    left.barh(places, [r["tolerances_off"] for r in residuals], color="tab:blue")
+    left.set_yticks(places, [r["datum"] for r in residuals])
+    for side in (-1.0, 1.0):
+        left.axvline(side, color="tab:red", linestyle="--", linewidth=1.0)
+    left.set(xlabel="model less figure [tolerances]", title="residuals")
+    numbers_found = result.data["numbers"]
+    rows = np.arange(len(numbers_found))[::-1]
+    for row, number in zip(rows, numbers_found, strict=True):
+        low, high = number["plausible"]
+        at = (number["fitted"] - low) / (high - low)
+        own = (number["hand"] - low) / (high - low)
+        share = number["share_of_range"]
+        colour = "tab:blue" if number["fixed_by_data"] else "0.6"
+        middle.errorbar(at, row, xerr=share, fmt="o", color=colour, capsize=3)
+        middle.plot(own, row, "D", markerfacecolor="white", markeredgecolor="black")
+    middle.set_yticks(rows, [number["name"] for number in numbers_found])
+    middle.set(
+        xlabel="share of the plausible range [1]; diamonds: the hand's own",
+        title="numbers; blue: narrowed to half or less by the data",
+        xlim=(-0.15, 1.15),
+    )
+    held = result.data["held"]
+    lines = np.arange(len(held) + 1)[::-1]
+    worst = [result.data["worst_after"], *(h["worst"] for h in held)]
+    right.barh(lines, worst, color=["tab:blue"] + ["0.6"] * len(held))
+    names = ["all free", *(h["held"][0].split("[")[0] for h in held)]
+    right.set_yticks(lines, names)
+    right.axvline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
+    right.set(
+        xlabel="largest residual [tolerances]",
+        title="numbers held at the hand's own, the rest fitted again",
+    )
+    for axes in (left, middle, right):
+        axes.grid(axis="x", alpha=0.3)
+    return [save_picture(figure, folder / "calibrate.png")]

@@ -1,0 +1,156 @@
+"""Convex hulls of a planar gripper's wrenches: extents, cuts, sections, limits along directions.
+
+Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus the contract's. A hull is
+given by any points whose convex hull it is; what comes back are vertices.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from hand_models.frames import Array
+from hand_models.polytopes import hull, hull_facets
+from hand_models.wrench_space import SCALE
+from hand_models.wrist_search import PLANAR
+
+__all__ = [
+    "PULL_OFF",
+    "UNITS",
+    "Extents",
+    "cut",
+    "extents",
+    "in_paper_signs",
+    "label_solid",
+    "reach",
+    "section",
+    "vertices",
+    "volume",
+]
+
+UNITS: Final = SCALE[list(PLANAR)]
+"""Per newton, newton and newton metre: what makes wrenches commensurate."""
+
+PULL_OFF: Final = (0.0, 1.0, 0.0)
+"""Normal of the cut that keeps F_z ≤ 0, the part of a hull that the paper shows."""
+
+LABEL_GAP: Final = 8.0
+"""Between numbers and labels of three-dimensional axes [pt]."""
+
+
+class Extents(NamedTuple):
+    """How far a set of wrenches goes: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
+
+    force_x: float
+    force_z: float
+    moment: float
+
+
+def in_paper_signs(wrenches: Array) -> Array:
+    """Return (F_x, F_z, M_y) in the paper's signs of wrenches (n, 6) in the contract's."""
+    return wrenches[:, PLANAR] * (1.0, 1.0, -1.0)
+
+
+def extents(points: Array) -> Extents:
+    """Return how far some wrenches, shape (n, 3), go."""
+    largest = np.abs(points).max(axis=0)
+    return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
+
+
+def vertices(points: Array) -> Array:
+    """Return the vertices of a hull, shape (k, 3).
+
+    Raises
+    ------
+    SolverError
+        If the points span no volume.
+    """
+    return points[hull(points * UNITS).vertices]
+
+
+def volume(points: Array) -> float:
+    """Return the volume of a hull over F_x, F_z and M_y [N³·m]."""
+    return float(hull(points * UNITS).volume / np.prod(UNITS))
+
+
+def cut(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
+    """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
+
+    None, shape (0, 3), if no vertex of the hull is within.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+    normal : array_like, shape (3,)
+        By default `PULL_OFF`.
+    offset : float
+    """
+    height = points @ np.asarray(normal, dtype=float) - offset
+    if not (height < 0.0).any():
+        return np.zeros((0, 3))
+    if (height <= 0.0).all():
+        return vertices(points)
+    return vertices(np.vstack([points[height <= 0.0], _crossings(points, height)]))
+
+
+def section(points: Array, normal: ArrayLike) -> Array:
+    """Return the polygon in which the plane normal · w = 0 meets a hull, in order, shape (k, 3).
+
+    Fewer than three corners, shape (0, 3), if it misses the hull.
+    """
+    n = np.asarray(normal, dtype=float)
+    height = points @ n
+    met = np.vstack([points[height == 0.0], _crossings(points, height)])
+    if len(met) < 3:
+        return np.zeros((0, 3))
+    # coordinates in the plane, of commensurate units
+    basis = np.linalg.svd((n / UNITS)[None])[2][1:]
+    return met[hull(met * UNITS @ basis.T).vertices]
+
+
+def reach(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
+    """Return the largest s ≥ 0 with start + s · direction in a hull, shape (m,).
+
+    Not a number where the line misses the hull, or meets it only behind.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+    directions : ndarray, shape (m, 3)
+    start : array_like, shape (3,) or (m, 3), optional
+        The origin by default.
+    """
+    normals, offsets = hull_facets(points * UNITS)
+    gaps = offsets - np.broadcast_to(start, directions.shape) * UNITS @ normals.T
+    slopes = (directions * UNITS) @ normals.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = gaps / slopes
+    most = np.where(slopes > 0.0, ratios, np.inf).min(axis=1)
+    least = np.where(slopes < 0.0, ratios, -np.inf).max(axis=1)
+    blocked = ((slopes == 0.0) & (gaps < 0.0)).any(axis=1)
+    return np.where((most >= np.maximum(least, 0.0)) & ~blocked, most, np.nan)
+
+
+def _crossings(points: Array, height: Array) -> Array:
+    """Return where the edges of a hull cross the plane at which its height is zero, (k, 3)."""
+    triangles = hull(points * UNITS).simplices
+    pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
+    near, far = np.unique(np.sort(pairs), axis=0).T
+    across = height[near] * height[far] < 0.0
+    near, far = near[across], far[across]
+    part = height[near] / (height[near] - height[far])
+    return np.asarray(points[near] + part[:, None] * (points[far] - points[near]))
+
+
+def label_solid(axes: Any, title: str) -> None:
+    """Label three-dimensional axes (F_x, M_y, F_z), drawn upside down: pull-off is up."""
+    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(5))
+        axis.labelpad = LABEL_GAP
+    axes.invert_zaxis()
+    axes.set_box_aspect(None, zoom=0.85)
+    axes.view_init(elev=25.0, azim=-50.0)

@@ -1,0 +1,71 @@
+"""All changes of load at once are what the complementarity problem gives one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hand_models.compliant_finger import STEP
+from hand_models.tendon import FingerTendon
+from hand_models.tendon_regimes import MOTOR_SCHEMES, TendonRegimes
+
+
+def random_tendon(rng, friction, entry):
+    n = int(rng.integers(3, 5))
+    stiffness = rng.uniform(2e3, 2e4, n) * (rng.random(n) > 0.15)
+    tendon = FingerTendon(
+        2.0, tuple(stiffness), 11500.0, tuple(rng.uniform(0.0, 6e-3, n)), friction, entry
+    )
+    return tendon, tendon.closed(37.0, rng.uniform(2.0, 9.0, n))
+
+
+@pytest.mark.parametrize("scheme", MOTOR_SCHEMES)
+@pytest.mark.parametrize(("friction", "entry"), [(0.34, 0.34), (0.34, 0.0), (0.1, 0.0), (0.0, 0.0)])
+@given(seed=st.integers(0, 10**6), size=st.sampled_from([1e-5, 3e-4, 3e-3]))
+def test_every_change_of_load_agrees_with_the_complementarity_problem(
+    scheme, friction, entry, seed, size
+):
+    rng = np.random.default_rng(seed)
+    tendon, state = random_tendon(rng, friction, entry)
+    n = len(tendon.pulley_radii)
+    slips, turns = size * rng.normal(size=(4, n)), 30.0 * size * rng.normal(size=(4, n))
+    found = TendonRegimes(tendon, state, scheme).respond(slips, turns)
+    for i in range(4):
+        if scheme == "held":
+            alone = tendon.held(state, slips[i], turns[i])
+        else:
+            alone = tendon.at_tension(state, 37.0, slips[i], turns[i])
+        np.testing.assert_allclose(found.tensions[i], alone.tensions, atol=1e-8)
+        np.testing.assert_allclose(found.shears[i], alone.shears, atol=1e-8)
+
+
+def test_small_changes_stick_and_large_ones_slip():
+    tendon, _ = random_tendon(np.random.default_rng(3), 0.34, 0.0)
+    # closed without loss, so that friction may turn either way
+    state = replace(tendon, friction=0.0).closed(37.0, [5.0] * len(tendon.pulley_radii))
+    regimes = TendonRegimes(tendon, state, "held")
+    n = len(tendon.pulley_radii)
+    sizes = np.array([1e-6, 5e-3])
+    found = regimes.respond(sizes[:, None] * np.ones(n), np.zeros((2, n)))
+    assert found.regime[0] == 0
+    assert found.regime[1] != 0
+    # where nothing slips the tile follows the winding: δT = k (δx − r δq / c_p) (Eq. 20)
+    np.testing.assert_allclose(
+        found.shears[0] - state.shears, np.array(tendon.contact_stiffness) * 1e-6, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("scheme", MOTOR_SCHEMES)
+def test_slopes_are_those_of_the_regime(scheme):
+    rng = np.random.default_rng(5)
+    tendon, state = random_tendon(rng, 0.34, 0.2)
+    regimes = TendonRegimes(tendon, state, scheme)
+    n, small = len(tendon.pulley_radii), 1e-9
+    for size in (1e-4, 2e-3):
+        at, way = size * rng.normal(size=(1, n)), rng.normal(size=(1, n))
+        none = np.zeros((1, n))
+        exact = regimes.respond(at + 1j * STEP * way, none).shears.imag / STEP
+        ends = [regimes.respond(at + side * small * way, none).shears for side in (1.0, -1.0)]
+        np.testing.assert_allclose(exact, (ends[0] - ends[1]) / (2.0 * small), rtol=1e-5, atol=1e-3)
