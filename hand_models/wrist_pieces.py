@@ -133,17 +133,14 @@ def pieces(
 
 
 def _exact(grasp: CompliantGrasp, d: Array, seen: WristSearch) -> tuple[Array, float]:
-    """Return the limiting pose in a direction and its reach: the best of several local maxima."""
+    """Return the limiting pose in a direction and its reach: the best of those seen, and beyond."""
     best = int((seen.wrenches @ d).argmax())
     pose, reach = seen.poses[best], float(d @ seen.wrenches[best])
-    for start in (None, pose):
-        try:
-            there = farthest(grasp, d, start)
-        except EmptySetError:
-            continue
-        if there.reach > reach:
-            pose, reach = there.twist, there.reach
-    return pose, reach
+    try:
+        there = farthest(grasp, d, pose)
+    except EmptySetError:
+        return pose, reach
+    return (there.twist, there.reach) if there.reach > reach else (pose, reach)
 
 
 def _piece(

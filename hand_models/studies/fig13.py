@@ -33,7 +33,9 @@ from hand_models.studies.wrench_hull import (
     section,
     vertices,
 )
-from hand_models.wrist_search import search
+from hand_models.wrist_limit import linear_extreme
+from hand_models.wrist_pieces import pieces
+from hand_models.wrist_search import PLANAR, search
 
 __all__ = ["plot", "run"]
 
@@ -45,6 +47,9 @@ DIRECTIONS: Final = 400
 
 PULL_SHARE: Final = 0.8
 """Of the study's time that these take."""
+
+PIECE_DIRECTIONS: Final = 48
+"""Directions in which a list of linearised sets is made and tried."""
 
 SUPPORTS: Final = 2000
 """Directions in which supports are compared, half of them with F_z < 0."""
@@ -108,6 +113,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         },
         "positive_moment": _positive_moment(full, force_x),
         "linearised": _linearised(gripper, full, size),
+        "linear_pieces": _linear_pieces(gripper, full, size),
         "not_tested": [
             "the 17 measured wrenches (dots) are printed in a picture only, so neither is the "
             "prediction error of 10 % on average",
@@ -172,6 +178,31 @@ def _positive_moment(points: Array, force_x: Array) -> dict[str, list[Any]]:
         found["strength"].append(float(-best[1]))
         found["strength_without"].append(None if np.isnan(without) else without)
     return found
+
+
+def _linear_pieces(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
+    """Return a list of linearised sets, and its union's error in support against the hull.
+
+    Half of the directions are those that the list was made for. Supports are from the wrench at
+    rest.
+    """
+    ways = _sphere(PIECE_DIRECTIONS) / size
+    directions = np.zeros((len(ways), 6))
+    directions[:, PLANAR] = ways * (1.0, 1.0, -1.0)
+    found = pieces(gripper, directions[::2])
+    rest = gripper.evaluate(np.zeros((1, len(PLANAR)))).wrenches[0]
+    reached = [
+        max(linear_extreme(piece.space, d)[1] for piece in found.pieces) for d in directions
+    ]
+    exact = (full @ ways.T).max(axis=0)
+    off = (np.array(reached) - directions @ rest) / (exact - directions @ rest) - 1.0
+    return {
+        "poses": [piece.twist.tolist() for piece in found.pieces],
+        "within": [piece.within.tolist() for piece in found.pieces],
+        "worst_looked_at": float(np.abs(off[::2]).max()),
+        "worst_elsewhere": float(np.abs(off[1::2]).max()),
+        "mean": float(off.mean()),
+    }
 
 
 def _linearised(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:

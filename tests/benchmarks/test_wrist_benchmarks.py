@@ -1,0 +1,77 @@
+"""How long a floating wrist takes: its linearised set, its pose for a wrench, its searches."""
+
+import math
+
+import numpy as np
+import pytest
+from hands import HAND, ROCK
+
+from hand_models import Cylinder, Grasp, wrench_space
+from hand_models.compliant_hand import CompliantHand
+from hand_models.floating_wrist import FloatingWrist
+from hand_models.gripper import Gripper
+from hand_models.wrist_inverse import wrist_pose
+from hand_models.wrist_limit import farthest
+from hand_models.wrist_search import search, search_box
+
+PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+
+
+def settled():
+    return HAND.settle(Cylinder(0.3), ROCK, Grasp(outer_rotation=math.pi, palm=False))
+
+
+@pytest.mark.benchmark(group="a hand's set, settled to o, V, A, b")
+def test_linearised_set(benchmark):
+    wrist = FloatingWrist(CompliantHand(settled()))
+    space = benchmark(wrist.linearised)
+    assert len(space.columns) == 6
+
+
+@pytest.mark.benchmark(group="a hand's set, settled to o, V, A, b")
+def test_fixed_wrist_beside_it(benchmark):
+    assert benchmark(wrench_space, settled()).columns
+
+
+@pytest.mark.benchmark(group="a wrist's pose")
+def test_pose_for_a_wrench(benchmark):
+    hand = CompliantHand(settled())
+    wrench = hand.wrenches(hand.loads(np.array([[1e-4, 5e-5, -2e-4, 1e-3, 1e-3, 1e-3]])))[0]
+    assert benchmark(wrist_pose, hand, wrench).converged
+
+
+@pytest.mark.benchmark(group="a wrist's pose")
+def test_limit_along_a_direction(benchmark):
+    wrist = FloatingWrist(CompliantHand(settled()))
+    assert benchmark(farthest, wrist, PULL).reach > 0.0
+
+
+@pytest.mark.benchmark(group="search of the plane, 2 fingers, 60^3 poses", min_rounds=3)
+def test_search_of_the_plane(benchmark):
+    gripper = Gripper(0.3, 37.0)
+
+    def hull():
+        found = search(gripper, 60)
+        return found, found.hull
+
+    found, hull = benchmark(hull)
+    assert found.tried == 60**3
+    assert hull.volume > 0.0
+
+
+@pytest.mark.benchmark(group="search of the plane, 2 fingers, 60^3 poses", min_rounds=3)
+def test_floor_of_that_search(benchmark):
+    """One of two fingers at every pose, and nothing else."""
+    gripper = Gripper(0.3, 37.0)
+    box = search_box(gripper)
+    x, z, turn = box.poses(box.grid(60, 0, 60**3)).T
+    assert benchmark(gripper.finger.loads, x, z, turn).reached.any()
+
+
+@pytest.mark.benchmark(group="search of 6-D, 4 fingers", min_rounds=1)
+@pytest.mark.parametrize("per_axis", [5, 7])
+def test_search_of_a_whole_hand(benchmark, per_axis):
+    """11^6 poses take (11/7)^6 = 15 times as long as 7^6."""
+    wrist = FloatingWrist(CompliantHand(settled()))
+    found = benchmark.pedantic(search, (wrist, per_axis), rounds=1)
+    assert found.tried == per_axis**6

@@ -1,0 +1,78 @@
+"""The study of failure modes and loading planes: shares, planes and sets as they must be."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hand_models.studies import fig14, run_study
+from hand_models.studies.fig14 import loading_planes
+from hand_models.studies.wrench_hull import reach
+
+BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)])
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    steps = []
+    folder = tmp_path_factory.mktemp("fig14")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fig14, "PER_AXIS", 30)
+        patch.setattr(fig14, "DIRECTIONS", 60)
+        result, files = run_study("fig14", folder, lambda *step: steps.append(step))
+    return result, files, steps
+
+
+def test_it_writes_its_data_and_two_pictures(study):
+    result, files, steps = study
+    assert [f.name for f in files] == ["result.json", "fig14.png", "fig14_planes.png"]
+    assert all(f.read_bytes().startswith(b"\x89PNG") for f in files[1:])
+    written = json.loads(files[0].read_text(encoding="utf-8"))
+    assert written["data"]["surfaces"] == result.data["surfaces"]
+    assert steps == sorted(steps)
+    assert steps[-1] == (1000, 1000)
+
+
+def test_nothing_in_it_was_fitted(study):
+    assert {c.role for c in study[0].claims} == {"test"}
+    cases = [(s["diameter"], s["tension"]) for s in study[0].data["surfaces"]]
+    assert cases == [(0.3, 37.0), (0.7, 37.0), (0.7, 30.0), (0.7, 40.0)]
+
+
+def test_shares_count_the_directions(study):
+    for surface in study[0].data["surfaces"]:
+        assert sum(entry["share"] for entry in surface["shares"]) == pytest.approx(1.0)
+        pulls = surface["pulls"]
+        for entry in surface["shares"]:
+            pairs = list(zip(pulls["phalanx"], pulls["way"], strict=True))
+            counted = pairs.count((entry["phalanx"], entry["way"]))
+            assert counted == round(entry["share"] * len(pairs))
+
+
+def test_a_box_is_loaded_best_in_its_diagonals():
+    """|F_x| to 40, −F_z to 20, M_y to ±1: the greatest force in any plane that meets the side."""
+    found = loading_planes(BOX)
+    assert found["best_for_force"]["force"] == pytest.approx(np.hypot(40.0, 20.0))
+    assert abs(found["best_for_force"]["arm"]) == pytest.approx(1.0 / 40.0)
+    assert found["best_for_moment"]["moment"] == 1.0
+    low, high = found["best_for_force"]["arms_as_good"]
+    assert -0.0255 < low < -0.0245
+    assert 0.0245 < high < 0.0255
+    for arm, force, moment in zip(found["arm"], found["force"], found["moment"], strict=True):
+        x = min(40.0, 1.0 / max(abs(arm), 1e-12))
+        assert force == pytest.approx(np.hypot(x, 20.0))
+        assert moment == pytest.approx(abs(arm) * x)
+
+
+def test_no_plane_holds_more_than_the_best(study):
+    for surface in study[0].data["surfaces"]:
+        planes, points = surface["planes"], np.array(surface["hull_vertices"])
+        for name in ("force", "moment"):
+            best = planes[f"best_for_{name}"]
+            assert max(planes[name]) <= best[name] + 1e-9
+            assert best["arm"] * best["ratio"] == pytest.approx(1.0)
+        # pure pull-off is in every plane, shear in the plane's own direction
+        arms = np.array(planes["arm"])
+        down = reach(points, np.array([[0.0, -1.0, 0.0]]))[0]
+        along = reach(points, np.column_stack([np.ones(len(arms)), 0.0 * arms, arms]))
+        assert (np.array(planes["force"]) >= np.maximum(down, along) - 1e-9).all()

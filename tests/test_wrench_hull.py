@@ -1,0 +1,114 @@
+"""Hulls of planar wrenches: cuts, sections, reaches; worked values and linear programs."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from hand_models.studies.wrench_hull import (
+    UNITS,
+    cut,
+    extents,
+    in_paper_signs,
+    reach,
+    section,
+    vertices,
+    volume,
+)
+
+BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 30.0) for m in (-1.0, 1.0)])
+CLOUDS = st.integers(0, 10_000).map(
+    lambda seed: np.random.default_rng(seed).normal(size=(30, 3)) / UNITS
+)
+
+
+def inside(points, wrench):
+    """Whether a wrench is a convex combination of points, by a linear program."""
+    A = np.vstack([(points * UNITS).T, np.ones(len(points))])
+    b = np.append(np.asarray(wrench) * UNITS, 1.0)
+    found = linprog(np.zeros(len(points)), A_eq=A, b_eq=b, method="highs")
+    return found.status == 0
+
+
+def farthest(points, start, direction):
+    """The largest s with start + s · direction a convex combination, by a linear program."""
+    A = np.zeros((4, len(points) + 1))
+    A[:3, :-1], A[3, :-1] = (points * UNITS).T, 1.0
+    A[:3, -1] = -direction * UNITS
+    found = linprog(
+        np.append(np.zeros(len(points)), -1.0),
+        A_eq=A,
+        b_eq=np.append(start * UNITS, 1.0),
+        method="highs",
+    )
+    return -found.fun if found.status == 0 else np.nan
+
+
+def test_the_papers_moment_is_minus_the_contracts():
+    wrench = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
+    np.testing.assert_array_equal(in_paper_signs(wrench), [[1.0, 3.0, -5.0]])
+
+
+def test_a_box_cut_at_no_pull_keeps_its_lower_part():
+    below = cut(np.vstack([BOX, BOX.mean(axis=0)]))
+    assert {tuple(v) for v in below} == {
+        (x, z, m) for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)
+    }
+    assert extents(below) == (40.0, -20.0, 1.0)
+    assert volume(below) == pytest.approx(80.0 * 20.0 * 2.0)
+    assert cut(BOX, offset=50.0).shape == (8, 3)
+    assert cut(BOX, offset=-21.0).shape == (0, 3)
+
+
+def test_a_box_in_the_plane_of_a_cable():
+    """F_x = 80 M_y cuts F_x at ±40 with M_y at ±0.5: a rectangle."""
+    corners = section(BOX, (1.0, 0.0, -80.0))
+    assert {tuple(np.round(c, 12)) for c in corners} == {
+        (x, z, x / 80.0) for x in (-40.0, 40.0) for z in (-20.0, 30.0)
+    }
+    assert section(np.add(BOX, (0.0, 0.0, 5.0)), (0.0, 0.0, 1.0)).shape == (0, 3)
+
+
+def test_reaches_of_a_box():
+    directions = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [80.0, 0.0, 1.0]])
+    np.testing.assert_allclose(reach(BOX, directions), [40.0, 20.0, 0.5])
+    np.testing.assert_allclose(reach(BOX, directions, (10.0, 0.0, 0.0)), [30.0, 20.0, 0.375])
+    # from beyond the box: toward it, away from it, past it
+    away = reach(BOX, np.array([[-1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]), (50.0, 0.0, 0.0))
+    np.testing.assert_allclose(away, [90.0, np.nan, np.nan])
+
+
+@settings(max_examples=20, deadline=None)
+@given(CLOUDS, st.floats(-0.5, 0.5), st.integers(0, 1000))
+def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3) * UNITS
+    below = cut(points, normal, offset)
+    assert (below @ normal <= offset + 1e-9).all()
+    assert all(inside(points, vertex) for vertex in below)
+    for wrench in rng.dirichlet(np.ones(len(points)), 10) @ points:
+        assert inside(below, wrench) == (wrench @ normal <= offset)
+
+
+@settings(max_examples=20, deadline=None)
+@given(CLOUDS, st.integers(0, 1000))
+def test_reach_is_that_of_a_linear_program(points, seed):
+    rng = np.random.default_rng(seed)
+    starts = 1.5 * rng.normal(size=(10, 3)) / UNITS
+    directions = rng.normal(size=(10, 3)) / UNITS
+    expected = [farthest(points, s, d) for s, d in zip(starts, directions, strict=True)]
+    np.testing.assert_allclose(reach(points, directions, starts), expected, rtol=1e-6, atol=1e-8)
+
+
+@settings(max_examples=20, deadline=None)
+@given(CLOUDS, st.integers(0, 1000))
+def test_a_section_is_bounded_by_reaches_in_its_plane(points, seed):
+    direction = np.random.default_rng(seed).normal(size=3) / UNITS
+    normal = np.cross(direction, (0.0, 1.0, 0.0))
+    corners = section(points, normal)
+    assert np.abs(corners @ normal).max() < 1e-9
+    far = reach(points, direction[None])[0]
+    assert inside(vertices(points), 0.999 * far * direction)
+    # the point on the hull is a combination of the section's corners
+    assert inside(np.vstack([corners, 0.0 * corners]), 0.999 * far * direction)
