@@ -36,6 +36,9 @@ from hand_models.tendon_regimes import MotorScheme
 
 __all__ = ["CompliantHand", "HandLoads"]
 
+NOTHING: Final = 1e-20
+"""Load of the palm that is none: the square of a complex step leaves as much [N]."""
+
 UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -197,7 +200,7 @@ class CompliantHand:
             laterals=laterals,
             tensions=tensions,
             stop_torques=self._pushing(torques, m),
-            palm=np.where(palm.real > 0.0, palm, 0.0 * palm),
+            palm=np.where(palm.real > NOTHING, palm, 0.0 * palm),
             positions=positions,
             axes=axes,
             reached=reached,

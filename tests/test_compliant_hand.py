@@ -134,6 +134,15 @@ def test_lateral_springs_are_the_beam_in_series_with_the_tiles():
     assert soft.lateral_loads(1, sideways)[0].sum() < loads.sum()
 
 
+@pytest.mark.parametrize("name", ["pinch", "oblique", "plane"])
+def test_at_rest_the_palm_does_not_stiffen_the_hand(name):
+    """It begins to carry there, which a complex step must not take for carrying."""
+    hold, grasp = HOLDS[name]
+    bare = Grasp(outer_rotation=grasp.outer_rotation, palm=False)
+    without = CompliantHand(HAND.settle(hold, ROCK, bare))
+    np.testing.assert_allclose(compliant(name).stiffness(), without.stiffness(), atol=1e-6)
+
+
 def test_the_palm_neither_pushes_nor_pulls():
     hand = compliant("pinch")
     assert hand.settled.palm.engaged
