@@ -134,6 +134,16 @@ def test_lateral_springs_are_the_beam_in_series_with_the_tiles():
     assert soft.lateral_loads(1, sideways)[0].sum() < loads.sum()
 
 
+@pytest.mark.parametrize("diameter", [0.2, 0.3, 0.7])
+def test_on_round_rock_a_pinch_is_stiff_in_every_direction_and_conservative(diameter):
+    """Springs and rolling without slip have an energy: K_g is symmetric, and positive."""
+    settled = HAND.settle(Cylinder(diameter), ROCK, HOLDS["pinch"][1])
+    stiffness = CompliantHand(settled).stiffness()
+    # what is left is of the preload's forces turning with the rock: not of springs
+    np.testing.assert_allclose(stiffness, stiffness.T, atol=5e-3 * np.abs(stiffness).max())
+    assert np.linalg.eigvalsh(stiffness + stiffness.T).min() > 0.0
+
+
 @pytest.mark.parametrize("name", ["pinch", "oblique", "plane"])
 def test_at_rest_the_palm_does_not_stiffen_the_hand(name):
     """It begins to carry there, which a complex step must not take for carrying."""

@@ -1,19 +1,23 @@
 """The paper's experiments, run again: figures, data, and every claim of the text held against them.
 
-A study is a module of this package with ``run(progress) -> StudyResult`` and
-``plot(result, folder) -> list[Path]``. What the model misses stays among the claims as missed.
+A study is a module of this package with ``run(progress, hand) -> StudyResult`` and
+``plot(result, folder) -> list[Path]``; ``hand`` is the whole table of the hand, the bundled one or
+one with entries of the caller's. What the model misses stays among the claims as missed.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, cast
 
+import msgspec
+
 from hand_models.errors import InvalidInputError
+from hand_models.parameters import ParameterTable, hand_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +35,11 @@ __all__ = [
 ]
 
 STUDIES: Final[Mapping[str, str]] = {
-    name: f"hand_models.studies.{name}" for name in ("fig06", "fig07", "fig10")
+    name: f"hand_models.studies.{name}"
+    for name in (
+        *("fig06", "fig07", "fig10", "fig12", "fig13", "fig14", "fig15", "fig16"),
+        *("calibrate", "sweep"),
+    )
 }
 """Modules of the studies by the name of their figure; loaded when asked for."""
 
@@ -71,21 +79,26 @@ class StudyResult:
         Its name, such as ``fig06``, and what it is about.
     data : dict
         The figure's data, as JSON can write it, SI units. ``not_tested``, if there, lists in words
-        what the paper says and nothing published can decide.
+        what the paper says and nothing published can decide; ``summary`` what else a person
+        should read.
     claims : tuple of Claim
+    hand : dict
+        By section and name, the entries in which the hand is not the bundled one; filled in by
+        `run_study`.
     """
 
     name: str
     title: str
     data: dict[str, Any]
     claims: tuple[Claim, ...]
+    hand: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 class Study(Protocol):
     """The functions of a study's module."""
 
-    def run(self, progress: Progress) -> StudyResult:
-        """Compute everything."""
+    def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
+        """Compute everything, for a hand."""
 
     def plot(self, result: StudyResult, folder: Path) -> list[Path]:
         """Write the pictures, and return where they are."""
@@ -109,8 +122,20 @@ def as_json(result: StudyResult) -> dict[str, Any]:
     return {"v": 1, **asdict(result)}
 
 
-def run_study(name: str, folder: Path, progress: Progress) -> tuple[StudyResult, list[Path]]:
+def run_study(
+    name: str | Study, folder: Path, progress: Progress, hand: ParameterTable | None = None
+) -> tuple[StudyResult, list[Path]]:
     """Run a study, and write ``result.json`` and its pictures into a folder.
+
+    Parameters
+    ----------
+    name : str or Study
+        One of `STUDIES`, or a study of the caller's own.
+    folder : Path
+        Made if it does not exist.
+    progress : Progress
+    hand : ParameterTable, optional
+        All numbers of the hand; the bundled ones by default.
 
     Returns
     -------
@@ -121,13 +146,15 @@ def run_study(name: str, folder: Path, progress: Progress) -> tuple[StudyResult,
     Raises
     ------
     InvalidInputError
-        If there is no study of that name.
+        If there is no study of that name, or the hand cannot be what the study needs.
     OSError
         If the folder cannot be made or written to.
     """
-    study = load_study(name)
+    study = load_study(name) if isinstance(name, str) else name
     folder.mkdir(parents=True, exist_ok=True)
-    result = study.run(progress)
+    hand = hand or hand_table()
+    changed = hand.difference(hand_table()).sections
+    result = replace(study.run(progress, hand), hand=msgspec.to_builtins(changed))
     file = folder / "result.json"
     text = json.dumps(as_json(result), indent=2, ensure_ascii=False, allow_nan=False)
     file.write_text(text + "\n", encoding="utf-8")

@@ -13,6 +13,7 @@ the data exclude.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +27,7 @@ from hand_models.finger import PHALANGES
 from hand_models.frames import Array
 from hand_models.gripper import Gripper, gripper_table
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
+from hand_models.spines import Surface
 from hand_models.studies import Claim, Progress, StudyResult, save_picture
 from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
 from hand_models.wrist_search import boundary, linear_box
@@ -238,6 +240,8 @@ def _with(table: ParameterTable, number: Number, value: float) -> ParameterTable
     return table.replaced(ParameterTable({number.section: {number.entry: quantity}}))
 
 
+SANDPAPER: Final = "sandpaper-36"
+
 HELD: Final = (
     ("tile_height",),
     ("added_radius",),
@@ -246,12 +250,13 @@ HELD: Final = (
     ("engagement[0]", "engagement[1]", "engagement[2]"),
     ("contact_stiffness[0]", "contact_stiffness[1]", "contact_stiffness[2]"),
     ("pulley_radii[1]", "pulley_radii[2]"),
+    ("shear_limit", "pull_off_slope"),
 )
-"""Numbers that are held at the hand's own in turn."""
+"""Numbers that are held in turn at what plans have for the hand and for sandpaper."""
 
 
 def _own(fit: Fit) -> Array:
-    """Return the numbers as they are on the hand, shape (n,); of the rig alone, as fitted."""
+    """Return the numbers as plans have them, of the hand and of sandpaper, shape (n,)."""
     hand = hand_table()
     joints = hand.vector("fingers", "inner_joint")
     axis, reach = hand.vector("fingers", "outer_axis"), hand.scalar("fingers", "outer_reach")
@@ -268,8 +273,14 @@ def _own(fit: Fit) -> Array:
         ("engagement", "tile"),
     ):
         own |= {f"{entry}[{i}]": v for i, v in enumerate(hand.vector(section, entry))}
-    now = fit.values(fit.start())
-    return np.array([own.get(n.label, now[i]) for i, n in enumerate(fit.numbers)])
+    paper = Surface.named(SANDPAPER)
+    own["shear_limit"] = paper.shear_limit
+    # T + k P = T_max goes through f_min at its angle
+    angle = paper.pull_off_angle
+    own["pull_off_slope"] = (paper.shear_limit / paper.pull_off_limit - math.cos(angle)) / math.sin(
+        angle
+    )
+    return np.array([own[number.label] for number in fit.numbers])
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -385,7 +396,7 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
         middle.plot(own, row, "D", markerfacecolor="white", markeredgecolor="black")
     middle.set_yticks(rows, [number["name"] for number in numbers_found])
     middle.set(
-        xlabel="share of the plausible range [1]; diamonds: the hand's own",
+        xlabel="share of the plausible range [1]; diamonds: in plans",
         title="numbers; blue: narrowed to half or less by the data",
         xlim=(-0.15, 1.15),
     )
@@ -398,7 +409,7 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
     right.axvline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
     right.set(
         xlabel="largest residual [tolerances]",
-        title="numbers held at the hand's own, the rest fitted again",
+        title="numbers held as in plans, the rest fitted again",
     )
     for axes in (left, middle, right):
         axes.grid(axis="x", alpha=0.3)
