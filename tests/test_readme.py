@@ -36,6 +36,26 @@ def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.Captur
     assert len(json.loads(lines[2])) == 4
 
 
+def test_the_example_of_a_floating_hand_prints_stiffness_pose_and_limit(
+    capsys: pytest.CaptureFixture[str],
+):
+    (example,) = (block for block in blocks("python") if "CompliantHand" in block)
+    exec(compile(example, "README.md", "exec"), {})
+    reach, label = capsys.readouterr().out.splitlines()[-1].split()
+    assert float(reach) > 50.0
+    assert label.split("/")[1] in ("proximal", "distal")
+
+
+def test_the_example_of_an_own_hand_changes_the_plan(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    (text,) = blocks("toml")
+    file = tmp_path / "mine.toml"
+    file.write_text(text, encoding="utf-8")
+    assert run(["plan", "wall-300", "--hand", str(file), "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["load_factor"] == pytest.approx(1.27, abs=0.005)
+
+
 def test_every_command_line_uses_a_bundled_name_that_exists():
     lines = [line for block in blocks("") for line in block.splitlines()]
     named = {m[1] for line in lines if (m := re.match(r"crux (?:plan|query) (\S+)", line))}
