@@ -250,7 +250,13 @@ class CompliantHand:
 
     def wrenches(self, loads: HandLoads) -> Numbers:
         """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""
-        return wrench_of(loads, self.settled.palm.centre)
+        forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
+        moments = np.cross(loads.positions, forces).sum(axis=1)
+        shear, pressing = loads.palm[:, 0], loads.palm[:, 1]
+        palm = np.stack([-shear, 0.0 * shear, pressing], axis=-1)
+        return np.concatenate(
+            [forces.sum(axis=1) + palm, moments + np.cross(self.settled.palm.centre, palm)], axis=1
+        )
 
     def stiffness(self, twist: ArrayLike | None = None) -> Array:
         """Return K_g = ∂w_g/∂x_g (Eq. 11) at a twist of the wrist, shape (6, 6).
@@ -260,16 +266,6 @@ class CompliantHand:
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
         loads = self.loads(at + 1j * STEP * np.eye(6))
         return np.asarray(self.wrenches(loads).imag.T / STEP)
-
-
-def wrench_of(loads: HandLoads, palm_centre: Array) -> Numbers:
-    """Return the wrench of all tiles' forces and the palm's, shape (m, 6) [N, N·m]."""
-    forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
-    moments = np.cross(loads.positions, forces).sum(axis=1)
-    palm = np.stack([-loads.palm[:, 0], 0.0 * loads.palm[:, 0], loads.palm[:, 1]], axis=-1)
-    return np.concatenate(
-        [forces.sum(axis=1) + palm, moments + np.cross(palm_centre, palm)], axis=1
-    )
 
 
 def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:

@@ -63,17 +63,13 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
     table = table.replaced(ParameterTable(own))
     if hand is None:
         return table
-    changed: dict[str, dict[str, Quantity]] = {}
-    for section, name, quantity in hand:
-        if bundled.sections.get(section, {}).get(name) != quantity:
-            changed.setdefault(section, {})[name] = quantity
-    if "contact_stiffness" in changed.get("tile", {}):
-        value = table.replaced(ParameterTable(changed)).scalar("tile", "contact_stiffness")
-        spread = changed["tile"]["contact_stiffness"]
-        changed.setdefault("gripper", {})["contact_stiffness"] = Quantity(
-            [value] * len(PHALANGES), spread.unit, spread.source, spread.note
-        )
-    return table.replaced(ParameterTable(changed))
+    changed = hand.difference(bundled)
+    stiffness = changed.sections.get("tile", {}).get("contact_stiffness")
+    if stiffness is not None:
+        spread = [changed.scalar("tile", "contact_stiffness")] * len(PHALANGES)
+        each = Quantity(spread, stiffness.unit, stiffness.source, stiffness.note)
+        table = table.replaced(ParameterTable({"gripper": {"contact_stiffness": each}}))
+    return table.replaced(changed)
 
 
 @dataclass(frozen=True)
@@ -120,6 +116,8 @@ class Gripper:
     ) -> None:
         if not (math.isfinite(diameter) and diameter > 0.0):
             raise InvalidInputError(f"must be above 0 m, got {diameter:g}", field="diameter")
+        if not (math.isfinite(tension) and tension > 0.0):
+            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
         self.table = table = table or gripper_table()
         self.surface = surface or sandpaper(table)
         self.tension = tension

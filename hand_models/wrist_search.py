@@ -18,11 +18,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linprog
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from hand_models.errors import EmptySetError, SolverError
+from hand_models.errors import EmptySetError, InvalidInputError, SolverError
 from hand_models.frames import Array, Indices
 from hand_models.wrench_space import SCALE, Row, WrenchSpace
 from hand_models.wrist_limit import pose_units
@@ -51,6 +51,18 @@ EXTREMES: Final = 1024
 """Directions in which extreme wrenches are kept where a full hull would be too large."""
 
 NEWTON_STEPS: Final = 50
+
+FARTHEST: Final = 20.0
+"""How far motions are looked at that no limit ends, such as those that load nothing, in
+`pose_units`."""
+
+SINGULAR: Final = 1e14
+"""Condition from which on a matrix of second derivatives counts as singular."""
+
+NOTHING_HOLDS: Final = "no pose of the wrist near rest holds: the preload alone breaks a limit"
+
+FEWEST: Final = 2
+"""Poses per axis of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +121,20 @@ class WristSearch:
 
     @cached_property
     def hull(self) -> ConvexHull:
-        """The hull of the wrenches, in newtons (moments over a length, `SCALE`)."""
+        """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
+
+        Raises
+        ------
+        EmptySetError
+            If the wrenches span no volume.
+        """
         components = list(self.components)
-        return ConvexHull(self.wrenches[:, components] * SCALE[components])
+        try:
+            return ConvexHull(self.wrenches[:, components] * SCALE[components])
+        except QhullError:
+            raise EmptySetError(
+                f"the {len(self.wrenches)} wrenches found span no volume: try more poses per axis"
+            ) from None
 
     def support(self, direction: ArrayLike) -> float:
         """Return max { d · w } over the hull, d of shape (6,)."""
@@ -121,16 +144,22 @@ class WristSearch:
 def linear_box(grasp: CompliantGrasp) -> SearchBox:
     """Return the ellipsoid about the set linearised at rest, its range that set's.
 
+    Where neither its centre nor rest holds, it is linearised at the centre again.
+
     Raises
     ------
     EmptySetError
         If no pose near rest holds.
     """
-    space = grasp.linearised()
-    centre, axes = _ellipsoid(space)
-    if not grasp.evaluate(centre[None]).verdict.holds[0]:
-        centre = np.zeros(len(centre))
-    return SearchBox(centre, axes, _range(space, centre, axes))
+    at = np.zeros(len(grasp.linearised().columns))
+    for _ in range(RESIZES):
+        space, centre, axes = _ellipsoid(grasp, at)
+        holds = grasp.evaluate(np.stack([centre, at])).verdict.holds
+        if holds.any():
+            at = centre if holds[0] else at
+            return SearchBox(at, axes, _range(space, at, axes))
+        at = centre
+    raise EmptySetError("no pose of the wrist near rest holds")
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
@@ -177,7 +206,11 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     ------
     EmptySetError
         If no pose of the grid holds.
+    InvalidInputError
+        If there are fewer than two poses along an axis.
     """
+    if per_axis < FEWEST:
+        raise InvalidInputError(f"must be at least {FEWEST}, got {per_axis}", field="per_axis")
     box = search_box(grasp)
     d = len(box.centre)
     components = PLANAR if d == len(PLANAR) else tuple(range(6))
@@ -215,8 +248,8 @@ class _Extremes:
         some: Indices = np.arange(len(t))
         if self._directions is not None:
             some = _outermost(scaled, self._directions)
-        elif len(t) > len(self._components) + 1:
-            some = ConvexHull(scaled).vertices.astype(np.intp)
+        else:
+            some = _corners(scaled)
         self._t.append(t[some])
         self._wrenches.append(scaled[some])
 
@@ -224,8 +257,18 @@ class _Extremes:
         """Return the coordinates of the outermost."""
         t, scaled = np.concatenate(self._t), np.concatenate(self._wrenches)
         if self._directions is None:
-            return t[ConvexHull(scaled).vertices]
+            return t[_corners(scaled)]
         return t[_outermost(scaled, self._directions)]
+
+
+def _corners(points: Array) -> Indices:
+    """Return which points are corners of their hull; all where they span no volume."""
+    if len(points) <= points.shape[1]:
+        return np.arange(len(points))
+    try:
+        return np.asarray(ConvexHull(points).vertices, dtype=np.intp)
+    except QhullError:
+        return np.arange(len(points))
 
 
 def _outermost(points: Array, directions: Array) -> Indices:
@@ -297,23 +340,45 @@ def _sphere(n: int, d: int) -> Array:
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _ellipsoid(space: WrenchSpace) -> tuple[Array, Array]:
-    """Return the analytic centre of { y : A y ≤ b } and the axes of its Dikin ellipsoid.
+def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Array]:
+    """Return the set linearised at a pose, its analytic centre and Dikin ellipsoid's axes.
 
-    The least of −Σ log(b − A y), by damped Newton steps from a point inside.
+    A set that no limit ends in some direction is kept within `FARTHEST`.
 
     Raises
     ------
     EmptySetError
         If there is no point inside.
     """
+    space = grasp.linearised(at)
     units = pose_units(space.columns)
-    A, b = space.A * units, space.b
+    found = _analytic_centre(space.A * units, space.b)
+    if found is None:
+        space = grasp.linearised(at, within=FARTHEST * units)
+        found = _analytic_centre(space.A * units, space.b)
+    if found is None:
+        raise SolverError("search: the middle of the linearised set was not found")
+    y, hessian = found
+    lengths, directions = np.linalg.eigh(hessian)
+    return space, y * units, units[:, None] * directions / np.sqrt(lengths)
+
+
+def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
+    """Return the y with the least −Σ log(b − A y) and its second derivatives; None without a least.
+
+    By damped Newton steps from the centre of the largest ball inside; every row counts alike.
+
+    Raises
+    ------
+    EmptySetError
+        If there is no point inside.
+    """
     size = np.linalg.norm(A, axis=1)
+    if (b[size == 0.0] < 0.0).any():
+        raise EmptySetError(NOTHING_HOLDS)
     keep = size > 0.0
     A, b = A[keep] / size[keep, None], b[keep] / size[keep]
     d = A.shape[1]
-    # the centre of the largest ball inside
     result = linprog(
         np.append(np.zeros(d), -1.0),
         A_ub=np.column_stack([A, np.ones(len(b))]),
@@ -324,20 +389,20 @@ def _ellipsoid(space: WrenchSpace) -> tuple[Array, Array]:
     if result.status != 0 or result.x is None:
         raise SolverError(f"search: {result.message}")
     if not result.x[-1] > 0.0:
-        raise EmptySetError("no pose of the wrist near rest holds: the preload alone is too much")
+        raise EmptySetError(NOTHING_HOLDS)
     y = result.x[:-1]
-    hessian = np.eye(d)
     for _ in range(NEWTON_STEPS):
         gap = b - A @ y
         gradient = A.T @ (1.0 / gap)
         hessian = (A / gap[:, None] ** 2).T @ A
+        if not np.linalg.cond(hessian) < SINGULAR:
+            return None
         step = -np.linalg.solve(hessian, gradient)
-        decrement = float(np.sqrt(-gradient @ step))
+        decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
         y = y + step / (1.0 + decrement)
         if decrement < 1e-9:
-            break
-    lengths, directions = np.linalg.eigh(hessian)
-    return y * units, units[:, None] * directions / np.sqrt(lengths)
+            return y, hessian
+    return None
 
 
 def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:

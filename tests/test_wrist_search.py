@@ -138,10 +138,16 @@ def test_a_callers_entries_go_before_the_experiments():
     assert gripper_table(hand_table()).quantity("finger", "pulley_radii") == calibrated
 
 
-@pytest.mark.parametrize("diameter", [0.0, -0.3, math.nan, 0.01])
-def test_an_impossible_surface_is_refused(diameter):
-    with pytest.raises(InvalidInputError):
-        Gripper(diameter, 37.0)
+@pytest.mark.parametrize(
+    ("diameter", "tension", "field"),
+    [
+        *((value, 37.0, "diameter") for value in (0.0, -0.3, math.nan, math.inf)),
+        *((0.3, value, "tension") for value in (0.0, -37.0, math.nan, math.inf)),
+    ],
+)
+def test_an_impossible_gripper_is_refused(diameter, tension, field):
+    with pytest.raises(InvalidInputError, match=field):
+        Gripper(diameter, tension)
 
 
 # Search -----------------------------------------------------------------------------------------
