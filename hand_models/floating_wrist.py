@@ -2,9 +2,9 @@
 
 A twist ξ of the wrist loads every tile, and what the hand holds is everything that some twist gives
 without a tile letting go. That set is not convex and not a polyhedron. Linearised at a wrist pose
-ξ₀, with the contacts' places as they are there, it is one:
+ξ₀ it is one,
 
-    w = o + V ξ = Σ_tiles W_t(ξ₀) f_t(ξ),    f_t(ξ) = f_t(ξ₀) + ∂f_t/∂ξ (ξ − ξ₀),
+    w = w_g(ξ₀) + K_g(ξ₀) (ξ − ξ₀),    f_t = f_t(ξ₀) + ∂f_t/∂ξ (ξ − ξ₀),
 
 with rows like those of a fixed wrist. The palm carries only where it moves against the rock, so
 each of its ways of carrying is a set of its own. A tendon's stick and slip stay as they are at ξ₀.
@@ -245,10 +245,9 @@ class FloatingWrist:
             sides, most, names = range_rows(WRIST, at, within)
             H, h, rows = np.vstack([H, sides]), np.concatenate([h, most]), rows + names
 
-        units = _units(loads)
-        palm_units = _palm_units(settled.palm.centre)
-        W = np.hstack([units[0].T, units[1].T, units[2].T, np.zeros((6, len(FINGERS))), palm_units])
-        origin, generators = W @ start, W @ slope
+        wrenches = hand.wrenches(loads)
+        generators = np.asarray(wrenches.imag.T / STEP)
+        origin = wrenches[0].real - generators @ at
         D = np.zeros((len(HELD), 6))
         D[:, :3] = HELD
         held = np.full(len(D), settled.hand.structure.hand_load)
@@ -275,16 +274,3 @@ def _elements(loads: HandLoads) -> Numbers:
 
 def _stiffnesses(hand: CompliantHand) -> Array:
     return np.array([hand.palm_shear_stiffness, hand.palm_pressing_stiffness])
-
-
-def _units(loads: HandLoads) -> Array:
-    """Return the wrench of a unit of each tile's shear, normal and lateral load, (3, n, 6)."""
-    axes, positions = loads.axes[0].real, loads.positions[0].real
-    units = np.concatenate([axes, np.cross(positions[:, None, :], axes)], axis=2)
-    return np.asarray(units.transpose(1, 0, 2))
-
-
-def _palm_units(centre: Array) -> Array:
-    """Return the wrenches of a unit of palm shear and of palm pressing, shape (6, 2)."""
-    x, y, z = centre
-    return np.array([[-1.0, 0.0, 0.0, 0.0, -z, y], [0.0, 0.0, 1.0, y, -x, 0.0]]).T

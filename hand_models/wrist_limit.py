@@ -109,6 +109,11 @@ def farthest(
         if excess <= KEPT:
             break
     if excess > KEPT:
+        # the nearest that holds
+        at, found, taken = _climb(grasp, np.zeros(6), at, units, below, WEIGHTS[-1])
+        rounds += taken
+        excess = _excess(found, below)
+    if excess > KEPT:
         raise EmptySetError(
             "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"

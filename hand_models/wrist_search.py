@@ -44,6 +44,9 @@ SPARSE: Final = {3: 13, 6: 5}
 RESIZES: Final = 6
 """How often the range is adapted at most."""
 
+RECENTRINGS: Final = 6
+"""How often the set is linearised anew at most, until its middle holds."""
+
 HALVINGS: Final = 30
 """Of the rays' lengths."""
 
@@ -56,7 +59,10 @@ FARTHEST: Final = 20.0
 """How far motions are looked at that no limit ends, such as those that load nothing, in
 `pose_units`."""
 
-SINGULAR: Final = 1e14
+NEAR: Final = 1e-3
+"""Newton decrement of a middle that is good enough where rounding keeps it from being better."""
+
+SINGULAR: Final = 1e12
 """Condition from which on a matrix of second derivatives counts as singular."""
 
 NOTHING_HOLDS: Final = "no pose of the wrist near rest holds: the preload alone breaks a limit"
@@ -152,14 +158,14 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
         If no pose near rest holds.
     """
     at = np.zeros(len(grasp.linearised().columns))
-    for _ in range(RESIZES):
+    for _ in range(RECENTRINGS):
         space, centre, axes = _ellipsoid(grasp, at)
         holds = grasp.evaluate(np.stack([centre, at])).verdict.holds
         if holds.any():
             at = centre if holds[0] else at
             return SearchBox(at, axes, _range(space, at, axes))
         at = centre
-    raise EmptySetError("no pose of the wrist near rest holds")
+    raise EmptySetError(NOTHING_HOLDS)
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
@@ -173,13 +179,11 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
     box = linear_box(grasp)
     centre = box.centre
     per_axis = SPARSE[len(centre)]
+    # odd grids: the middle is among their poses, and it holds
     for _ in range(RESIZES):
         t = box.grid(per_axis, 0, per_axis ** len(centre))
         t = t[grasp.sieve(box.poses(t))]
         held = t[grasp.evaluate(box.poses(t)).verdict.holds]
-        if not len(held):
-            box = SearchBox(box.centre, box.axes, 0.5 * box.range)
-            continue
         step = 2.0 * box.range / (per_axis - 1)
         outermost = np.abs(held).max(axis=0)
         # a layer more than holds: outward while the outermost holds, inward where none does
@@ -390,7 +394,7 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
         raise SolverError(f"search: {result.message}")
     if not result.x[-1] > 0.0:
         raise EmptySetError(NOTHING_HOLDS)
-    y = result.x[:-1]
+    y, hessian, decrement = result.x[:-1], np.eye(d), np.inf
     for _ in range(NEWTON_STEPS):
         gap = b - A @ y
         gradient = A.T @ (1.0 / gap)
@@ -401,8 +405,8 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
         decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
         y = y + step / (1.0 + decrement)
         if decrement < 1e-9:
-            return y, hessian
-    return None
+            break
+    return (y, hessian) if decrement < NEAR else None
 
 
 def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:

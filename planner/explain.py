@@ -13,7 +13,7 @@ from planner.plan import Certificate, HandPlan, LimitName
 from planner.program import WRENCH_UNIT
 from planner.stance import Stance
 
-__all__ = ["limit_sentence", "shortfall_sentence", "warnings"]
+__all__ = ["NO_FACTOR", "UNPROVEN", "limit_sentence", "shortfall_sentence", "warnings"]
 
 NOTABLE: Final = 0.3
 """Components of what is missing are told from this part of the largest on."""
@@ -46,8 +46,20 @@ BARRIERS: Final = {
     "tendon_sticks": "would stick if it were slackened",
     "palm_shear_reversed": "cannot drag the rock along +x of the hand",
     "palm_pressing_reversed": "cannot pull",
+    "wrist_range": "goes no farther",
 }
 """What a hard row forbids."""
+
+
+UNPROVEN: Final = (
+    "the floating wrists are where their hands' stiffness jumps or the search ended: the loads are "
+    "exact, but that no other pose uses less is not proven"
+)
+"""Of a plan that its search could not prove to be the least."""
+
+
+NO_FACTOR: Final = "no load factor was found; with floating wrists that is no proof of none"
+"""Of a question for it that ends without one."""
 
 
 def _spoken(name: LimitName) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from hand_models.floating_wrist import PalmMode
 from hand_models.frames import Array
 from hand_models.hand import Seating
 from hand_models.spines import HalfPlane
@@ -22,6 +23,7 @@ __all__ = [
     "Status",
     "TileLoad",
     "Times",
+    "WristPlan",
 ]
 
 Status = Literal["optimal", "overloaded", "infeasible", "failed"]
@@ -85,9 +87,9 @@ class TileLoad:
     shear_axis, normal_axis, lateral_axis : ndarray, shape (3,)
     utilisation : float
         Largest load over capacity of its half-planes; never below zero.
-    load_at_zero : ndarray, shape (2,)
-        Shear and normal load at zero tension [N].
-    load_per_newton : ndarray, shape (2,)
+    load_at_zero : ndarray, shape (2,), or None
+        Shear and normal load at zero tension [N]; None where the wrist floats.
+    load_per_newton : ndarray, shape (2,), or None
         The same per newton of tension.
     half_planes : tuple of HalfPlane
     """
@@ -103,8 +105,8 @@ class TileLoad:
     normal_axis: Array
     lateral_axis: Array
     utilisation: float
-    load_at_zero: Array
-    load_per_newton: Array
+    load_at_zero: Array | None
+    load_per_newton: Array | None
     half_planes: tuple[HalfPlane, ...]
 
 
@@ -120,7 +122,8 @@ class FingerPlan:
     motor_torque, motor_current : float
         Of its motor while it tightens the tendon to that [N·m], [A].
     winch_angle : float
-        From the open finger to that tension [rad].
+        From the open finger to that tension, of a floating hand to the preload at which the motor
+        stands still [rad].
     tiles : tuple of TileLoad
         From the base outward.
     """
@@ -145,6 +148,29 @@ class PalmPlan:
 
 
 @dataclass(frozen=True, eq=False)
+class WristPlan:
+    """Where the wrist of a floating hand goes.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (6,)
+        ξ of H about its origin at rest [m, rad].
+    palm : PalmMode
+        How the palm carries: of the hand's sets, one for each, that which the plan is in.
+    rounds : int
+        How often all hands' sets were linearised.
+    error : float
+        How far the set before the last was off where the wrist went: forces, and moments over
+        0.1 m [N]. The plan itself is exact.
+    """
+
+    twist: Array
+    palm: PalmMode
+    rounds: int
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
 class HandPlan:
     """One hand of a plan.
 
@@ -159,7 +185,9 @@ class HandPlan:
     seating : Seating
         Where the hold is in H.
     space : WrenchSpace
-        The set that the program used.
+        The set that the program used; of a floating hand linearised where its wrist goes.
+    wrist : WristPlan or None
+        None for a hand with a fixed wrist.
     """
 
     limb: str
@@ -169,6 +197,7 @@ class HandPlan:
     utilisation: float
     seating: Seating
     space: WrenchSpace
+    wrist: WristPlan | None = None
 
 
 @dataclass(frozen=True, eq=False)

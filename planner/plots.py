@@ -107,7 +107,7 @@ def _draw_view(
             axes.plot(*flat(place.apply(touching)).T, ".", color="black", markersize=4)
         x, y = flat(place.position)
         spot = (round(float(x), 2), round(float(y), 2))
-        name = hand.limb.replace("_", " ")
+        name = hand.limb.replace("_", " ") + (" (floats)" if hand.wrist == "floating" else "")
         labels[spot] = f"{labels[spot]},\n{name}" if spot in labels else name
     for spot, text in labels.items():
         _write(axes, text, spot, (0.0, -26.0), va="top")

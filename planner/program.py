@@ -5,18 +5,20 @@ wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give
 
     Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W.                                              (balance)
 
-Four programs share these rows:
+Five programs share these rows:
 
 =============  =============================================================================
 `Margin`       min u                              least utilisation; its duals are the prices
+`Curved`       min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
 `Effort`       min Σ (tension / maximum)²         the tie-break, at the least utilisation
 `LoadFactor`   max s with s W in place of W       at utilisation 1
 `Nearest`      min ‖S (W − Σ …)‖                  hard rows alone, loads up to `UNLIMITED`
 =============  =============================================================================
 
-Everything is nondimensional: loads over `LOAD_UNIT`, body wrenches over `WRENCH_UNIT`, limit rows
-over their capacities. Data enter as whole-block parameters (disciplined parametrised programming),
-so a program depends on the shape of a stance only, is built once and solved with new data after.
+Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
+body wrenches over `WRENCH_UNIT`, limit rows over their capacities. Data enter as whole-block
+parameters (disciplined parametrised programming), so a program depends on the shape of a stance
+only, is built once and solved with new data after.
 """
 
 from __future__ import annotations
@@ -32,13 +34,16 @@ from typing import Any, Final, NamedTuple, Self
 import cvxpy as cp
 import numpy as np
 
+from hand_models.floating_wrist import WRIST
 from hand_models.frames import Array
 from hand_models.wrench_space import WrenchSpace
 
 __all__ = [
     "LOAD_UNIT",
     "SOLVER",
+    "TWIST_UNIT",
     "WRENCH_UNIT",
+    "Curved",
     "Effort",
     "HandData",
     "LoadFactor",
@@ -54,11 +59,20 @@ SOLVER: Final = "CLARABEL"
 LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
 
+TWIST_UNIT: Final = np.array([1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2])
+"""Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
+
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
 
 UNLIMITED: Final = 1e4
 """Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
+
+SLACK: Final = 1e-6
+"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+
+WRIST_RANGE: Final = "wrist_range"
+"""Name of the hard rows within which a floating hand's set is linearised."""
 
 SECONDARY: Final = 1e-4
 """Weight in the tie-break of loads that are not tensions: enough to make them unique."""
@@ -96,6 +110,8 @@ class HandData(NamedTuple):
         Hard rows H z ≤ h.
     effort : ndarray, shape (m,)
         Weights of z in the tie-break.
+    unit : ndarray, shape (m,)
+        Of z: the loads are ``y = unit z`` [N], of a floating wrist [m, rad].
     """
 
     G: Array
@@ -105,9 +121,10 @@ class HandData(NamedTuple):
     H: Array
     h: Array
     effort: Array
+    unit: Array
 
     @classmethod
-    def of(cls, space: WrenchSpace, transport: Array, reach: Array) -> HandData:
+    def of(cls, space: WrenchSpace, transport: Array, reach: Array | None = None) -> HandData:
         """Scale a hand's set.
 
         Parameters
@@ -115,21 +132,28 @@ class HandData(NamedTuple):
         space : WrenchSpace
         transport : ndarray, shape (6, 6)
             Ad(B←H).
-        reach : ndarray, shape (m,)
-            The maximum of each column's load [N], for the tie-break; tensions come first.
+        reach : ndarray, shape (m,), optional
+            The maximum of each column's load [N], for the tie-break; tensions come first. A
+            floating wrist's twist is measured by its unit.
         """
         carried = -transport / WRENCH_UNIT[:, None]
         weights = np.array(
             [1.0 if name.endswith("/tension") else SECONDARY**0.5 for name in space.columns]
         )
+        floats = space.columns == WRIST
+        unit = TWIST_UNIT if floats else np.full(len(space.columns), LOAD_UNIT)
+        # hard rows are in newtons, but for those of a wrist's range
+        ranges = [row.limit == WRIST_RANGE for row in space.rows[len(space.s) :]]
+        over = np.where(ranges, 1.0, 1.0 / LOAD_UNIT)
         return cls(
-            G=carried @ space.generators * LOAD_UNIT,
+            G=carried @ space.generators * unit,
             g=carried @ space.origin,
-            L=space.L / space.s[:, None] * LOAD_UNIT,
+            L=space.L / space.s[:, None] * unit,
             l0=space.l0 / space.s,
-            H=space.H,
-            h=space.h / LOAD_UNIT,
-            effort=weights * LOAD_UNIT / reach,
+            H=space.H * unit * over[:, None],
+            h=space.h * over,
+            effort=weights * (1.0 if reach is None else unit / reach),
+            unit=unit,
         )
 
     @property
@@ -168,7 +192,7 @@ class Outcome:
     value : float
         Objective, NaN if not solved.
     loads : tuple of ndarray
-        y of each hand [N]; empty if not solved.
+        y of each hand [N], of a floating one [m, rad]; empty if not solved.
     limit_duals, hard_duals : tuple of ndarray
         Multipliers of each hand's rows; empty if not solved.
     balance_dual : ndarray or None
@@ -196,6 +220,7 @@ class _Program(ABC):
         self.l0 = [cp.Parameter(nl) for _, nl, _ in shape]
         self.H = [cp.Parameter((nh, m)) for m, _, nh in shape]
         self.h = [cp.Parameter(nh) for _, _, nh in shape]
+        self._units = [np.ones(m) for m, _, _ in shape]
         self.offset = cp.Parameter(6)
         """W − Σ g, or −Σ g where W is scaled apart."""
         self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
@@ -224,6 +249,7 @@ class _Program(ABC):
             self.G[i].value = hand.G
             self.L[i].value, self.l0[i].value = hand.L, hand.l0
             self.H[i].value, self.h[i].value = hand.H, hand.h
+            self._units[i] = hand.unit
         self.offset.value = data.wrench - sum(hand.g for hand in data.hands)
 
     def _run(self) -> Outcome:
@@ -246,7 +272,9 @@ class _Program(ABC):
                     status=self.problem.status,
                     iterations=iterations,
                     value=float(self.problem.value),
-                    loads=tuple(z.value * LOAD_UNIT for z in self.z),
+                    loads=tuple(
+                        z.value * unit for z, unit in zip(self.z, self._units, strict=True)
+                    ),
                     limit_duals=tuple(np.asarray(row.dual_value) for row in self.limits),
                     hard_duals=tuple(np.asarray(row.dual_value) for row in self.hard),
                     balance_dual=np.asarray(self.balance.dual_value),
@@ -269,6 +297,30 @@ class Margin(_Program):
         """Return the plan of least utilisation; ``value`` is that utilisation."""
         with self._lock:
             self._load(data)
+            return self._run()
+
+
+class Curved(_Program):
+    """min u + ½ ‖R (z − z₀)‖²: least utilisation where sets are curved, or near to loads."""
+
+    def define(self) -> cp.Problem:
+        self.u = cp.Variable()
+        size = sum(z.shape[0] for z in self.z)
+        self.root = cp.Parameter((size, size))
+        self.centre = cp.Parameter(size)
+        self.limits = [row <= self.u for row in self.utilisations()]
+        self.balance = self.reaction == self.offset
+        bent = cp.sum_squares(self.root @ cp.hstack(self.z) - self.centre)
+        rows = [self.balance, *self.limits, *self.hard]
+        return cp.Problem(cp.Minimize(self.u + 0.5 * bent), rows)
+
+    def solve(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
+        """Return the plan for the root R (M, M) of the curvature in all hands' z, about their y."""
+        with self._lock:
+            self._load(data)
+            z = [y / hand.unit for hand, y in zip(data.hands, near, strict=True)]
+            self.root.value = root
+            self.centre.value = root @ np.concatenate(z)
             return self._run()
 
 
@@ -345,6 +397,11 @@ def margin(data: StanceData) -> Outcome:
     return Margin.built(data.shape).solve(data)
 
 
+def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
+    """Solve `Curved`, built once for each shape."""
+    return Curved.built(data.shape).solve(data, root, near)
+
+
 def effort(data: StanceData, cap: float) -> Outcome:
     """Solve `Effort`, built once for each shape."""
     return Effort.built(data.shape).solve(data, cap)
@@ -361,8 +418,8 @@ def nearest(data: StanceData) -> Outcome:
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the scaled body wrench of the hands' loads y [N], shape (6,)."""
-    parts = [hand.G @ (y / LOAD_UNIT) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
+    """Return the scaled body wrench of the hands' loads y, shape (6,)."""
+    parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
     return np.asarray(sum(parts, start=np.zeros(6)))
 
 

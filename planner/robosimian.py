@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from importlib import resources
 
 import numpy as np
@@ -57,13 +57,24 @@ class Robot:
         return float(np.linalg.norm(link - self.shoulders[limb])) / self.reach
 
 
-@cache
-def robosimian() -> Robot:
-    """Return RoboSimian with four SpinyHands, from ``parameters/robosimian.toml``."""
+@lru_cache(maxsize=32)
+def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
+    """Return RoboSimian with four SpinyHands, from ``parameters/robosimian.toml``, built once.
+
+    Parameters
+    ----------
+    hand_numbers : ParameterTable, optional
+        All numbers of its hands; the bundled ones by default.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number of the hand is missing or impossible.
+    """
     name = "robosimian.toml"
     text = resources.files("planner.parameters").joinpath(name).read_text(encoding="utf-8")
     table = ParameterTable.read(text, name)
-    hand = spiny_hand()
+    hand = spiny_hand(hand_numbers)
     limbs = tuple(table.sections["shoulders"])
     return Robot(
         name="robosimian",

@@ -6,20 +6,25 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
-from hand_models.errors import InvalidInputError
+from hand_models.compliant_hand import CompliantHand
+from hand_models.errors import InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import wrench_space
+from hand_models.floating_wrist import FloatingWrist, PalmMode
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
-from planner.explain import limit_sentence, shortfall_sentence, warnings
+from planner.explain import NO_FACTOR, UNPROVEN, limit_sentence, shortfall_sentence, warnings
+from planner.floating import Settled
+from planner.hand_sets import Hands, widest_at_rest
+from planner.palm_choice import least_use, most_load
 from planner.plan import (
     Certificate,
     HandPlan,
@@ -29,16 +34,14 @@ from planner.plan import (
     SolverInfo,
     Status,
     Times,
+    WristPlan,
 )
-from planner.program import LOAD_UNIT, SOLVER, UNLIMITED, WRENCH_UNIT, HandData, Outcome, StanceData
-from planner.reading import read_hand
+from planner.program import LOAD_UNIT, SLACK, SOLVER, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.reading import read_floating_hand, read_hand
 from planner.stance import HandOnHold, Question, Stance
 from planner.verify import problems
 
-__all__ = ["hand_space", "plan"]
-
-SLACK: Final = 1e-6
-"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+__all__ = ["RestingHand", "floating_wrist", "hand_space", "plan", "resting_hand"]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
@@ -75,7 +78,49 @@ def _settle_at(stance: Stance, index: int) -> SettledHand:
         raise error.within(f"stance.hands[{index}]") from None
 
 
+def _wrist_at(
+    stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
+) -> FloatingWrist | None:
+    """Return how the hand of that index gives way; None if its wrist is fixed."""
+    hand = stance.hands[index]
+    if hand.wrist == "fixed":
+        return None
+    try:
+        return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
+    except InvalidInputError as error:
+        if isinstance(error, UnsupportedError):
+            error.field = "wrist"
+        raise error.within(f"stance.hands[{index}]") from None
+
+
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
+    """Return one hand of a stance on its hold, and what it can carry; see `resting_hand`."""
+    hand = resting_hand(stance, limb)
+    return hand.settled, hand.space
+
+
+class RestingHand(NamedTuple):
+    """One hand of a stance on its hold, and what it can carry.
+
+    Attributes
+    ----------
+    settled : SettledHand
+    space : WrenchSpace
+        Of a floating hand the widest of its sets linearised at rest, one for each palm mode.
+    palm : PalmMode or None
+        The mode of that set; None for a fixed wrist.
+    error : float
+        How far it is off at most where it reaches farthest along ± each axis: forces, and moments
+        over 0.1 m [N].
+    """
+
+    settled: SettledHand
+    space: WrenchSpace
+    palm: PalmMode | None = None
+    error: float = 0.0
+
+
+def resting_hand(stance: Stance, limb: str) -> RestingHand:
     """Return one hand of a stance on its hold, and what it can carry.
 
     Raises
@@ -83,10 +128,32 @@ def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     InvalidInputError
         If the stance has no such hand, or the hold cannot be where it is.
     """
+    settled, wrist = _hand_at(stance, limb)
+    if wrist is None:
+        return RestingHand(settled, wrench_space(settled))
+    palm, space, error = widest_at_rest(wrist)
+    return RestingHand(settled, space, palm, error)
+
+
+def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
+    """Return how one hand of a stance gives way.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance has no such hand, its wrist is fixed, or the hold cannot be where it is.
+    """
+    _, wrist = _hand_at(stance, limb)
+    if wrist is None:
+        raise InvalidInputError(f"the wrist of {limb} is fixed; floating is needed", field="limb")
+    return wrist
+
+
+def _hand_at(stance: Stance, limb: str) -> tuple[SettledHand, FloatingWrist | None]:
     for i, hand in enumerate(stance.hands):
         if hand.limb == limb:
             settled = _settle_at(stance, i)
-            return settled, wrench_space(settled)
+            return settled, _wrist_at(stance, i, settled)
     limbs = ", ".join(hand.limb for hand in stance.hands)
     raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")
 
@@ -114,17 +181,25 @@ def plan(question: Question) -> Plan:
     except InvalidInputError as error:
         raise error.within("load") from None
     settled = [_settle_at(stance, i) for i in range(len(stance.hands))]
-    spaces = [wrench_space(hand, question.limits.tendon_tension) for hand in settled]
+    cap = question.limits.tendon_tension
+    wrists = [_wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)]
+    spaces = [
+        wrench_space(hand, cap) if wrist is None else wrist.linearised()
+        for hand, wrist in zip(settled, wrists, strict=True)
+    ]
     body = stance.body.inverse()
-    data = StanceData(
-        tuple(
-            HandData.of(space, wrench_transport(body @ hand.pose), _reach(space))
-            for space, hand in zip(spaces, stance.hands, strict=True)
+    hands = Hands(
+        spaces=tuple(spaces),
+        wrists=tuple(wrists),
+        transports=tuple(wrench_transport(body @ hand.pose) for hand in stance.hands),
+        reaches=tuple(
+            _reach(space) if wrist is None else None
+            for space, wrist in zip(spaces, wrists, strict=True)
         ),
-        wrench / WRENCH_UNIT,
+        wrench=wrench / WRENCH_UNIT,
     )
     modelled = time.perf_counter()
-    answer = _Answer(question, settled, spaces, data, wrench)
+    answer = _Answer(question, settled, hands, wrench)
     answer.solve()
     solved = time.perf_counter()
     return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
@@ -149,15 +224,15 @@ class _Answer:
         self,
         question: Question,
         settled: Sequence[SettledHand],
-        spaces: Sequence[WrenchSpace],
-        data: StanceData,
+        hands: Hands,
         wrench: Array,
     ) -> None:
         self.question = question
         self.settled = settled
-        self.spaces = spaces
-        self.data = data
+        self.parts = hands
+        self.spaces, self.data = hands.sets(hands.at_rest(hands.idle))
         self.wrench = wrench
+        self.search: Settled | None = None
         self.outcome: Outcome
         self.loads: tuple[Array, ...] = ()
         self.hands: tuple[HandPlan, ...] = ()
@@ -171,12 +246,25 @@ class _Answer:
 
     def solve(self) -> None:
         """Find the loads, or the certificate that there are none."""
-        self.outcome = program.margin(self.data)
-        self._settle_tie()
+        if self.parts.floating:
+            self._settle_wrists()
+        else:
+            self.outcome = program.margin(self.data)
+            self._settle_tie()
         if not self.outcome.solved or self.wrong:
             self._look_again()
         if "load_factor" in self.question.want:
             self._find_load_factor()
+
+    def _settle_wrists(self) -> None:
+        """Find where floating wrists go, and take the plan there."""
+        self.search = least_use(self.parts)
+        self.outcome = self.search.outcome
+        if self.search.exact:
+            self.spaces, self.data = self.search.sets
+            self._take(self.search.point.loads)
+        else:
+            self.spaces, self.data = self.parts.sets(self.search.point)
 
     def _settle_tie(self) -> None:
         """Take the plan of least effort among those of least utilisation."""
@@ -192,16 +280,19 @@ class _Answer:
     def _take(self, loads: tuple[Array, ...]) -> None:
         """Read these loads, and check them."""
         self.loads = loads
-        self.hands = tuple(
-            read_hand(place.limb, settled, space, y)
-            for place, settled, space, y in zip(
-                self.question.stance.hands, self.settled, self.spaces, loads, strict=True
-            )
-        )
+        self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
         self.utilisation = max(hand.utilisation for hand in self.hands)
         self.wrong = problems(
             self.question, self.settled, self.hands, self.utilisation, self.wrench
         )
+
+    def _read_hand(self, index: int, y: Array) -> HandPlan:
+        limb, settled = self.question.stance.hands[index].limb, self.settled[index]
+        space, wrist, search = self.spaces[index], self.parts.wrists[index], self.search
+        if wrist is None or search is None:
+            return read_hand(limb, settled, space, y)
+        pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
+        return read_floating_hand(limb, settled, wrist.hand, space, pose)
 
     def _look_again(self) -> None:
         """Tell no balance at all from a solver that failed."""
@@ -212,7 +303,7 @@ class _Answer:
             self.certificate = self._certify(nearest)
             if self.certificate is not None:
                 self.outcome = replace(self.outcome, solved=False)
-        elif not self.outcome.solved:
+        elif not self.outcome.solved and not self.parts.floating:
             # rounding put the wrench a hair outside: plan for the nearest that can be had
             inside = program.body_wrench(self.data, nearest.loads)
             self.outcome = program.margin(StanceData(self.data.hands, inside))
@@ -272,12 +363,15 @@ class _Answer:
             # nothing is asked of the hands: any multiple of it can be held, or none
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
             return
+        if self.search is not None:
+            self.load_factor = most_load(self.parts, self.search)
+            return
         result = program.load_factor(self.data)
         if result.solved:
             scaled = StanceData(self.data.hands, self.data.wrench * result.value)
             error = program.body_wrench(scaled, result.loads) - scaled.wrench
             used = max(
-                float(np.max(hand.L @ (y / LOAD_UNIT) + hand.l0, initial=0.0))
+                float(np.max(hand.L @ (y / hand.unit) + hand.l0, initial=0.0))
                 for hand, y in zip(self.data.hands, result.loads, strict=True)
             )
             if np.abs(error).max() <= SLACK and used <= 1.0 + SLACK:
@@ -313,6 +407,10 @@ class _Answer:
             verified = True
             touching = any(h.holding.any() or h.palm.engaged for h in self.settled)
             reason = shortfall_sentence(self.certificate, touching)
+            if self.parts.floating:
+                reason += "; floating hands as they give way where the search for a plan ended"
+        elif self.search is not None:
+            reason = f"the floating wrists came to no balance in {self.search.rounds} rounds"
         else:
             reason = f"the solver gave no usable answer ({self.outcome.status})"
         return Plan(
@@ -328,13 +426,27 @@ class _Answer:
             residual=residual,
             verified=verified,
             reason=reason,
-            warnings=warnings(self.question.stance, self.settled),
+            warnings=self._warnings(),
             solver=SolverInfo(SOLVER, self.outcome.status, self.outcome.iterations),
             time=Times(times.model, times.solve, time.perf_counter() - start),
         )
 
+    def _warnings(self) -> tuple[str, ...]:
+        found = warnings(self.question.stance, self.settled)
+        if self.search is not None and self.search.found == "unproven":
+            found += (UNPROVEN,)
+        asked = "load_factor" in self.question.want and not self.unbounded
+        if self.search is not None and asked and self.load_factor is None:
+            found += (NO_FACTOR,)
+        return found
+
     def _not_least(self, utilisation: float) -> list[str]:
-        """Return what is wrong if the multipliers do not prove the utilisation the least."""
+        """Return what is wrong if the multipliers do not prove the utilisation the least.
+
+        With floating hands, the least of their sets about the plan.
+        """
+        if self.search is not None and self.search.found == "unproven":
+            return []
         bound = program.least_bound(self.data, self.outcome)
         if utilisation - bound <= OPTIMAL * max(1.0, utilisation):
             return []

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Pose, finite_vector
-from hand_models.hand import Grasp
+from hand_models.hand import FINGERS, Grasp
 from hand_models.holds import Hold
 from hand_models.spines import Surface
 from planner.robosimian import Robot, robosimian
 
-__all__ = ["EARTH", "HandOnHold", "Limits", "Load", "Question", "Stance"]
+__all__ = ["EARTH", "HandOnHold", "Limits", "Load", "Question", "Stance", "Wrist"]
+
+Wrist = Literal["fixed", "floating"]
+
+WRISTS: Final = get_args(Wrist)
+"""How a wrist may be."""
 
 EARTH: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
@@ -73,6 +78,12 @@ class HandOnHold:
     hold_in_hand : Pose, optional
         The hold's frame in H. With neither, the hand is seated on the hold.
     grasp : Grasp
+    wrist : {'fixed', 'floating'}
+        Whether its motors give each tendon the tension that the plan asks for while the wrist keeps
+        its pose, or stand still while the wrist gives way.
+    tendon_preload : ndarray, shape (4,), optional
+        Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
+        default.
     """
 
     limb: str
@@ -82,8 +93,22 @@ class HandOnHold:
     hold_pose: Pose | None = None
     hold_in_hand: Pose | None = None
     grasp: Grasp = field(default_factory=Grasp)
+    wrist: Wrist = "fixed"
+    tendon_preload: Array | None = None
 
     def __post_init__(self) -> None:
+        if self.wrist not in WRISTS:
+            raise InvalidInputError(
+                f"unknown wrist {self.wrist!r}; known are {', '.join(WRISTS)}", field="wrist"
+            )
+        if self.tendon_preload is not None:
+            if self.wrist == "fixed":
+                raise InvalidInputError(
+                    "only a floating wrist holds a preload; valid is none, or wrist floating",
+                    field="tendon_preload",
+                )
+            preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
+            object.__setattr__(self, "tendon_preload", preload)
         if self.hold_pose is not None and self.hold_in_hand is not None:
             raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
         _possible(self.pose, "pose")

@@ -4,7 +4,7 @@ Nothing here is shared with the way the plan was found. Tile loads are recompute
 by solving the full equilibrium of Eq. 6 (joint rows and tile rows, forces in the finger's frame),
 not by the affine maps of Eq. 14, motors and winches from those; wrenches are summed force by force;
 limits are Eq. 21 itself, the plan's half-planes and the structure's published figures; balance is
-added up in the body frame.
+added up in the body frame. What is different where a wrist floats is in `verify_floating`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.structure import HELD
 from planner.plan import FingerPlan, HandPlan, TileLoad
-from planner.stance import Question
+from planner.stance import HandOnHold, Question
+from planner.verify_floating import check_finger, check_palm
 
 __all__ = ["BALANCE", "LOAD", "UTILISATION", "equilibrium", "problems"]
 
@@ -135,7 +136,7 @@ def problems(
     worst = 0.0
     into_body = question.stance.body.rotation.T
     for place, hand, plan in zip(question.stance.hands, settled, hands, strict=True):
-        worst = max(worst, _check_hand(found, question, hand, plan))
+        worst = max(worst, _check_hand(found, question, place, hand, plan))
         # carried to B by hand: the rock's reaction at the hand's place
         force = into_body @ place.pose.rotation @ -plan.wrench[:3]
         moment = into_body @ place.pose.rotation @ -plan.wrench[3:]
@@ -149,7 +150,9 @@ def problems(
     return found
 
 
-def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: HandPlan) -> float:
+def _check_hand(
+    found: list[str], question: Question, place: HandOnHold, hand: SettledHand, plan: HandPlan
+) -> float:
     """Check one hand; return its utilisation as recomputed."""
     limb = plan.limb
     loads = [abs(v) for f in plan.fingers for t in f.tiles for v in (t.shear, t.normal, t.lateral)]
@@ -159,31 +162,43 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
         maximum = min(maximum, question.limits.tendon_tension)
     worst = 0.0
     wrench = np.zeros(6)
-    for finger, planned in zip(hand.fingers, plan.fingers, strict=True):
-        outer = planned.name.startswith("outer")
+    if (place.wrist == "floating") != (plan.wrist is not None):
+        found.append(f"{limb}: the wrist is not {place.wrist}")
+    for i, (finger, planned) in enumerate(zip(hand.fingers, plan.fingers, strict=True)):
         tension = planned.tendon_tension
         if not (math.isfinite(tension) and tension >= -allowed):
             found.append(f"{limb}: tension of {planned.name} is {tension:g} N")
             continue
         worst = max(worst, tension / maximum)
-        shear, normal, stop = equilibrium(finger, tension, hand.closing_tension, outer)
+        wound = tension
+        if plan.wrist is not None:
+            wound = (
+                hand.closing_tension if place.tendon_preload is None else place.tendon_preload[i]
+            )
+        shear, normal, stop = _at_tension(hand, finger, planned, float(wound))
+        at_rest = shear
+        if plan.wrist is not None:
+            check = check_finger(hand, planned, plan.wrist, wound, at_rest)
+            shear, normal, stop = check.shear, check.normal, check.stop
+            found.extend(f"{limb}: {planned.name}: {sentence}" for sentence in check.wrong)
+            off = np.abs(check.lateral - [tile.lateral for tile in planned.tiles]).max()
+            if not max(float(off), abs(check.tension - tension)) <= allowed:
+                found.append(f"{limb}: {planned.name} does not hold what the plan says")
         if finger.bearing and stop.min() < -STOP:
             found.append(f"{limb}: a joint of {planned.name} would leave its stop")
-        if outer:
-            model = hand.hand.finger
-            base = planned.tiles[0]
-            drag = model.base_engagement * hand.closing_tension
-            drag += model.shear_gain * (tension - hand.closing_tension)
-            shear = np.append(drag if base.contact != "none" else 0.0, shear)
-            normal = np.append(0.0, normal)
         hooked = planned.tiles[-1].contact == NAIL
-        if hand.hand.finger.friction > 0.0 and (any(finger.touching) or hooked):
+        if (
+            plan.wrist is None
+            and hand.hand.finger.friction > 0.0
+            and (any(finger.touching) or hooked)
+        ):
             slack = hand.closing_tension - tension
             if slack > allowed:
                 found.append(
                     f"{limb}: tendon of {planned.name} would stick, slackened {slack:.3g} N"
                 )
-        worst = max(worst, _check_drive(found, hand, planned, finger, shear, limb))
+        drawn = (wound, at_rest)
+        worst = max(worst, _check_drive(found, hand, planned, finger, drawn, limb))
         worst = max(worst, float(shear.sum()) / hand.hand.structure.finger_shear)
         worst = max(worst, float(normal[-1]) / hand.hand.structure.fingertip_force)
         tiles = [tile for tile in planned.tiles if tile.phalanx != NAIL]
@@ -207,6 +222,8 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
             _compare(found, name, used, tile.utilisation)
             if touches and used <= 1.0 and not _inside_curve(hand, tile, t, n, allowed):
                 found.append(f"{name} is beyond its limit curve")
+    if plan.wrist is not None:
+        found.extend(check_palm(hand, plan, plan.wrist, allowed))
     pressed = _check_palm(found, hand, plan, allowed)
     _compare(found, f"{limb}: palm", pressed, plan.palm.utilisation)
     worst = max(worst, pressed)
@@ -217,6 +234,21 @@ def _check_hand(found: list[str], question: Question, hand: SettledHand, plan: H
     worst = max(worst, _check_held(found, hand, plan, allowed))
     _compare(found, limb, worst, plan.utilisation)
     return worst
+
+
+def _at_tension(
+    hand: SettledHand, finger: SettledFinger, planned: FingerPlan, tension: float
+) -> tuple[Array, Array, Array]:
+    """Return shears and normals of all tiles of a finger, and stops, with its wrist at rest."""
+    outer = planned.name.startswith("outer")
+    shear, normal, stop = equilibrium(finger, tension, hand.closing_tension, outer)
+    if outer:
+        model = hand.hand.finger
+        drag = model.base_engagement * hand.closing_tension
+        drag += model.shear_gain * (tension - hand.closing_tension)
+        shear = np.append(drag if planned.tiles[0].contact != "none" else 0.0, shear)
+        normal = np.append(0.0, normal)
+    return shear, normal, stop
 
 
 def _check_force(found: list[str], name: str, tile: TileLoad, allowed: float) -> None:
@@ -237,10 +269,12 @@ def _check_drive(
     hand: SettledHand,
     planned: FingerPlan,
     finger: SettledFinger,
-    shear: Array,
+    wound: tuple[float, Array],
     limb: str,
 ) -> float:
     """Check one finger's motor and winch; return the utilisation of the motor.
+
+    ``wound``: the tension to which its winch has drawn the tendon, and the tiles' shears then.
 
     A tile has slid so far that its spring and the rock's shear balance the tendon's two strands
     (Eq. 5), and the tendon drawn in is that of all joints and tiles, on the winch.
@@ -252,7 +286,7 @@ def _check_drive(
     drawn = hand.hand.nail.pulley_radius * _nail_angle(hand, planned)
     for radius, angle in zip(finger.model.pulley_radii, finger.joint_angles, strict=True):
         drawn += radius * angle
-    local = tension
+    local, shear = wound
     for drag in shear:
         drawn += drive.pulley_ratio * (drive.pulley_ratio * local - drag) / drive.tile_stiffness
         local *= 1.0 - finger.model.friction

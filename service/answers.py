@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from hand_models.closing import closing_sequence
 from hand_models.errors import EmptySetError
@@ -17,7 +17,7 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS, Seating, SettledHand, Tile
 from hand_models.spines import HalfPlane
 from hand_models.wrench_space import WrenchSpace
-from planner.plan import Certificate, HandPlan, LimitName, Plan, Price, TileLoad
+from planner.plan import Certificate, HandPlan, LimitName, Plan, Price, TileLoad, WristPlan
 from service import replies
 from service.replies import AXES
 
@@ -63,6 +63,7 @@ def wrench_space_reply(
     settled: SettledHand,
     space: WrenchSpace,
     limits: Iterable[TensionLimit],
+    wrist: WristPlan | None = None,
 ) -> replies.WrenchSpaceReply:
     """Return one hand's wrench space as a reply, with its views at utilisation 1.
 
@@ -86,6 +87,7 @@ def wrench_space_reply(
     return replies.WrenchSpaceReply(
         robot=robot,
         limb=limb,
+        wrist=_wrist(wrist),
         seating=_seating(settled.seating),
         contacts=[
             replies.Contact(
@@ -208,6 +210,7 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
         ),
         utilisation=float(part.utilisation),
         seating=_seating(part.seating),
+        wrist=_wrist(part.wrist),
         wrench_space=_wrench_set(part.space) if model else UNSET,
     )
 
@@ -225,11 +228,27 @@ def _tile(tile: TileLoad, model: bool) -> replies.Tile:
         normal_axis=_vector(tile.normal_axis),
         lateral_axis=_vector(tile.lateral_axis),
         utilisation=float(tile.utilisation),
-        load_at_zero=_vector(tile.load_at_zero) if model else UNSET,
-        load_per_newton=_vector(tile.load_per_newton) if model else UNSET,
+        load_at_zero=_law(tile.load_at_zero, model),
+        load_per_newton=_law(tile.load_per_newton, model),
         half_planes=[row for plane in tile.half_planes for row in _both_signs(plane)]
         if model
         else UNSET,
+    )
+
+
+def _law(loads: Array | None, model: bool) -> list[float] | UnsetType:
+    return _vector(loads) if model and loads is not None else UNSET
+
+
+def _wrist(wrist: WristPlan | None) -> replies.Wrist:
+    if wrist is None:
+        return replies.Wrist(mode="fixed")
+    return replies.Wrist(
+        mode="floating",
+        twist=_vector(wrist.twist),
+        palm=wrist.palm,
+        rounds=wrist.rounds,
+        error=float(wrist.error),
     )
 
 

@@ -6,6 +6,7 @@ Every number is finite, and nothing is asked that this version cannot do.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import msgspec
@@ -33,10 +34,6 @@ LATER: Final[dict[type, dict[str, _Later]]] = {
     },
     requests.Stance: {
         "joints": _Later(None, f"{_OMIT}: joint torques are not planned"),
-    },
-    requests.Hand: {
-        "wrist": _Later("fixed", "valid is fixed"),
-        "tendon_preload": _Later(None, f"{_OMIT}: it is for a floating wrist"),
     },
     requests.Limits: {
         "joint_torque": _Later(None, f"{_OMIT}; valid limits are utilisation and tendon_tension"),
@@ -73,6 +70,9 @@ def check(value: object, path: str = "") -> None:
                 )
             if name not in BULK.get(type(value), ()):
                 check(part, field)
+    elif isinstance(value, Mapping):
+        for name, part in value.items():
+            check(part, f"{path}.{name}")
     elif isinstance(value, (list, tuple)):
         for i, part in enumerate(value):
             check(part, f"{path}[{i}]")

@@ -99,7 +99,10 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
     except msgspec.ValidationError as error:
         field, message = blame(error, kind)
         raise InvalidInputError(message, field=field) from None
-    check(request)
+    try:
+        check(request)
+    except RecursionError:
+        raise MalformedError("nested too deeply") from None
     return request
 
 

@@ -19,7 +19,10 @@ import click
 import msgspec
 import zenoh
 
+from hand_models import studies
 from hand_models.errors import CruxError, InvalidInputError
+from hand_models.parameters import ParameterTable
+from hand_models.parameters.own import own_hand
 from service.client import TIMEOUT, CruxClient
 from service.config import (
     listening,
@@ -29,10 +32,12 @@ from service.config import (
     zenoh_options,
 )
 from service.errors import REQUEST_KINDS
+from service.own_hand import read_hand, with_hand
 from service.replies import PlanReply
 from service.requests import PlanRequest, Want, WrenchSpaceRequest
 from service.schema import schema as message_schema
 from service.stances import read_request, read_route
+from service.studies import chosen_study, print_study, sweep_options
 from service.tables import console, print_plan, print_wrench_space
 
 __all__ = ["crux", "main", "run"]
@@ -46,6 +51,7 @@ EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": O
 """By a plan's status; any other is `FAILED`."""
 
 PICTURES: Final = (".png", ".pdf", ".svg")
+HAND_FILE: Final = ".toml"
 DEMO_STANCE: Final = "wall-300"
 EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
@@ -95,7 +101,18 @@ def _check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> 
     return path
 
 
+def _read_hand(_: click.Context, __: click.Parameter, path: Path | None) -> ParameterTable | None:
+    return None if path is None else read_hand(path)
+
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+hand_option = click.option(
+    "--hand",
+    type=click.Path(path_type=Path),
+    callback=_read_hand,
+    metavar="FILE",
+    help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
+)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
@@ -103,8 +120,9 @@ def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
     STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-700. ROUTE is the same
-    of a climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left or front_left.
+    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating, wall-700.
+    ROUTE is the same of a climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left
+    or front_left. --hand FILE puts numbers of your own in place of the bundled hand's.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.
@@ -116,12 +134,13 @@ def crux() -> None:
 @click.option(
     "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
 )
+@hand_option
 @json_option
-def plan(stance: str, picture: Path | None, as_json: bool) -> int:
+def plan(stance: str, picture: Path | None, hand: ParameterTable | None, as_json: bool) -> int:
     """Make one plan, without the network."""
     from service import dispatch
 
-    request = _with_extras(read_request(stance))
+    request = _with_extras(with_hand(read_request(stance), hand))
     reply = dispatch.plan(request)
     if picture is not None:
         _draw_plan(request, picture)
@@ -162,9 +181,31 @@ def _without_palms(request: PlanRequest) -> PlanRequest:
     return replace(request, stance=replace(request.stance, hands=hands), want=["load_factor"])
 
 
+def _limb_and_hand(
+    _: click.Context, __: click.Parameter, given: tuple[str, ...]
+) -> tuple[str, ParameterTable | None]:
+    """Tell the limb, which the contract calls a hand, from the file of one."""
+    files = [value for value in given if value.endswith(HAND_FILE)]
+    limbs = [value for value in given if not value.endswith(HAND_FILE)]
+    if len(limbs) != 1 or len(files) > 1:
+        raise click.BadParameter(
+            f"one LIMB and at most one FILE that ends in {HAND_FILE}, got {', '.join(given)}"
+        )
+    return limbs[0], read_hand(Path(files[0])) if files else None
+
+
 @crux.command("wrench-space")
 @click.argument("stance")
-@click.option("--hand", "limb", required=True, metavar="LIMB", help="Whose wrench space.")
+@click.option(
+    "--hand",
+    "limb_and_hand",
+    required=True,
+    multiple=True,
+    callback=_limb_and_hand,
+    metavar="LIMB",
+    help="Whose wrench space. A second --hand FILE, ending in .toml, has numbers of a hand of your "
+    "own; all others are the bundled hand's.",
+)
 @click.option(
     "--plot",
     "picture",
@@ -173,14 +214,37 @@ def _without_palms(request: PlanRequest) -> PlanRequest:
     metavar="FILE",
     help="Draw it there.",
 )
+@click.option(
+    "--search",
+    "per_axis",
+    type=click.IntRange(3, 25),
+    metavar="N",
+    help="Of a floating hand: search N^6 poses of its wrist, too.",
+)
 @json_option
-def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) -> int:
+def wrench_space(
+    stance: str,
+    limb_and_hand: tuple[str, ParameterTable | None],
+    picture: Path | None,
+    per_axis: int | None,
+    as_json: bool,
+) -> int:
     """Show what one hand can carry."""
     from planner import solve
+    from planner.wrist_survey import survey
     from service import dispatch, questions
+    from service.surveys import print_survey, survey_json
 
-    request = WrenchSpaceRequest(v=1, stance=read_request(stance).stance, limb=limb)
+    limb, hand = limb_and_hand
+    request = WrenchSpaceRequest(
+        v=1, stance=with_hand(read_request(stance), hand).stance, limb=limb
+    )
     reply = dispatch.wrench_space(request)
+    found = None
+    if per_axis is not None:
+        wrist = solve.floating_wrist(questions.stance(request.stance), limb)
+        with _progress(f"{per_axis}^6 poses of {limb}") as tell:
+            found = survey(wrist, per_axis, tell)
     if picture is not None:
         from planner import hand_plots
 
@@ -189,17 +253,24 @@ def wrench_space(stance: str, limb: str, picture: Path | None, as_json: bool) ->
         with _writing(picture):
             hand_plots.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}")
     if as_json:
-        _say(reply)
+        searched = {} if found is None else {"search": survey_json(found)}
+        _say(msgspec.to_builtins(reply) | searched)
     else:
         print_wrench_space(reply, console())
+        if found is not None:
+            print_survey(found, console())
     return DONE if reply.vertices else OVERLOADED
 
 
 @crux.command()
 @zenoh_options
+@hand_option
 @json_option
-def serve(config: zenoh.Config, as_json: bool) -> None:
-    """Answer questions on zenoh until SIGTERM or Ctrl-C."""
+def serve(config: zenoh.Config, hand: ParameterTable | None, as_json: bool) -> None:
+    """Answer questions on zenoh until SIGTERM or Ctrl-C.
+
+    The hand of --hand is that of every question; a question's own numbers go on top.
+    """
     stop = _StopSignal()
     from service.server import PlanService, prepare_zenoh
 
@@ -207,7 +278,7 @@ def serve(config: zenoh.Config, as_json: bool) -> None:
     prepare_zenoh()
     start_zenoh_log()
     endpoints = listening(config)
-    with open_session(config) as session, PlanService(session) as service:
+    with open_session(config) as session, PlanService(session, hand=hand) as service:
         if as_json:
             _say({"v": 1, "keys": service.keys, "listen": endpoints})
         where = ", ".join(endpoints) or "no address"
@@ -248,10 +319,13 @@ def _timeout_option(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("stance")
 @zenoh_options
 @_timeout_option
+@hand_option
 @json_option
-def query(stance: str, config: zenoh.Config, timeout: float, as_json: bool) -> int:
+def query(
+    stance: str, config: zenoh.Config, timeout: float, hand: ParameterTable | None, as_json: bool
+) -> int:
     """Ask a running service for a plan."""
-    request = _with_extras(read_request(stance))
+    request = _with_extras(with_hand(read_request(stance), hand))
     start_zenoh_log()
     with CruxClient(config, request.stance.robot, timeout=timeout) as client:
         reply = client.plan(request)
@@ -278,12 +352,13 @@ def _show(reply: PlanReply, as_json: bool) -> int:
     metavar="FILE",
     help="Where the picture goes.",
 )
+@hand_option
 @json_option
-def demo(picture: Path, as_json: bool) -> int:
+def demo(picture: Path, hand: ParameterTable | None, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer."""
     from service.server import PlanService
 
-    request = _with_extras(read_request(DEMO_STANCE))
+    request = _with_extras(with_hand(read_request(DEMO_STANCE), hand))
     start_zenoh_log()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with open_session(config) as session, PlanService(session):
@@ -333,8 +408,11 @@ def _filling_folder() -> Iterator[None]:
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
+@hand_option
 @json_option
-def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
+def route(
+    route: str, folder: Path, workers: int | None, hand: ParameterTable | None, as_json: bool
+) -> int:
     """Evaluate a climb: every stance, and every one with a limb in the air.
 
     ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
@@ -344,7 +422,7 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
     from service import questions
     from service.climb import print_route
 
-    climb = questions.route(read_route(route))
+    climb = questions.route(with_hand(read_route(route), hand))
     with _progress(f"planning {climb.name}") as tell:
         result = evaluate(climb, workers, tell)
     with _filling_folder():
@@ -358,20 +436,24 @@ def route(route: str, folder: Path, workers: int | None, as_json: bool) -> int:
     return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
 
 
-@crux.command()
+@crux.command(epilog=f"NAME is one of {', '.join(studies.STUDIES)}.")
 @click.argument("name")
 @_folder_option("Where result.json and the pictures go.")
+@sweep_options
+@hand_option
 @json_option
-def study(name: str, folder: Path, as_json: bool) -> None:
+def study(
+    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **options: Any
+) -> None:
     """Run an experiment of the paper again, and hold its claims against the model.
 
-    NAME is that of the figure: fig06, fig07, fig10. The exit status is 0 whatever the claims say.
+    The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
+    The exit status is 0 whatever the claims say.
     """
-    from hand_models import studies
-    from service.studies import print_study
-
+    asked = chosen_study(name, **options)
+    numbers = None if hand is None else own_hand(hand)
     with _filling_folder(), _progress(name) as tell:
-        result, files = studies.run_study(name, folder, tell)
+        result, files = studies.run_study(asked, folder, tell, numbers)
     if as_json:
         _say(studies.as_json(result) | {"files": [str(path) for path in files]})
     else:

@@ -7,14 +7,18 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import msgspec
+import numpy as np
 
 from hand_models.errors import CruxError, InvalidInputError
 from hand_models.fixed_wrist import tension_limits
+from hand_models.parameters import ParameterTable
 from planner import solve
+from planner.plan import WristPlan
 from service.answers import plan_reply, wrench_space_reply
 from service.codec import Format, decode_request, encode_error
 from service.errors import REQUEST_KINDS
 from service.keys import PLAN, WRENCH_SPACE
+from service.own_hand import over_default
 from service.questions import question, stance
 from service.replies import PlanReply, WrenchSpaceReply
 from service.requests import PlanRequest, WrenchSpaceRequest
@@ -61,9 +65,15 @@ def wrench_space(request: WrenchSpaceRequest) -> WrenchSpaceReply:
     InvalidInputError
         If the request is impossible.
     """
-    settled, space = solve.hand_space(stance(request.stance), request.limb)
+    hand = solve.resting_hand(stance(request.stance), request.limb)
+    wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     return wrench_space_reply(
-        request.stance.robot, request.limb, settled, space, tension_limits(settled)
+        request.stance.robot,
+        request.limb,
+        hand.settled,
+        hand.space,
+        tension_limits(hand.settled),
+        wrist,
     )
 
 
@@ -79,7 +89,9 @@ SERVICES: Final[dict[str, _Service]] = {
 """By the last part of the key: what is asked, and who answers."""
 
 
-def handle(key: str, payload: bytes, encoding: str = "") -> Answer:
+def handle(
+    key: str, payload: bytes, encoding: str = "", hand: ParameterTable | None = None
+) -> Answer:
     """Answer a query.
 
     Parameters
@@ -89,6 +101,9 @@ def handle(key: str, payload: bytes, encoding: str = "") -> Answer:
     payload : bytes
     encoding : str, optional
         Zenoh's name of it; the answer's is of the same format.
+    hand : ParameterTable, optional
+        Entries of the hand in which the service's is not the bundled one; a request's own entries
+        go on top.
 
     Returns
     -------
@@ -99,7 +114,8 @@ def handle(key: str, payload: bytes, encoding: str = "") -> Answer:
     try:
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
-        reply = service.answer(decode_request(payload, service.request, form))
+        request = over_default(decode_request(payload, service.request, form), hand)
+        reply = service.answer(request)
         return Answer(form.encode(reply), form.label(reply), True)
     except InvalidInputError as error:
         kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind

@@ -14,6 +14,8 @@ from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose
 from hand_models.hand import Grasp
 from hand_models.mesh import Mesh
+from hand_models.parameters import ParameterTable
+from hand_models.parameters.own import own_hand
 from hand_models.profile import Profile
 from hand_models.spines import Surface
 from planner.robosimian import Robot, robosimian
@@ -23,7 +25,8 @@ from service import requests
 
 __all__ = ["ROBOTS", "question", "route", "stance"]
 
-ROBOTS: Final[dict[str, Callable[[], Robot]]] = {"robosimian": robosimian}
+ROBOTS: Final[dict[str, Callable[[ParameterTable | None], Robot]]] = {"robosimian": robosimian}
+"""By name, what builds a robot from all numbers of its hands."""
 
 
 @contextmanager
@@ -62,11 +65,13 @@ def route(request: requests.RouteRequest) -> Route:
     InvalidInputError
         If a part of it is impossible; the field is relative to the file.
     """
+    start = stance(request.stance)
+    numbers = start.robot.hand.table
     return Route(
         name=request.name,
-        start=stance(request.stance),
+        start=start,
         moves=tuple(
-            Move(_hand(move, f"moves[{i}]"), _pose(move.body, f"moves[{i}].body"))
+            Move(_hand(move, numbers, f"moves[{i}]"), _pose(move.body, f"moves[{i}].body"))
             for i, move in enumerate(request.moves)
         ),
         load=_load(request.load),
@@ -87,11 +92,17 @@ def stance(message: requests.Stance) -> Stance:
             raise InvalidInputError(
                 f"unknown robot {message.robot!r}; known are {', '.join(ROBOTS)}", field="robot"
             )
+        with _within("hand"):
+            own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
+            robot = ROBOTS[message.robot](own)
+        numbers = robot.hand.table
         return Stance(
-            hands=tuple(_hand(hand, f"hands[{i}]") for i, hand in enumerate(message.hands)),
+            hands=tuple(
+                _hand(hand, numbers, f"hands[{i}]") for i, hand in enumerate(message.hands)
+            ),
             body=_pose(message.body, "body"),
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
-            robot=ROBOTS[message.robot](),
+            robot=robot,
         )
 
 
@@ -105,14 +116,14 @@ def _limits(message: requests.Limits) -> Limits:
         return Limits(message.utilisation, message.tendon_tension)
 
 
-def _hand(message: requests.Hand, path: str) -> HandOnHold:
+def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnHold:
     with _within(path):
         with _within("grasp"):
             grasp = Grasp(**msgspec.structs.asdict(message.grasp))
         with _within("surface"):
             surface = _surface(message.surface)
         with _within("hold"):
-            hold = _hold(message.hold)
+            hold = _hold(message.hold, numbers)
             hold_pose = _pose(message.hold.pose, "pose")
             hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
         return HandOnHold(
@@ -123,6 +134,10 @@ def _hand(message: requests.Hand, path: str) -> HandOnHold:
             hold_pose=hold_pose,
             hold_in_hand=hold_in_hand,
             grasp=grasp,
+            wrist=message.wrist,
+            tendon_preload=None
+            if message.tendon_preload is None
+            else np.array(message.tendon_preload),
         )
 
 
@@ -144,7 +159,7 @@ def _surface(message: str | requests.Surface) -> Surface:
     return Surface.from_values({name: v for name, v in given.items() if v is not None})
 
 
-def _hold(message: requests.Hold) -> holds.Hold:
+def _hold(message: requests.Hold, numbers: ParameterTable) -> holds.Hold:
     match message:
         case requests.Plane():
             return holds.Plane()
@@ -157,20 +172,20 @@ def _hold(message: requests.Hold) -> holds.Hold:
         case requests.Edge():
             return holds.Edge(message.fillet_radius, message.angle)
         case requests.Profile():
-            return _profile(message)
+            return _profile(message, numbers)
         case requests.Mesh():
-            return _mesh(message)
+            return _mesh(message, numbers)
 
 
-def _profile(message: requests.Profile) -> Profile:
+def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
     if message.points is not None and message.profiles is None:
-        return Profile(message.points)
+        return Profile(message.points, numbers)
     if message.profiles is not None and message.points is None:
-        return Profile(msgspec.structs.asdict(message.profiles))
+        return Profile(msgspec.structs.asdict(message.profiles), numbers)
     raise InvalidInputError("give points or profiles, one of them", field="points")
 
 
-def _mesh(message: requests.Mesh) -> Mesh:
+def _mesh(message: requests.Mesh, numbers: ParameterTable) -> Mesh:
     if message.file is not None:
         raise InvalidInputError(
             "only the command line reads files; send vertices and faces", field="file"
@@ -178,4 +193,4 @@ def _mesh(message: requests.Mesh) -> Mesh:
     if message.vertices is None or message.faces is None:
         missing = "vertices" if message.vertices is None else "faces"
         raise InvalidInputError("missing", field=missing)
-    return Mesh(message.vertices, message.faces)
+    return Mesh(message.vertices, message.faces, numbers)

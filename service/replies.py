@@ -36,6 +36,7 @@ __all__ = [
     "Time",
     "WrenchSet",
     "WrenchSpaceReply",
+    "Wrist",
 ]
 
 AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -84,7 +85,10 @@ class Price(LimitName):
 
 
 class Tile(Struct, kw_only=True):
-    """One finger tile. The last three fields come with ``"want": ["model"]``."""
+    """One finger tile. The last three fields come with ``"want": ["model"]``.
+
+    The first two of them only where the wrist is fixed.
+    """
 
     phalanx: str
     contact: str
@@ -141,7 +145,10 @@ class Seating(Struct):
 
 
 class Generator(Struct):
-    """A column of a hand's wrench space: a load, and the wrench per newton of it."""
+    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+
+    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    """
 
     name: str
     wrench: Vector
@@ -173,6 +180,23 @@ class WrenchSet(Struct, kw_only=True):
     rows: list[Row]
 
 
+class Wrist(Struct, kw_only=True):
+    """How a hand's wrist is; all but ``mode`` are null where it is fixed.
+
+    ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
+    ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
+    were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
+    0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
+    farthest along the axes.
+    """
+
+    mode: str
+    twist: Vector | None = None
+    palm: str | None = None
+    rounds: int | None = None
+    error: float | None = None
+
+
 class Hand(Struct, kw_only=True):
     """One hand of a plan. Its wrench space comes with ``"want": ["model"]``."""
 
@@ -182,6 +206,7 @@ class Hand(Struct, kw_only=True):
     palm: Palm
     utilisation: float
     seating: Seating
+    wrist: Wrist
     wrench_space: WrenchSet | UnsetType = UNSET
 
 
@@ -315,6 +340,7 @@ class WrenchSpaceReply(Reply, kw_only=True):
 
     robot: str
     limb: str
+    wrist: Wrist
     seating: Seating
     contacts: list[Contact]
     closing: list[Closing]

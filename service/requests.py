@@ -91,9 +91,30 @@ Scatter = Annotated[float, Meta(ge=0.0, le=1e5, description="standard deviation,
 Count = Annotated[int, Meta(ge=1, le=64)]
 OuterRotation = Annotated[float, Meta(ge=0.0, le=math.pi + 1e-6, description="[rad]")]
 Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
+PreloadEntry = Annotated[float, Meta(ge=0.0, le=1e4)]
+Preload = Annotated[
+    tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry],
+    Meta(
+        description="tensions that the tendons of a floating hand hold at rest [N]; by default the "
+        "closing tension"
+    ),
+]
 Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
+HandEntries = Annotated[
+    dict[Name, Any],
+    Meta(
+        description="numbers of the hand in place of the service's own, by section and entry of "
+        "its parameter file hand.toml",
+        extra_json_schema={
+            "additionalProperties": {
+                "type": "object",
+                "additionalProperties": {"$ref": "#/$defs/Quantity"},
+            }
+        },
+    ),
+]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
 
 
@@ -207,15 +228,17 @@ class Hand(Strict, frozen=True, kw_only=True):
     surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")]
     grasp: Grasp = Grasp()
     wrist: Annotated[
-        Literal["fixed", "floating"], Meta(description="only fixed in this version")
+        Literal["fixed", "floating"],
+        Meta(description="floating: the motors stand still, and the wrist gives way"),
     ] = "fixed"
-    tendon_preload: Later = None
+    tendon_preload: Preload | None = None
 
 
 class Stance(Strict, frozen=True, kw_only=True):
     """Where the body and the hands are."""
 
     robot: Name = "robosimian"
+    hand: HandEntries | None = None
     gravity: Acceleration | None = None
     body: Annotated[Pose, Meta(description="of B in W")]
     joints: Later = None

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hand_models.parameters import Quantity
 from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
 from service.requests import PlanRequest, RouteRequest, WrenchSpaceRequest
 
@@ -23,10 +24,12 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
 
 def schema() -> dict[str, Any]:
     """Return one schema whose ``$defs`` hold every message; a valid document is one of them."""
-    wholes, parts = msgspec.json.schema_components(MESSAGES, ref_template="#/$defs/{name}")
+    wholes, parts = msgspec.json.schema_components(
+        (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
+    )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Messages of crux, version 1",
-        "anyOf": list(wholes),
+        "anyOf": list(wholes[: len(MESSAGES)]),
         "$defs": parts,
     }

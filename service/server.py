@@ -19,6 +19,7 @@ from typing import Final, Self
 import zenoh
 from zenoh.handlers import FifoChannel, Handler
 
+from hand_models.parameters import ParameterTable
 from service.dispatch import SERVICES, handle
 from service.keys import ALIVE, service_key
 
@@ -49,9 +50,17 @@ class PlanService:
     session : zenoh.Session
         Not closed by the service.
     robot : str, optional
+    hand : ParameterTable, optional
+        Entries in which its hands are not the bundled one; a request's own go on top.
     """
 
-    def __init__(self, session: zenoh.Session, robot: str = "robosimian") -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        robot: str = "robosimian",
+        hand: ParameterTable | None = None,
+    ) -> None:
+        self._hand = hand
         self.keys = tuple(service_key(robot, name) for name in SERVICES)
         self._alive = service_key(robot, ALIVE)
         self._session = session
@@ -103,7 +112,7 @@ class PlanService:
         payload = b"" if query.payload is None else query.payload.to_bytes()
         encoding = "" if query.encoding is None else str(query.encoding)
         with self._answering:
-            answer = handle(key, payload, encoding)
+            answer = handle(key, payload, encoding, self._hand)
         if answer.good:
             query.reply(key, answer.payload, encoding=answer.encoding)
         else:

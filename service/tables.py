@@ -48,6 +48,10 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         _show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
         )
+        floating = [hand for hand in reply.hands if hand.wrist.twist is not None]
+        if floating:
+            title = "where floating wrists go (mm, mrad), and how their palms carry"
+            _show(title, _wrist_table(floating), out)
         title = "tendons and their motors, and each finger's most loaded tile"
         _show(title, _tendon_table(reply.hands), out)
     if reply.prices:
@@ -68,6 +72,13 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
     out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
+    if reply.wrist.error is not None:
+        palm = (reply.wrist.palm or "off").replace("_", " ")
+        out.print(
+            f"floating wrist: the set at rest, palm: {palm}; "
+            f"off by up to {reply.wrist.error:.1f} N",
+            markup=False,
+        )
     _show(
         "contacts, and the tendon tension [N] at which each part was at rest",
         _closing_table(reply),
@@ -147,6 +158,17 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
         cells += [_fixed(value, 1) for value in hand.wrench[3:]]
         cells += [_fixed(hand.utilisation, 2), _fixed(-force[0], 0), _fixed(force[2], 0)]
         table.add_row(hand.limb, *cells)
+    return table
+
+
+def _wrist_table(hands: Iterable[Hand]) -> Table:
+    table = table_of("hand")
+    for name in ("vx", "vy", "vz", "wx", "wy", "wz"):
+        table.add_column(name, justify="right")
+    table.add_column("palm")
+    for hand in hands:
+        cells = [_fixed(1e3 * value, 2) for value in hand.wrist.twist or ()]
+        table.add_row(hand.limb, *cells, (hand.wrist.palm or "-").replace("_", " "))
     return table
 
 

@@ -123,13 +123,13 @@ def test_a_plane_through_vertices_cuts_as_one_beside_them():
 def test_smoothing_keeps_the_radius_of_a_cylinder(diameter, around):
     radius = diameter / 2.0
     (ring,) = cut(Triangles(*cylinder_mesh(diameter, around)), np.zeros(3), X, Z, 1.0)
-    curve = smooth(ring, Scale.default())
+    curve = smooth(ring, Scale.of())
     assert np.abs(np.hypot(curve[:, 0], curve[:, 1] - radius) - radius).max() < 5e-5
 
 
 def test_a_corner_is_rounded_at_the_scale_of_a_tile_and_never_cut():
     corner = np.array([[-0.1, 0.1], [0.0, 0.0], [0.1, 0.1]])
-    section = PolylineSection([smooth(corner, Scale.default())])
+    section = PolylineSection([smooth(corner, Scale.of())])
     line = np.linspace(-0.09, 0.09, 1001)
     off = section.clearances(np.column_stack([line, np.abs(line)]))
     assert off.max() < 2e-5
@@ -143,7 +143,7 @@ def test_no_raw_rock_stands_out_of_a_smoothed_cut(seed):
     rng = np.random.default_rng(seed)
     x = np.sort(rng.uniform(-0.2, 0.2, 80))
     raw = np.column_stack([x, 0.05 * rng.random() * np.abs(x) + 4e-3 * rng.random(80)])
-    curve = smooth(raw, Scale.default())
+    curve = smooth(raw, Scale.of())
     inner = np.abs(raw[:, 0]) < 0.15
     assert PolylineSection([curve]).clearances(raw[inner]).max() < 1e-4
 

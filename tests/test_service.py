@@ -47,9 +47,9 @@ def free_endpoint() -> str:
 class Served:
     """A ``crux serve`` process."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, *more: str) -> None:
         self.endpoint = endpoint
-        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json"]
+        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "service.command", "serve", *flags],
             cwd=ROOT,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError
+from hand_models.parameters import hand_table
 from hand_models.studies import STUDIES, as_json, load_study, run_study
 from hand_models.studies.hard_stop import PalmExperiment
 from service.command import run
@@ -23,7 +24,7 @@ def results():
     for name in PALM_STUDIES:
         steps = []
         found[name] = load_study(name).run(
-            lambda done, total, steps=steps: steps.append((done, total))
+            lambda done, total, steps=steps: steps.append((done, total)), hand_table()
         )
         totals = {total for _, total in steps}
         assert len(totals) == 1
@@ -55,7 +56,7 @@ def test_the_fitted_claim_says_so_and_the_formulas_hold(results):
     assert all(c.holds for c in claims)
     # the k_p that gives the printed 14 % exactly: the calibrated one, rounded down
     stiffness = results["fig06"].data["preload_stiffness_at_printed_gain"]
-    gain = PalmExperiment.from_tables().with_preload(stiffness).gain((1, 2))
+    gain = PalmExperiment.from_tables(hand_table()).with_preload(stiffness).gain((1, 2))
     assert gain == pytest.approx(0.14)
     assert stiffness == pytest.approx(KP, abs=10.0)
 
@@ -151,7 +152,8 @@ def test_the_command_prints_json_and_nothing_else(tmp_path, capsys):
     written = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert reply == written | {"files": [str(tmp_path / n) for n in ("result.json", "fig06.png")]}
     assert written["v"] == 1
-    assert set(written) == {"v", "name", "title", "data", "claims"}
+    assert set(written) == {"v", "name", "title", "data", "claims", "hand"}
+    assert written["hand"] == {}
     for claim in written["claims"]:
         assert set(claim) == {"claim", "claimed", "got", "holds", "role"}
 

@@ -174,7 +174,9 @@ def test_a_finer_search_and_rays_agree():
     coarse, rays = search(GRIPPER, 40), boundary(GRIPPER, search_box(GRIPPER), 3000)
     for way in np.random.default_rng(0).normal(size=(50, 3)):
         direction = planar(way / np.linalg.norm(way) * SCALE[list(PLANAR)])
-        assert coarse.support(direction) == pytest.approx(rays.support(direction), rel=0.05)
+        # in shares of the set's size: both miss the very corners
+        size = 0.5 * (rays.support(direction) + rays.support(-direction))
+        assert coarse.support(direction) == pytest.approx(rays.support(direction), abs=0.05 * size)
 
 
 def test_the_set_is_skew_symmetric():
@@ -182,7 +184,8 @@ def test_the_set_is_skew_symmetric():
     for way in np.random.default_rng(1).normal(size=(50, 3)):
         direction = planar(way * SCALE[list(PLANAR)])
         mirrored = planar(way * MIRROR * SCALE[list(PLANAR)])
-        assert found.support(direction) == pytest.approx(found.support(mirrored), rel=0.03)
+        size = 0.5 * (found.support(direction) + found.support(-direction))
+        assert found.support(direction) == pytest.approx(found.support(mirrored), abs=0.05 * size)
 
 
 def test_a_closing_that_is_too_tight_leaves_nothing():
