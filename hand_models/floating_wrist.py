@@ -34,6 +34,9 @@ __all__ = ["WRIST", "FloatingWrist", "PalmMode"]
 WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
 """Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
 
+ROUNDING: Final = 1e-9
+"""Slope of a load that is none [N/m, N/rad]."""
+
 PALM_ROWS: Final = 1e5
 """Newtons per metre by which rows of the palm's travel are made commensurate."""
 
@@ -224,12 +227,12 @@ class FloatingWrist:
         free = hand.palm_loads(steps)
         loads = loads._replace(palm=free * np.array([dragging, pressing]))
         e = _elements(loads)
-        slope = e.imag.T / STEP
+        slope = _slopes(e)
         start = e[0].real - slope @ at
         P, p, s = self._limit_map
         P_hard = self._hard_map
         torques = loads.stop_torques
-        torque_slope = torques.imag.T / STEP
+        torque_slope = _slopes(torques)
         torque_start = torques[0].real - torque_slope @ at
         H = P_hard @ np.vstack([slope, torque_slope])
         h = -P_hard @ np.concatenate([start, torque_start])
@@ -246,7 +249,7 @@ class FloatingWrist:
             H, h, rows = np.vstack([H, sides]), np.concatenate([h, most]), rows + names
 
         wrenches = hand.wrenches(loads)
-        generators = np.asarray(wrenches.imag.T / STEP)
+        generators = _slopes(wrenches)
         origin = wrenches[0].real - generators @ at
         D = np.zeros((len(HELD), 6))
         D[:, :3] = HELD
@@ -263,6 +266,12 @@ class FloatingWrist:
             h=h,
             D=D,
         )
+
+
+def _slopes(values: Numbers) -> Array:
+    """Return the derivatives that complex steps have found, without what is rounding alone."""
+    slopes = np.asarray(values.imag.T / STEP)
+    return np.where(np.abs(slopes) > ROUNDING, slopes, 0.0)
 
 
 def _elements(loads: HandLoads) -> Numbers:

@@ -38,6 +38,14 @@ TOLERANCE: Final = 1e-9
 """Relative tolerance of the geometry in this module."""
 
 
+TIGHT: Final = 1e-10
+"""Tolerance of linear programs that measure a polytope."""
+
+BEYOND: Final = 1e-6
+"""By how much a row must clear a bounding box to be left out at once."""
+
+TOLERANCES: Final = ("primal_feasibility_tolerance", "dual_feasibility_tolerance")
+
 SPANNING: Final = 1e-13
 """Squares of unit normals that span a direction sum to more than this in it."""
 
@@ -88,7 +96,18 @@ def polytope_vertices(A: Array, b: Array) -> Array:
         # each row by its own size: one that is far away must not loosen the others
         points = points[(points @ A.T <= b + TOLERANCE * (1.0 + np.abs(b))).all(axis=1)]
         return _distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
-    slack = TOLERANCE * (1.0 + float(np.abs(b).max()))
+    box = _bounding_box(A, b)
+    if box is None:
+        return np.zeros((0, d))
+    middle, half = box
+    if not (half > 0.0).all():
+        raise SolverError(f"a block of {d} columns has no interior")
+    # in a box of unit half widths, where a thin or skew set is as round as any other
+    A, b = A * half, b - A @ middle
+    norms = np.linalg.norm(A, axis=1)
+    A, b = A / norms[:, None], b / norms
+    rows = _irredundant(A, b)
+    A, b = A[rows], b[rows]
     # the centre of the largest ball inside
     cost = np.zeros(d + 1)
     cost[-1] = -1.0
@@ -99,14 +118,57 @@ def polytope_vertices(A: Array, b: Array) -> Array:
         bounds=[(None, None)] * d + [(0.0, None)],
         method="highs",
     )
-    if ball.status == 2:
-        return np.zeros((0, d))
     if ball.status != 0 or ball.x is None:
-        raise SolverError(f"a block of {d} columns is not bounded: {ball.message}")
-    if ball.x[-1] <= slack:
+        raise SolverError(f"a block of {d} columns: {ball.message}")
+    if ball.x[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
     cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
-    return _distinct(cut.intersections, slack)
+    return middle + half * _distinct(cut.intersections, TOLERANCE)
+
+
+def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
+    """Return the middle and the half widths of { y : A y ≤ b }; None if it is empty."""
+    d = A.shape[1]
+    # rows in units of the largest offset: a solver's tolerances are about 1e-7
+    unit = float(np.abs(b).max()) or 1.0
+    ends = np.empty((2, d))
+    for j in range(d):
+        for k, sign in enumerate((1.0, -1.0)):
+            result = linprog(
+                sign * np.eye(d)[j],
+                A_ub=A,
+                b_ub=b / unit,
+                bounds=[(None, None)] * d,
+                method="highs",
+                options={
+                    "primal_feasibility_tolerance": TIGHT,
+                    "dual_feasibility_tolerance": TIGHT,
+                },
+            )
+            if result.status == 2:
+                return None
+            if result.status != 0 or result.x is None:
+                raise SolverError(f"a block of {d} columns is not bounded: {result.message}")
+            ends[k, j] = unit * result.x[j]
+    return 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
+
+
+def _irredundant(A: Array, b: Array) -> Indices:
+    """Return rows of { y : A y ≤ b }, within the box |y| ≤ 1, that are enough for it."""
+    # the others hold in the whole box, and a little beyond
+    rows = list(np.flatnonzero(np.abs(A).sum(axis=1) >= b - BEYOND))
+    for row in list(rows):
+        others = [k for k in rows if k != row]
+        result = linprog(
+            -A[row],
+            A_ub=A[others],
+            b_ub=b[others],
+            bounds=[(-2.0, 2.0)] * A.shape[1],
+            method="highs",
+        )
+        if result.status == 0 and result.fun is not None and -result.fun <= b[row] + TOLERANCE:
+            rows.remove(row)
+    return np.array(rows, dtype=np.intp)
 
 
 def _distinct(points: Array, slack: float) -> Array:

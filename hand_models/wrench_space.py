@@ -183,9 +183,12 @@ class WrenchSpace:
         if not m:
             return ()
         incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
-        _, labels = connected_components(incidence, directed=False)
+        count, labels = connected_components(incidence, directed=False)
+        if count == 1:
+            # rows of the whole wrench couple nothing that is not coupled already
+            A, b, used = self.A, self.b, np.abs(self.A) > 0.0
         blocks: list[tuple[Indices, Array]] = []
-        for label in range(labels.max() + 1):
+        for label in range(count):
             columns: Indices = np.flatnonzero(labels == label)
             mine = used[:, columns].any(axis=1)
             vertices = polytope_vertices(A[np.ix_(mine, columns)], b[mine])
