@@ -307,11 +307,15 @@ class SpinyHand:
                 f"got {self.closing_tension:g}",
                 field="tendon.closing_tension",
             )
+        for name in ("holding_friction", "entry_friction"):
+            mu = table.scalar("tendon", name)
+            if not 0.0 <= mu < 1.0:
+                raise InvalidInputError(f"must be in [0, 1), got {mu:g}", field=f"tendon.{name}")
         self.tendon_friction = table.scalar("tendon", "holding_friction")
         self.spine_travel = table.scalar("tile", "spine_travel")
-        self.lateral_stiffness = table.scalar("tile", "lateral_stiffness")
-        self.bending_stiffness = table.scalar("beam", "bending_stiffness")
-        self.torsional_stiffness = table.scalar("beam", "torsional_stiffness")
+        self.lateral_stiffness = table.positive("tile", "lateral_stiffness")
+        self.bending_stiffness = table.positive("beam", "bending_stiffness")
+        self.torsional_stiffness = table.positive("beam", "torsional_stiffness")
         self.seated_contact = table.scalar("finger", "seated_contact")
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))
@@ -332,7 +336,7 @@ class SpinyHand:
         self.palm_spring = table.scalar("palm", "spring_stiffness")
         self.palm_contact = table.vector("palm", "contact_stiffness")
         self.palm_pressing = table.positive("palm", "pressing_limit")
-        self.palm_pressing_stiffness = table.scalar("palm", "pressing_stiffness")
+        self.palm_pressing_stiffness = table.positive("palm", "pressing_stiffness")
         if len(self.palm_contact) != len(self.palm_tiles):
             raise InvalidInputError(
                 f"one number for each of the {len(self.palm_tiles)} tiles",

@@ -7,7 +7,8 @@ with the share t halved until the residual falls, so that they do not overshoot 
 forces change fast. At a kink (a contact that runs out of its tile, a tendon that begins to slip) a
 step may not help whatever its length; then the damping of Levenberg and Marquardt turns it toward
 the gradient. Where steps go back and forth over the kink of the palm, which carries much or
-nothing, it is taken as carrying or free throughout, in each way in turn.
+nothing, it is taken as carrying or free throughout, in each way in turn. Where all that fails,
+steps begin anew at a few other poses.
 """
 
 from __future__ import annotations
@@ -43,6 +44,11 @@ DAMPING: Final = (1e-6, 1e-4, 1e-2, 1.0)
 
 RANK: Final = 1e-9
 """Singular values below this share of the largest count as zero: motions that load nothing."""
+
+OTHER_STARTS: Final = 8
+"""Poses that steps begin anew at, up to `FARTHEST_START` from the first in `pose_units`."""
+
+FARTHEST_START: Final = 2.0
 
 TINY: Final = float(np.finfo(float).tiny)
 
@@ -89,6 +95,22 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike, start: ArrayLike | None =
     """
     wanted = finite_vector(wrench, 6, "wrench")
     first = np.zeros(6) if start is None else finite_vector(start, 6, "start")
+    found = _reached(hand, wanted, first)
+    steps = found.steps
+    ways = np.random.default_rng(0).normal(size=(OTHER_STARTS, 6)) * pose_units(WRIST)
+    for share, way in zip(
+        np.linspace(0.0, FARTHEST_START, OTHER_STARTS + 1)[1:], ways, strict=True
+    ):
+        if found.converged:
+            break
+        tried = _reached(hand, wanted, first + share * way)
+        steps += tried.steps
+        found = min(found, tried, key=_size)
+    return replace(found, steps=steps)
+
+
+def _reached(hand: CompliantHand, wanted: Array, first: Array) -> WristPose:
+    """Return what Newton's steps find from a pose, taking the palm in each way in turn."""
     ways: list[Array | None] = [None]
     if hand.settled.palm.engaged:
         ways += [np.array(way) for way in itertools.product((False, True), repeat=2)]
@@ -102,8 +124,11 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike, start: ArrayLike | None =
         found.append(WristPose(at, residual, steps, exact))
         if exact:
             return found[-1]
-    nearest = min(found, key=lambda pose: float(np.abs(pose.residual * SCALE).max()))
-    return replace(nearest, steps=steps)
+    return replace(min(found, key=_size), steps=steps)
+
+
+def _size(pose: WristPose) -> float:
+    return float(np.abs(pose.residual * SCALE).max())
 
 
 class _Problem:
@@ -155,7 +180,7 @@ class _Problem:
                 return tried, there
             share *= 0.5
         for damping in DAMPING:
-            weak = values / (values**2 + (damping * values[0]) ** 2)
+            weak = values / np.maximum(values**2 + (damping * values[0]) ** 2, TINY)
             step = right.T @ (weak * across)
             share = min(1.0, LONGEST / max(float(np.abs(step).max()), TINY))
             tried = at + share * step * units

@@ -13,7 +13,14 @@ from planner.plan import Certificate, HandPlan, LimitName
 from planner.program import WRENCH_UNIT
 from planner.stance import Stance
 
-__all__ = ["NO_FACTOR", "UNPROVEN", "limit_sentence", "shortfall_sentence", "warnings"]
+__all__ = [
+    "LEAST_FACTOR",
+    "NO_FACTOR",
+    "UNPROVEN",
+    "limit_sentence",
+    "shortfall_sentence",
+    "warnings",
+]
 
 NOTABLE: Final = 0.3
 """Components of what is missing are told from this part of the largest on."""
@@ -57,6 +64,11 @@ UNPROVEN: Final = (
 )
 """Of a plan that its search could not prove to be the least."""
 
+
+LEAST_FACTOR: Final = (
+    "the load factor is a lower bound: beyond it no plan was found, nor proven away"
+)
+"""Of a load factor that a search ends which found no plan, not a limit."""
 
 NO_FACTOR: Final = "no load factor was found; with floating wrists that is no proof of none"
 """Of a question for it that ends without one."""

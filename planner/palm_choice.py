@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from hand_models.floating_wrist import PalmMode
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
@@ -78,7 +78,22 @@ def least_use(hands: Hands, factor: float = 1.0) -> Settled:
     return min(failed, key=lambda found: found.measure.missing)
 
 
-def most_load(hands: Hands, plan: Settled) -> float | None:
+class LargestFactor(NamedTuple):
+    """The largest factor of the body wrench that was found.
+
+    Attributes
+    ----------
+    factor : float
+    sure : bool
+        Whether utilisation 1 ends it; otherwise a search that found no plan beyond it, so that it
+        is a lower bound.
+    """
+
+    factor: float
+    sure: bool
+
+
+def most_load(hands: Hands, plan: Settled) -> LargestFactor | None:
     """Return the largest factor of the body wrench that has a plan of utilisation 1.
 
     By Newton's method on the least utilisation as a function of the factor, whose slope the
@@ -98,20 +113,22 @@ def most_load(hands: Hands, plan: Settled) -> float | None:
         now = least_use(hands, factor)
     if not now.exact:
         return None
-    low, high = 0.0, math.inf
+    low, high, sure, overloaded = 0.0, math.inf, False, False
     for _ in range(FACTORS):
         used, factor = now.measure.utilisation, now.point.factor
         if used <= 1.0 + SLACK:
             low = max(low, factor)
-        else:
-            high = min(high, factor)
+        elif factor < high:
+            high, overloaded = factor, True
         if abs(used - 1.0) <= SLACK:
             better = _exchanged(hands, now)
             if better is now:
+                sure = True
                 break
             now = better
             continue
         if high < math.inf and high - low <= BRACKET * high:
+            sure = overloaded
             break
         assert now.outcome.balance_dual is not None
         slope = -float(now.outcome.balance_dual @ hands.wrench)
@@ -127,10 +144,10 @@ def most_load(hands: Hands, plan: Settled) -> float | None:
         if there.exact:
             now = there
         elif aim > factor:
-            high = aim
+            high, overloaded = aim, False
         else:
             break
-    return low if low > 0.0 else None
+    return LargestFactor(low, sure) if low > 0.0 else None
 
 
 def _starts(hands: Hands, factor: float) -> Iterator[Palms]:

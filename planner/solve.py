@@ -21,7 +21,14 @@ from hand_models.hand import SettledHand
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
-from planner.explain import NO_FACTOR, UNPROVEN, limit_sentence, shortfall_sentence, warnings
+from planner.explain import (
+    LEAST_FACTOR,
+    NO_FACTOR,
+    UNPROVEN,
+    limit_sentence,
+    shortfall_sentence,
+    warnings,
+)
 from planner.floating import Settled
 from planner.hand_sets import Hands, widest_at_rest
 from planner.palm_choice import least_use, most_load
@@ -240,6 +247,7 @@ class _Answer:
         self.wrong: list[str] = []
         self.certificate: Certificate | None = None
         self.load_factor: float | None = None
+        self.least_factor = False
         self.unbounded = False
 
     # Solving ------------------------------------------------------------------------------------
@@ -364,7 +372,9 @@ class _Answer:
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
             return
         if self.search is not None:
-            self.load_factor = most_load(self.parts, self.search)
+            most = most_load(self.parts, self.search)
+            if most is not None:
+                self.load_factor, self.least_factor = most.factor, not most.sure
             return
         result = program.load_factor(self.data)
         if result.solved:
@@ -438,6 +448,8 @@ class _Answer:
         asked = "load_factor" in self.question.want and not self.unbounded
         if self.search is not None and asked and self.load_factor is None:
             found += (NO_FACTOR,)
+        if self.least_factor:
+            found += (LEAST_FACTOR,)
         return found
 
     def _not_least(self, utilisation: float) -> list[str]:
