@@ -1,0 +1,24 @@
+"""Load factors of floating hands, and whether a limit or a failed search ends them."""
+
+import msgspec
+import pytest
+
+from planner.explain import LEAST_FACTOR
+from planner.solve import plan
+from service.questions import question
+from service.stances import read_request
+
+
+def factor_of(request):
+    return plan(question(msgspec.structs.replace(request, want=["load_factor"])))
+
+
+def test_a_load_factor_that_a_limit_ends_has_no_warning():
+    request = read_request("wall-300-floating")
+    answer = factor_of(request)
+    assert answer.load_factor > 1.0
+    assert LEAST_FACTOR not in answer.warnings
+    # and at that factor the utilisation is one
+    at = [answer.load_factor * value for value in answer.body_wrench]
+    there = plan(question(msgspec.structs.replace(request, load=None, body_wrench=at, want=[])))
+    assert there.utilisation == pytest.approx(1.0, abs=1e-3)
