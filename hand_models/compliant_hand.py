@@ -281,7 +281,7 @@ def _preload(preload: ArrayLike | None, settled: SettledHand) -> Array:
     most = settled.hand.maximum_tension
     if tensions.shape != (len(FINGERS),) or not ((tensions >= 0.0) & (tensions <= most)).all():
         raise InvalidInputError(
-            f"four tensions from 0 to {most:g} N are needed, got {preload}",
+            f"four tensions from 0 to {most:g} N are needed, got {tensions.tolist()}",
             field="tendon_preload",
         )
     return tensions

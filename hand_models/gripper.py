@@ -118,8 +118,6 @@ class Gripper:
             raise InvalidInputError(f"must be above 0 m, got {diameter:g}", field="diameter")
         if not (math.isfinite(tension) and tension > 0.0):
             raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
-        if not (math.isfinite(tension) and tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
         self.table = table = table or gripper_table()
         self.surface = surface or sandpaper(table)
         self.tension = tension

@@ -31,7 +31,7 @@ LARGEST_BOX: Final = 4.0
 SMALLEST_BOX: Final = 1e-9
 """Half width of the box about a pose, in `UNITS`: at first, at most, and when to end."""
 
-ROUNDS: Final = 30
+ROUNDS: Final = 50
 WEIGHTS: Final = (1e3, 1e4, 1e5)
 """What a limit exceeded by the whole of its capacity counts, in units of d · w: the next if the
 last left one exceeded."""

@@ -10,6 +10,7 @@ which phalanx of which finger fails there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -402,7 +403,7 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
         if not np.linalg.cond(hessian) < SINGULAR:
             return None
         step = -np.linalg.solve(hessian, gradient)
-        decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
+        decrement = math.sqrt(max(-float(gradient @ step), 0.0))
         y = y + step / (1.0 + decrement)
         if decrement < 1e-9:
             break

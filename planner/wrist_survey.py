@@ -24,6 +24,10 @@ MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
 }
 
 
+PROMISING: Final = 0.5
+"""Share of the farthest wrench of a search from which another way of carrying is tried, too."""
+
+
 @dataclass(frozen=True, eq=False)
 class Survey:
     """A floating hand's wrenches, found by search.
@@ -32,8 +36,8 @@ class Survey:
     ----------
     found : WristSearch
     ends : tuple of (Farthest or None), length 12
-        Where the hand lets go along + and − each axis of H in turn, begun at the search's farthest
-        wrench; None where no way from there holds.
+        Where the hand lets go along + and − each axis of H in turn: the farthest of local maxima,
+        begun at the search's farthest wrenches; None where no way from there holds.
     """
 
     found: WristSearch
@@ -51,22 +55,45 @@ def survey(
     per_axis : int
         Poses along each of the six axes of the search.
     progress : callable, optional
-        Told how many poses are done, of how many.
+        Told how much is done, of how much.
 
     Raises
     ------
     EmptySetError
         If no pose near rest holds.
     """
-    found = search(wrist, per_axis, progress)
-    ends = [_end(wrist, found, sign * axis) for axis in np.eye(6) for sign in (1.0, -1.0)]
+    directions = [sign * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
+    poses = per_axis**6
+    each = max(1, poses // (2 * len(directions)))
+    total = poses + each * len(directions)
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(done, total)
+
+    found = search(wrist, per_axis, lambda done, _: tell(done))
+    ends = []
+    for i, direction in enumerate(directions):
+        tell(poses + i * each)
+        ends.append(_end(wrist, found, direction))
+    tell(total)
     return Survey(found, tuple(ends))
 
 
 def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest | None:
-    pose = found.poses[int((found.wrenches @ direction).argmax())]
-    drags, presses = wrist.hand.palm_loads(pose[None])[0] > 0.0
-    try:
-        return farthest(replace(wrist, palm=MODES[bool(drags), bool(presses)]), direction, pose)
-    except EmptySetError:
-        return None
+    """Return the farthest limit that is reached, begun in each of the palm's ways of carrying."""
+    reach = found.wrenches @ direction
+    carries = wrist.hand.palm_loads(found.poses) > 0.0
+    best: Farthest | None = None
+    for (drags, presses), mode in MODES.items():
+        those = np.flatnonzero((carries == (drags, presses)).all(axis=1))
+        if not len(those) or reach[those].max() < PROMISING * reach.max():
+            continue
+        start = found.poses[those[int(reach[those].argmax())]]
+        try:
+            there = farthest(replace(wrist, palm=mode), direction, start)
+        except EmptySetError:
+            continue
+        if best is None or there.reach > best.reach:
+            best = there
+    return best

@@ -108,9 +108,7 @@ def test_poses_of_an_edge_are_found_from_other_starts() -> None:
         wrench = wrist.evaluate(twist[None]).wrenches[0]
         pose = wrist_pose(wrist.hand, wrench)
         assert pose.converged
-        np.testing.assert_allclose(
-            wrist.evaluate(pose.twist[None]).wrenches[0], wrench, atol=1e-6
-        )
+        np.testing.assert_allclose(wrist.evaluate(pose.twist[None]).wrenches[0], wrench, atol=1e-6)
 
 
 def test_a_hand_that_touches_nothing_gives_no_wrench_and_no_warning() -> None:

@@ -287,7 +287,7 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         raise InvalidInputError("done", field="stance")
 
     monkeypatch.setattr(solve, "plan", exclusive)
-    monkeypatch.setattr(solve, "hand_space", exclusive)
+    monkeypatch.setattr(solve, "resting_hand", exclusive)
     plan, space = (
         msgspec.json.encode(wall_request()),
         msgspec.json.encode({"v": 1, "stance": wall_request()["stance"], "limb": "front_left"}),
