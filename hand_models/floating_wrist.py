@@ -29,7 +29,7 @@ from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
 from hand_models.wrist_pose import Evaluation, Verdict, range_rows
 
-__all__ = ["WRIST", "FloatingWrist", "PalmMode"]
+__all__ = ["PALM_MODES", "WRIST", "FloatingWrist", "PalmMode"]
 
 WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
 """Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
@@ -42,6 +42,14 @@ PALM_ROWS: Final = 1e5
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
 """How a palm carries: not at all, by moving toward −x, into the rock, or both."""
+
+PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
+    (False, False): "off",
+    (True, False): "drags",
+    (False, True): "presses",
+    (True, True): "drags_and_presses",
+}
+"""By whether the palm drags, and whether it presses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +200,7 @@ class FloatingWrist:
         """Return the ways in which the palm can carry."""
         if not self.hand.settled.palm.engaged:
             return ("off",)
-        return ("off", "drags", "presses", "drags_and_presses")
+        return tuple(PALM_MODES.values())
 
     def linearised(
         self,

@@ -9,20 +9,12 @@ from typing import Final
 import numpy as np
 
 from hand_models.errors import EmptySetError
-from hand_models.floating_wrist import FloatingWrist, PalmMode
+from hand_models.floating_wrist import PALM_MODES, FloatingWrist
 from hand_models.frames import Array
 from hand_models.wrist_limit import Farthest, farthest
 from hand_models.wrist_search import WristSearch, search
 
 __all__ = ["Survey", "survey"]
-
-MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
-    (False, False): "off",
-    (True, False): "drags",
-    (False, True): "presses",
-    (True, True): "drags_and_presses",
-}
-
 
 PROMISING: Final = 0.5
 """Share of the farthest wrench of a search from which another way of carrying is tried, too."""
@@ -85,7 +77,7 @@ def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest
     reach = found.wrenches @ direction
     carries = wrist.hand.palm_loads(found.poses) > 0.0
     best: Farthest | None = None
-    for (drags, presses), mode in MODES.items():
+    for (drags, presses), mode in PALM_MODES.items():
         those = np.flatnonzero((carries == (drags, presses)).all(axis=1))
         if not len(those) or reach[those].max() < PROMISING * reach.max():
             continue

@@ -9,7 +9,7 @@ from hand_models import InvalidInputError
 from hand_models.compliant_hand import CompliantHand
 from hand_models.errors import UnsupportedError
 from hand_models.fixed_wrist import wrench_space
-from hand_models.floating_wrist import FloatingWrist
+from hand_models.floating_wrist import PALM_MODES, FloatingWrist
 from hand_models.hand import FINGERS, Grasp
 from hand_models.holds import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.spines import Surface
@@ -186,8 +186,7 @@ def test_the_linearised_set_touches_the_exact_one_where_it_is_linearised(name):
     wrist = FloatingWrist(hand)
     at = np.array([5e-5, 2e-5, -8e-5, 1e-3, -1e-3, 5e-4])
     back, into = hand.palm_loads(at[None])[0] > 0.0
-    mode = {(0, 0): "off", (1, 0): "drags", (0, 1): "presses", (1, 1): "drags_and_presses"}
-    space = wrist.linearised(at, mode[int(back), int(into)])
+    space = wrist.linearised(at, PALM_MODES[bool(back), bool(into)])
     loads = hand.loads(at[None])
     np.testing.assert_allclose(space.wrench(at), hand.wrenches(loads)[0], atol=1e-8)
     verdict = wrist.judge(at[None])
