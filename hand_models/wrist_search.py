@@ -319,7 +319,7 @@ def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array
     t : ndarray, shape (n, d)
         The last that hold.
     limiting : ndarray of int, shape (n,)
-        The limit row that is exceeded beyond; −1 where it is a hard row.
+        The limit row that is exceeded beyond; −1 where it is a hard row, or a phalanx is off its rock.
     """
     low = np.zeros(len(t))
     high = np.ones(len(t))
@@ -334,7 +334,8 @@ def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array
         holds = grasp.evaluate(box.poses(t * middle[:, None])).verdict.holds
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
     beyond: Verdict = grasp.evaluate(box.poses(t * high[:, None])).verdict
-    limiting = np.where(beyond.utilisation > 1.0, beyond.limiting, -1)
+    named = np.isfinite(beyond.utilisation) & (beyond.utilisation > 1.0)
+    limiting = np.where(named, beyond.limiting, -1)
     return t * low[:, None], limiting
 
 

@@ -73,7 +73,11 @@ AROUND: Final = 0.19
 
 
 def plot_wrench_space(
-    settled: SettledHand, space: WrenchSpace | None, path: Path, title: str
+    settled: SettledHand,
+    space: WrenchSpace | None,
+    path: Path,
+    title: str,
+    preload: Array | None = None,
 ) -> None:
     """Draw a hand on its hold, and three projections of what it can carry.
 
@@ -85,32 +89,48 @@ def plot_wrench_space(
     path : Path
         PNG, PDF or SVG.
     title : str
+    preload : ndarray, shape (4,), optional
+        Of a floating hand, the tensions at which its motors stand still [N]; ``space`` is then its
+        set linearised at rest.
     """
+    tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
     figure = Figure(figsize=(15.0, 8.8 if space is None else 13.4), layout="constrained")
     heights = [1.0] if space is None else [1.0, 0.5]
     rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
     upper = rows[0, 0]
     grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.15))
     fingers = [upper.add_subplot(grid[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1))]
-    _draw_fingers(fingers, settled)
+    _draw_fingers(fingers, settled, tensions)
     _draw_from_above(upper.add_subplot(grid[:, 2]), settled)
     seating = settled.seating.rule.replace("_", " ")
+    held = f"closing tension of {settled.closing_tension:g} N"
+    if preload is not None:
+        held = f"preload of {_listed(preload)} N, wrist floating, at rest"
     upper.suptitle(
-        f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the closing tension "
-        f"of {settled.closing_tension:g} N"
+        f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}"
     )
     if space is not None:
         vertices = space.vertices()
+        if preload is not None:
+            rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
         for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
             _draw_projection(axes, vertices, i, j)
     figure.savefig(path, dpi=110, facecolor="white")
 
 
+def _listed(tensions: Array) -> str:
+    """Return four tensions in words; one if they are alike."""
+    if np.ptp(tensions) == 0.0:
+        return f"{tensions[0]:g}"
+    return ", ".join(f"{tension:g}" for tension in tensions)
+
+
 # Fingers in their planes ------------------------------------------------------------------------
 
 
-def _draw_fingers(panels: list[Axes], settled: SettledHand) -> None:
-    loads = settled.tile_loads(np.full(len(FINGERS), settled.closing_tension))
+def _draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> None:
+    """Draw every finger, its tiles loaded by the four tensions."""
+    loads = settled.tile_loads(tensions)
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
     chains = np.vstack([_chain(finger) for finger in settled.fingers])
     limits = chains.min(axis=0) - MARGINS[0], chains.max(axis=0) + MARGINS[1]

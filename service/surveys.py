@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Final
 
 from rich.console import Console
+from rich.table import Table
 
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_space import Row
 from planner.wrist_survey import Survey
 from service.replies import AXES
 from service.tables import table_of
 
 __all__ = ["print_survey", "survey_json"]
+
+DRAGGED: Final = "a tile dragged backwards"
+"""What ends the way where no limit does: a part that can only push or only pull is about to do the
+other, which is a tile nearly always."""
+
+WHOLE: Final = "finger"
+"""Column of a finger's limits that are no tile's."""
+
+ORDER: Final = (WHOLE, "base", *PHALANGES, NAIL)
+"""Of the columns of a finger's parts."""
 
 
 def survey_json(survey: Survey) -> dict[str, Any]:
@@ -56,6 +70,14 @@ def print_survey(survey: Survey, out: Console) -> None:
         f"{len(found.poses)} extreme wrenches",
         markup=False,
     )
+    _print_ends(survey, out)
+    if found.limiting:
+        out.print(f"\n[bold]what lets go first, at how many of {len(found.limiting)}[/bold]")
+        out.print(failures_table(found.limiting))
+
+
+def _print_ends(survey: Survey, out: Console) -> None:
+    """Print where the hand lets go along each axis."""
     table = table_of("axis")
     table.add_column("reach", justify="right")
     for name in ("finger", "phalanx", "limit"):
@@ -69,11 +91,34 @@ def print_survey(survey: Survey, out: Console) -> None:
         cells = ("-",) * 3 if row is None else (row.finger or "-", row.phalanx or "-", row.limit)
         table.add_row(f"{name} {unit}", f"{end.reach:.2f}", *cells)
     out.print(table)
-    failing = Counter(
-        "a tile dragged backwards or the palm"
-        if row is None
-        else " ".join(part for part in (row.finger, row.phalanx) if part) or row.limit
-        for row in found.limiting
-    )
-    listed = ", ".join(f"{name} {count}" for name, count in failing.most_common())
-    out.print(f"what lets go first at the extreme wrenches: {listed}", markup=False)
+    if any(end is None for end in survey.ends):
+        out.print("reach -: no way along the axis was found that holds", markup=False)
+    if any(end is not None and end.limiting is None for end in survey.ends):
+        out.print(
+            f"limit -: no limit binds there; the way ends at {DRAGGED}, or where the search "
+            "stopped",
+            markup=False,
+        )
+
+
+def failures_table(limiting: Sequence[Row | None]) -> Table:
+    """Return how often each tile of each finger lets go first, and what is no finger's."""
+    counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
+    parts = [part for part in ORDER if any(finger and name == part for finger, name in counts)]
+    table = table_of("")
+    for name in (*parts, "all"):
+        table.add_column(name, justify="right")
+    for finger in FINGERS:
+        own = [counts[finger, part] for part in parts]
+        table.add_row(finger, *(str(count or "-") for count in own), str(sum(own)))
+    for (other, name), count in counts.items():
+        if other is None:
+            table.add_row(name, *[""] * len(parts), str(count))
+    return table
+
+
+def _place(row: Row) -> tuple[str | None, str]:
+    """Return finger and part of a limit; for what is no finger's, the limit in words."""
+    if row.finger is None:
+        return None, row.limit.replace("_", " ")
+    return row.finger, row.phalanx or WHOLE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from rich import box
@@ -10,12 +10,29 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from service.replies import AXES, Finger, Hand, PlanReply, Price, Tile, WrenchSpaceReply
+from service.replies import (
+    AXES,
+    AxisCapability,
+    Finger,
+    Hand,
+    PlanReply,
+    Price,
+    Tile,
+    WrenchSpaceReply,
+)
 
 __all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
+
+CARRIES: Final[Mapping[str, str]] = {
+    "off": "carries nothing",
+    "drags": "drags on the rock",
+    "presses": "presses on the rock",
+    "drags_and_presses": "drags and presses on the rock",
+}
+"""What a palm does in each of its modes."""
 
 
 def console(stderr: bool = False) -> Console:
@@ -73,12 +90,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
     out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
     if reply.wrist.error is not None:
-        palm = (reply.wrist.palm or "off").replace("_", " ")
-        out.print(
-            f"floating wrist: the set at rest, palm: {palm}; "
-            f"off by up to {reply.wrist.error:.1f} N",
-            markup=False,
-        )
+        _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
     _show(
         "contacts, and the tendon tension [N] at which each part was at rest",
         _closing_table(reply),
@@ -97,16 +109,38 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
         f"dimension {reply.dimension}"
     )
+    _print_capability(reply.capability, out)
+
+
+def _print_floating(palm: str, error: float, out: Console) -> None:
+    """Say what the set of a floating hand stands for, and what it does not."""
+    out.print(
+        f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
+        f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
+        "--search N finds what the hand really holds, palm and all.",
+        markup=False,
+    )
+
+
+def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
+    """Print the least and the most of each component, and those of it alone if there are any."""
+    with_pure = any(end.pure is not None for end in capability.values())
     reaches = table_of("axis")
-    for name in ("pure -", "pure +", "extent -", "extent +"):
+    for name in ("least", "most", *(("pure least", "pure most") if with_pure else ())):
         reaches.add_column(name, justify="right")
     for axis in AXES:
-        less, more = reply.capability[f"-{axis}"], reply.capability[f"+{axis}"]
+        less, more = capability[f"-{axis}"], capability[f"+{axis}"]
         unit = "N" if axis.startswith("f") else "N·m"
-        cells = [less.pure, more.pure, less.extent, more.extent]
-        reaches.add_row(f"{axis} {unit}", *("-" if c is None else _fixed(c, 2) for c in cells))
-    _show("capability along the axes of H", reaches, out)
-    out.print("pure: with nothing else; extent: with whatever else the hand can carry")
+        cells = [-less.extent, more.extent]
+        pure = [None if less.pure is None else -less.pure, more.pure] if with_pure else []
+        shown = ("-" if cell is None else _fixed(cell, 2) for cell in (*cells, *pure))
+        reaches.add_row(f"{axis} {unit}", *shown)
+    _show("wrenches on the rock along the axes of H", reaches, out)
+    out.print("least, most: with whatever else the hand can carry")
+    if with_pure:
+        out.print("pure: with every other component zero; -: none")
+    if any(capability[f"{sign}{AXES[0]}"].pure is None for sign in "+-"):
+        out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 
 def _closing_table(reply: WrenchSpaceReply) -> Table:

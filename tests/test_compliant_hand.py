@@ -170,6 +170,14 @@ def test_an_impossible_preload_is_refused(preload):
         compliant("pinch", preload)
 
 
+def test_an_impossible_preload_is_told_as_a_plain_list():
+    with pytest.raises(InvalidInputError) as caught:
+        compliant("pinch", np.full(4, 900.0))
+    assert str(caught.value) == (
+        "tendon_preload: four tensions from 0 to 700 N are needed, got [900.0, 900.0, 900.0, 900.0]"
+    )
+
+
 def test_a_hand_on_its_nails_cannot_float():
     hold = Edge(fillet_radius=0.002, angle=1.5707963)
     settled = HAND.settle(hold, ROCK, Grasp(fingernail=True))

@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 from hands import HAND, ROCK
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from rocks import cylinder_mesh
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere, wrench_space
+from hand_models.compliant_hand import CompliantHand
+from hand_models.floating_wrist import FloatingWrist
 from hand_models.mesh import Mesh
 from hand_models.profile import Profile
 from planner import hand_plots
@@ -38,7 +40,7 @@ def test_every_hold_has_a_picture(hold, rotation, tmp_path):
 def test_contacts_and_forces_are_drawn_where_they_are():
     settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
     axes = Figure().subplots(2, 2).ravel()
-    hand_plots._draw_fingers(list(axes), settled)
+    hand_plots._draw_fingers(list(axes), settled, np.full(4, settled.closing_tension))
     drawn = axes[0]  # inner_left
     finger = settled.fingers[1]
     dots = [line for line in drawn.lines if line.get_color() == "black"]
@@ -53,6 +55,22 @@ def test_contacts_and_forces_are_drawn_where_they_are():
     for tip, row in zip(tips, rows, strict=True):
         force = loads[row, 0] * settled.axes[row, 0] + loads[row, 1] * settled.axes[row, 1]
         np.testing.assert_allclose(tip, hand_plots.ARROW * force[[0, 2]] / largest, atol=1e-9)
+
+
+def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypatch, tmp_path):
+    settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
+    wrist = FloatingWrist(CompliantHand(settled, [40.0, 50.0, 60.0, 45.0]))
+    at_rest = wrist.hand.loads(np.zeros((1, 6)))
+    drawn = settled.tile_loads(wrist.hand.preload)
+    np.testing.assert_allclose(drawn[:, 0], at_rest.shears[0], atol=1e-9)
+    np.testing.assert_allclose(drawn[:, 1], at_rest.normals[0], atol=1e-9)
+    titles = []
+    monkeypatch.setattr(SubFigure, "suptitle", lambda _, text: titles.append(text))
+    hand_plots.plot_wrench_space(
+        settled, wrist.linearised(), tmp_path / "hand.png", "a hand", wrist.hand.preload
+    )
+    assert "preload of 40, 50, 60, 45 N, wrist floating" in titles[0]
+    assert "linearised at rest" in titles[1]
 
 
 @pytest.mark.parametrize(

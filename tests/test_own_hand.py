@@ -293,6 +293,14 @@ BAD = {
         '[hand]\nmass = { value = 1.0, source = "assumed" }',
         "hand.mass: object missing required field unit; an entry is { value, unit, source, note",
     ),
+    "a source that is none": (
+        '[hand]\nmass = { value = 1.0, unit = "kg", source = "guess" }',
+        "hand.mass.source: must be one of paper, measured, calibrated, assumed, got 'guess'",
+    ),
+    "text for a number": (
+        '[hand]\nmass = { value = "a", unit = "kg", source = "assumed" }',
+        "hand.mass.value: must be a number or a list of numbers, got 'a'",
+    ),
     "a bare number": ("[hand]\nmass = 2.0\n", "hand.mass: expected object, got float"),
     "no section": ("mass = 2.0\n", "mass: a section of entries is needed"),
     "no TOML": ("[hand\n", "Expected"),
@@ -359,6 +367,14 @@ def test_the_file_has_the_last_word_over_the_stance(
     both = own_hand(THICK.replaced(own("hand", "mass", 4.6)))
     want = dispatch.plan(with_hand(request_for(mass=None), both))
     assert got["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
+
+
+def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixture[str]) -> None:
+    path = file(line("hand", "mass", 3.0))
+    assert run(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
+    assert f"one FILE at most, got {path}, {path}" in capfd.readouterr().err
+    assert run(["plan", "wall-300", "--hand", "front_left"]) == 2
+    assert "a FILE with numbers of a hand is wanted" in capfd.readouterr().err
 
 
 def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixture[str]) -> None:
@@ -498,8 +514,8 @@ SPOILT = [
     ),
     (
         {"hand": {"mass": {"value": 1.0, "unit": "kg", "source": "x" * 10**5}}},
-        "stance.hand.hand.mass",
-        "invalid enum value",
+        "stance.hand.hand.mass.source",
+        "must be one of paper, measured, calibrated, assumed",
     ),
     (
         {"hand": {"mass": {"value": 10**400, "unit": "kg", "source": "paper"}}},

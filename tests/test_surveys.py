@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from hand_models.row_layout import named_row
+from hand_models.wrench_space import Row
 from service.command import crux, run
+from service.surveys import failures_table
 
 STANCE = "wall-300-floating"
 
@@ -39,6 +42,59 @@ def test_the_search_prints_a_table():
     shown = searched("--hand", "rear_left", "--search", "5")
     assert f"of {5**6} poses" in shown
     assert "what lets go first" in shown
+    # one line a finger, and its counts add up
+    rows = {line.split()[0]: line.split()[1:] for line in shown.splitlines() if line.split()}
+    table = shown.partition("what lets go first")[2]
+    total = int(table.split("of ")[1].split()[0])
+    counted = [line.split()[-1] for line in table.splitlines()[1:] if line.strip()]
+    assert sum(int(count) for count in counted if count.isdigit()) == total
+    assert {"outer_left", "inner_left", "inner_right", "outer_right"} <= rows.keys()
+
+
+def test_counts_are_by_finger_and_tile():
+    rows = [
+        named_row("inner_left", "distal", "pull_off", "limit"),
+        named_row("inner_left", "distal", "shear", "limit"),
+        named_row("inner_left", None, "finger_shear", "limit"),
+        named_row("outer_right", "base", "shear", "limit"),
+        Row(None, None, "palm_shear", "limit", "palm_shear"),
+        None,
+    ]
+    table = failures_table(rows)
+    cells = list(zip(*(column.cells for column in table.columns), strict=True))
+    assert [column.header for column in table.columns] == ["", "finger", "base", "distal", "all"]
+    assert cells == [
+        ("outer_left", "-", "-", "-", "0"),
+        ("inner_left", "1", "-", "2", "3"),
+        ("inner_right", "-", "-", "-", "0"),
+        ("outer_right", "-", "1", "-", "1"),
+        ("palm shear", "", "", "", "1"),
+        ("a tile dragged backwards", "", "", "", "1"),
+    ]
+
+
+def test_a_floating_set_without_zero_shows_least_and_most(capsys):
+    arguments = ["wrench-space", STANCE, "--hand", "rear_left"]
+    assert run([*arguments, "--json"]) == 0
+    reply = json.loads(capsys.readouterr().out)
+    assert run(arguments) == 0
+    shown = capsys.readouterr().out
+    forces = np.array(reply["vertices"])[:, 0]
+    line = next(line.split() for line in shown.splitlines() if line.strip().startswith("fx N"))
+    np.testing.assert_allclose(
+        [float(cell) for cell in line[2:]], [forces.min(), forces.max()], atol=0.01
+    )
+    assert "zero is not in this set" in shown
+    assert "--search N finds what the hand really holds" in " ".join(shown.split())
+
+
+def test_a_set_with_zero_in_it_shows_what_is_carried_alone(capsys):
+    assert run(["wrench-space", "wall-300", "--hand", "front_left"]) == 0
+    shown = capsys.readouterr().out
+    line = next(line.split() for line in shown.splitlines() if line.strip().startswith("fz N"))
+    least, most, pure_least, pure_most = (float(cell) for cell in line[2:])
+    assert least <= pure_least < 0.0 < pure_most <= most
+    assert "zero is not" not in shown
 
 
 def test_a_fixed_hand_has_nothing_to_search(capsys):

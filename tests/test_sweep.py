@@ -20,6 +20,7 @@ from hand_models.studies.sweep import (
     sweep_grid,
 )
 from hand_models.studies.sweep_axis import Axis, Conditions
+from hand_models.studies.sweep_picture import entry_name
 from service.command import run
 
 CONDITIONS = Conditions(0.3, 46.0)
@@ -69,6 +70,8 @@ def test_every_entry_that_is_offered_does_something_or_is_read_with_reason(table
         Axis.parse("nothing.at_all=1:2:3", table, FINE)
     message = str(caught.value)
     assert "\n" not in message
+    listed = message.partition("known are ")[2].split(", ")
+    assert listed == sorted(listed)
     for name in ("finger.pulley_radii[2]", "gripper.contact_stiffness[0]", "tile.spring_stiffness"):
         assert name in message
     for name in ("tile.contact_stiffness", "palm.length", "gripper.pulley_radii"):
@@ -176,9 +179,11 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
         (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must not be that of --x"),
         (["--measure", "weight"], "--measure: 'weight': valid are shear, normal, moment, volume"),
         (["--surface", "moon"], "surface: unknown surface 'moon'; known are"),
-        (["--diameter", "-0.3"], "diameter: must be above 0 m"),
-        (["--diameter", "nan"], "diameter: must be above 0 m"),
-        (["--tension", "0"], "tension: must be above 0 N"),
+        (["--diameter", "-0.3"], "--diameter: must be from 0.02 to 10 m, got -0.3"),
+        (["--diameter", "300"], "--diameter: must be from 0.02 to 10 m, got 300"),
+        (["--diameter", "nan"], "--diameter: must be from 0.02 to 10 m, got nan"),
+        (["--tension", "0"], "--tension: must be above 0 and at most the tendon's 700 N"),
+        (["--tension", "701"], "--tension: must be above 0 and at most the tendon's 700 N"),
     ],
 )
 def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path, capsys):
@@ -204,3 +209,16 @@ def test_other_studies_refuse_the_options_of_a_sweep(option, value, tmp_path, ca
     assert run(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
     assert capsys.readouterr().err == f"crux: {option}: only the study sweep takes it, not fig06\n"
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("finger.pulley_radii[1]", "middle pulley radius"),
+        ("tile.engagement[2]", "distal engagement"),
+        ("gripper.base_half_spacing", "base half spacing"),
+        ("tendon.friction", "tendon friction"),
+    ],
+)
+def test_an_entry_has_a_name_in_words(entry, words):
+    assert entry_name(entry) == words

@@ -15,7 +15,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 import msgspec
 
@@ -35,6 +35,14 @@ Source = Literal["paper", "measured", "calibrated", "assumed"]
 
 ENTRY: Final = "{ value, unit, source, note (optional) }"
 """Form of an entry."""
+
+VALID: Final[Mapping[str, str]] = {
+    "value": "a number or a list of numbers",
+    "unit": "text",
+    "source": f"one of {', '.join(get_args(Source))}",
+    "note": "text",
+}
+"""What each part of an entry must be."""
 
 LONGEST_QUOTE: Final = 200
 """Characters of a complaint about an entry: it may quote it."""
@@ -188,10 +196,7 @@ def _quantity(raw: Any, field: str) -> Quantity:
     try:
         quantity = msgspec.convert(raw, Quantity)
     except msgspec.ValidationError as error:
-        complaint = shorten(str(error).replace("`", ""), LONGEST_QUOTE, placeholder=" …")
-        raise InvalidInputError(
-            f"{complaint[:1].lower()}{complaint[1:]}; an entry is {ENTRY}", field=field
-        ) from None
+        raise _refusal(raw, str(error), field) from None
     value = quantity.value
     numbers = enumerate(value) if isinstance(value, list) else [(None, value)]
     for i, number in numbers:
@@ -199,6 +204,18 @@ def _quantity(raw: Any, field: str) -> Quantity:
             place = f"{field}.value" if i is None else f"{field}.value[{i}]"
             raise InvalidInputError(f"must be finite, got {number}", field=place)
     return quantity
+
+
+def _refusal(raw: Any, complaint: str, field: str) -> InvalidInputError:
+    """Return the error of an entry that is no quantity, from msgspec's complaint about it."""
+    for name, valid in VALID.items():
+        # msgspec ends in the place of what is wrong
+        if isinstance(raw, Mapping) and f"`$.{name}" in complaint:
+            got = repr(raw[name])
+            got = got if len(got) <= LONGEST_QUOTE else f"{got[:LONGEST_QUOTE]} …"
+            return InvalidInputError(f"must be {valid}, got {got}", field=f"{field}.{name}")
+    said = shorten(complaint.replace("`", ""), LONGEST_QUOTE, placeholder=" …")
+    return InvalidInputError(f"{said[:1].lower()}{said[1:]}; an entry is {ENTRY}", field=field)
 
 
 def _bundled(name: str) -> ParameterTable:

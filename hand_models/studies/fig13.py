@@ -45,9 +45,6 @@ PER_AXIS: Final = 60
 DIRECTIONS: Final = 400
 """Of loads that are pulled until a tile lets go."""
 
-PULL_SHARE: Final = 0.8
-"""Of the study's time that these take."""
-
 PIECE_DIRECTIONS: Final = 48
 """Directions in which a list of linearised sets is made and tried."""
 
@@ -63,6 +60,11 @@ GRID: Final = 81
 STEPS: Final = 1000
 """Of the progress told."""
 
+SEARCHED: Final = 100
+PULLED: Final = 300
+LISTED: Final = 980
+"""Of these, done when the search ends, when the pulls do, and when the list of sets does."""
+
 SYMMETRIC: Final = 1e-6
 """Of its extents, by how much a hull may be off its mirror image."""
 
@@ -76,15 +78,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     diameter, tension = table.scalar("fig13", "diameter"), table.scalar("fig13", "tension")
     gripper = Gripper(diameter, tension, table=gripper_table(hand))
     unloaded(gripper)
-    searching = round((1.0 - PULL_SHARE) * STEPS)
-    found = search(gripper, PER_AXIS, lambda i, n: progress(searching * i // n, STEPS))
+    found = search(gripper, PER_AXIS, lambda i, n: progress(SEARCHED * i // n, STEPS))
     whole = in_paper_signs(found.wrenches)
     full, shown = vertices(whole), cut(whole)
     size = np.abs(shown).max(axis=0)
     held = whole[whole[:, 1] <= 0.0]
     directions = even_pulls(DIRECTIONS, size)
-    told = _told(progress, searching)
-    pulled = pull(gripper, directions, told)
+    pulled = pull(gripper, directions, _told(progress))
     over = np.linalg.norm(pulled.wrenches * UNITS, axis=1)
     filled = reach(full, pulled.wrenches / over[:, None]) / over
     force_x, moment = np.linspace(-1.0, 1.0, GRID) * size[0], np.linspace(-1.0, 1.0, GRID) * size[2]
@@ -113,7 +113,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         },
         "positive_moment": _positive_moment(full, force_x),
         "linearised": _linearised(gripper, full, size),
-        "linear_pieces": _linear_pieces(gripper, full, size),
+        "linear_pieces": _linear_pieces(gripper, full, size, progress),
         "not_tested": [
             "the 17 measured wrenches (dots) are printed in a picture only, so neither is the "
             "prediction error of 10 % on average",
@@ -125,11 +125,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     return StudyResult("fig13", "wrench space of the gripper on 300 mm", data, claims)
 
 
-def _told(progress: Progress, start: int) -> Callable[[Array], None]:
-    """Return what tells of pulls that are done, from a step on."""
+def _told(progress: Progress) -> Callable[[Array], None]:
+    """Return what tells of pulls that are done."""
 
     def tell(done: Array) -> None:
-        progress(start + int((STEPS - 1 - start) * done.mean()), STEPS)
+        progress(SEARCHED + int((PULLED - SEARCHED) * done.mean()), STEPS)
 
     return tell
 
@@ -180,7 +180,9 @@ def _positive_moment(points: Array, force_x: Array) -> dict[str, list[Any]]:
     return found
 
 
-def _linear_pieces(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
+def _linear_pieces(
+    gripper: Gripper, full: Array, size: Array, progress: Progress
+) -> dict[str, Any]:
     """Return a list of linearised sets, and its union's error in support against the hull.
 
     Half of the directions are those that the list was made for. Supports are from the wrench at
@@ -189,11 +191,13 @@ def _linear_pieces(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]
     ways = _sphere(PIECE_DIRECTIONS) / size
     directions = np.zeros((len(ways), 6))
     directions[:, PLANAR] = ways * (1.0, 1.0, -1.0)
-    found = pieces(gripper, directions[::2])
+    found = pieces(
+        gripper,
+        directions[::2],
+        progress=lambda i, n: progress(PULLED + (LISTED - PULLED) * i // n, STEPS),
+    )
     rest = gripper.evaluate(np.zeros((1, len(PLANAR)))).wrenches[0]
-    reached = [
-        max(linear_extreme(piece.space, d)[1] for piece in found.pieces) for d in directions
-    ]
+    reached = [max(linear_extreme(piece.space, d)[1] for piece in found.pieces) for d in directions]
     exact = (full @ ways.T).max(axis=0)
     off = (np.array(reached) - directions @ rest) / (exact - directions @ rest) - 1.0
     return {
@@ -310,7 +314,7 @@ def _draw_solid(axes: Any, points: Array) -> None:
         ylim=(low[2], high[2]),
         zlim=(low[1], 0.0),
     )
-    label_solid(axes, "hull, F_z ≤ 0 (upside down), the paper's signs")
+    label_solid(axes, "hull, F_z ≤ 0, F_z downward, the paper's signs")
 
 
 def _subdivided(faces: Array) -> Array:
@@ -329,6 +333,12 @@ def _draw_strength(axes: Any, data: dict[str, Any]) -> None:
     )
     axes.figure.colorbar(filled, ax=axes, label="largest pull-off, −F_z [N]")
     best = data["positive_moment"]
-    axes.plot(best["force_x"], best["best_moment"], color="tab:red", label="best M_y for each F_x")
+    # the line ends where the map does: its cells at the hull's edge are not drawn
+    drawn = np.isfinite(values)
+    columns = np.searchsorted(field["force_x"], best["force_x"])
+    above = np.clip(np.searchsorted(field["moment"], best["best_moment"]), 1, len(drawn) - 1)
+    inside = drawn[above, columns] & drawn[above - 1, columns]
+    line = np.where(inside, best["best_moment"], np.nan)
+    axes.plot(best["force_x"], line, color="tab:red", label="best M_y for each F_x")
     axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", title="pull-off strength")
     axes.legend(loc="upper left")

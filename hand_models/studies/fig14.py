@@ -340,7 +340,7 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
         top.set(xlabel="F_x [N]", ylabel="M_y [N·m]", ylim=(1.15 * low[2], 1.9 * high[2]))
         top.set_title(f"{name}: from above, planes of loading")
         side.set(xlabel="F_x [N]", ylabel="F_z [N]", title=f"{name}: from aside")
-        label_solid(solid, f"{name}: first failure (upside down)")
+        label_solid(solid, f"{name}: first failure, F_z downward")
         top.grid(alpha=0.3)
         side.grid(alpha=0.3)
         top.legend(fontsize=8, loc="upper left")

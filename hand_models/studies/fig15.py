@@ -308,6 +308,15 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
             fails = curve["closing_alone_fails_at"]
             if fails is not None:
                 axes.axvline(fails, color=colour, alpha=0.4, linestyle="--")
+                axes.annotate(
+                    name,
+                    (fails, 0.02),
+                    xycoords=axes.get_xaxis_transform(),
+                    xytext=(4.0, 0.0),
+                    textcoords="offset points",
+                    rotation=90.0,
+                    color=colour,
+                )
         axes.set(
             xlabel="tension of the tendons [N]; dashed: from there on closing alone fails",
             ylabel=f"{force} limit [N]",
@@ -318,7 +327,8 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
         axes.legend(title="diameter")
     shear, normal = figure.axes
     shear.set_title(
-        f"largest $F_x$ with $F_z \\leq 0$ at $F_x = {data['force_to_moment']:g}\\ M_y$"
+        f"largest $F_x$ with $F_z \\leq 0$ at $F_x = "
+        f"{data['force_to_moment']:g}\\,\\mathrm{{m^{{-1}}}}\\ M_y$"
     )
     normal.set_title("largest $-F_z$")
     figure.suptitle(data["surface"])

@@ -249,6 +249,5 @@ def _draw(maps: dict[str, dict[str, Any]]) -> Figure:
         for axes, (name, data) in zip(row, maps.items(), strict=True):
             draw_map(axes, data, measure)
             axes.set_title(f"{name}: {conditions_title(data['conditions'])}")
-            axes.set(xlabel="middle pulley radius [mm]", ylabel="distal pulley radius [mm]")
     legend(figure, list(maps.values()))
     return figure

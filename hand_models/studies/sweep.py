@@ -149,6 +149,7 @@ class Sweep:
                 )
         table = gripper_table(hand)
         conditions = self.conditions or Conditions.of_fig16()[0]
+        conditions.check(table)
         grasp = conditions.gripper(table)
         axes = list(radius_axes(table))
         for i, (text, option) in enumerate(((self.x, "--x"), (self.y, "--y"))):

@@ -42,6 +42,26 @@ class Conditions:
         tension = settings.scalar("fig16", "tension")
         return tuple(cls(d, tension) for d in settings.vector(PARAMETER_STUDIES, "diameters"))
 
+    def check(self, table: ParameterTable) -> None:
+        """Refuse a rock that no hand is made for, and a tension that the tendon does not bear.
+
+        Raises
+        ------
+        InvalidInputError
+            The field is the option that has the number.
+        """
+        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
+        if not least <= self.diameter <= most:
+            raise InvalidInputError(
+                f"must be from {least:g} to {most:g} m, got {self.diameter:g}", field="--diameter"
+            )
+        strongest = table.scalar("tendon", "maximum_tension")
+        if not 0.0 < self.tension <= strongest:
+            raise InvalidInputError(
+                f"must be above 0 and at most the tendon's {strongest:g} N, got {self.tension:g}",
+                field="--tension",
+            )
+
     def gripper(self, table: ParameterTable) -> Gripper:
         """Return a gripper of these numbers.
 
@@ -111,8 +131,9 @@ class Axis:
         known = _entries(table, surface)
         if entry not in known:
             like = difflib.get_close_matches(entry, known)
-            listed = ", ".join([*like, *(name for name in known if name not in like)])
-            raise InvalidInputError(f"the gripper reads no {entry!r}; known are {listed}")
+            hint = f"; did you mean {' or '.join(like)}?" if like else ""
+            listed = ", ".join(sorted(known))
+            raise InvalidInputError(f"the gripper reads no {entry!r}{hint}; known are {listed}")
         section, name, index = known[entry]
         old = table.quantity(section, name)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):

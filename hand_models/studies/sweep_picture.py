@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hand_models.finger import PHALANGES
 from hand_models.studies.force_limits import MEASURES, Measure
 
-__all__ = ["NO_GRASP", "conditions_title", "draw_map", "legend"]
+__all__ = ["NO_GRASP", "conditions_title", "draw_map", "entry_name", "legend"]
 
 NO_GRASP: Final = "no grasp"
 STATES: Final = {
@@ -23,6 +24,12 @@ STATES: Final = {
     NO_GRASP: ("0.6", "no such grasp"),
 }
 """Colour and legend of cells without limits."""
+
+OWN: Final = ("finger", "gripper")
+"""Sections whose entries need no more words than their own."""
+
+SINGULAR: Final = {"pulley_radii": "pulley radius"}
+"""Of entries that are lists of one number a phalanx, where their names are plurals."""
 
 SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
 """By SI unit, the scale and the unit that pictures have instead."""
@@ -34,6 +41,15 @@ def conditions_title(conditions: dict[str, Any]) -> str:
         f"{1e3 * conditions['diameter']:g} mm, tendons at {conditions['tension']:g} N, "
         f"{conditions['surface']}"
     )
+
+
+def entry_name(entry: str) -> str:
+    """Return an entry in words, such as ``middle pulley radius`` of ``finger.pulley_radii[1]``."""
+    section, _, name = entry.partition(".")
+    name, _, place = name.partition("[")
+    words = SINGULAR.get(name, name.replace("_", " "))
+    whose = PHALANGES[int(place[:-1])] if place else "" if section in OWN else section
+    return f"{whose} {words}".strip()
 
 
 def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
@@ -52,16 +68,16 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
     for side in (data["x"], data["y"]):
         scale, unit = SHOWN.get(side["unit"], (1.0, side["unit"]))
         sides.append((scale * np.array(side["values"]), scale * side["current"]))
-        labels.append(f"{side['entry']} [{unit}]")
+        labels.append(f"{entry_name(side['entry'])} [{unit}]")
     (x, current_x), (y, current_y) = sides
     mesh = axes.pcolormesh(x, y, values, cmap="YlOrRd", vmin=0.0, shading="nearest")
     for state, (colour, _) in STATES.items():
         if (states == state).any():
             shown = np.ma.masked_where(states != state, np.ones(states.shape))
             axes.pcolormesh(x, y, shown, cmap=ListedColormap([colour]), shading="nearest")
-    across, up = axes.get_xlim(), axes.get_ylim()
     axes.plot(current_x, current_y, "D", color="white", markeredgecolor="k", markersize=11)
-    axes.set(xlim=across, ylim=up)
+    # the range that was asked for: half of each cell at its ends is beyond
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     unit = MEASURES[measure]
     name = measure if measure == "volume" else f"{measure} limit"
     axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{unit}]")

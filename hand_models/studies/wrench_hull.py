@@ -40,6 +40,9 @@ PULL_OFF: Final = (0.0, 1.0, 0.0)
 LABEL_GAP: Final = 8.0
 """Between numbers and labels of three-dimensional axes [pt]."""
 
+CORNER: Final = 0.1
+"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
+
 
 class Extents(NamedTuple):
     """How far a set of wrenches goes: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
@@ -146,11 +149,16 @@ def _crossings(points: Array, height: Array) -> Array:
 
 
 def label_solid(axes: Any, title: str) -> None:
-    """Label three-dimensional axes (F_x, M_y, F_z), drawn upside down: pull-off is up."""
+    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
     axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(5))
         axis.labelpad = LABEL_GAP
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        corner = CORNER * (high - low)
+        ticks = MaxNLocator(4).tick_values(low, high)
+        axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
     axes.invert_zaxis()
     axes.set_box_aspect(None, zoom=0.85)
     axes.view_init(elev=25.0, azim=-50.0)
