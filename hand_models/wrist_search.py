@@ -319,7 +319,8 @@ def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array
     t : ndarray, shape (n, d)
         The last that hold.
     limiting : ndarray of int, shape (n,)
-        The limit row that is exceeded beyond; −1 where it is a hard row, or a phalanx is off its rock.
+        The limit row that is exceeded beyond; −1 where it is a hard row or a phalanx lost its
+        rock.
     """
     low = np.zeros(len(t))
     high = np.ones(len(t))

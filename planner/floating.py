@@ -29,6 +29,7 @@ from scipy.linalg import block_diag
 from hand_models.frames import Array
 from hand_models.wrench_space import SCALE
 from planner import program
+from planner.budget import Budget
 from planner.hand_sets import Hands, Measure, Point, Sets
 from planner.program import SLACK, Outcome
 
@@ -158,17 +159,20 @@ class _State(NamedTuple):
         return cls(point, sets, sets.measure(point.loads), error)
 
 
-def settle_wrists(hands: Hands, start: Point, most: int = ROUNDS) -> Settled:
+def settle_wrists(hands: Hands, start: Point, budget: Budget, most: int = ROUNDS) -> Settled:
     """Find the point of least utilisation, from a start and with the start's palm modes.
 
     Of several such points it is the one of about least effort. Where the search ends without proof,
-    the point is made exact there.
+    or its budget does, the point is made exact there.
     """
     now = _State.of(hands, start, START)
     within, penalty, stalled = START, PENALTY, 0
     duals, root, rounds = UNSOLVED, None, 0
     for rounds in range(1, most + 1):
+        if budget.ended:
+            break
         outcome = program.margin(now.sets.data)
+        budget.spend(2)
         if outcome.solved:
             if now.measure.exact(hands) and _gap(now, outcome) <= CLOSE:
                 return Settled("least", now.point, now.sets, outcome, rounds, now.error)
@@ -210,7 +214,7 @@ def settle_wrists(hands: Hands, start: Point, most: int = ROUNDS) -> Settled:
             if within < KINK:
                 break
             now = _State.of(hands, now.point, within)._replace(error=now.error)
-    return _made_exact(hands, now, rounds)
+    return _made_exact(hands, now, rounds, budget)
 
 
 def _repaired(hands: Hands, state: _State, within: float) -> _State:
@@ -241,11 +245,12 @@ def _repaired(hands: Hands, state: _State, within: float) -> _State:
     return _State.of(hands, replace(state.point, loads=moved), within, state.sets)
 
 
-def _made_exact(hands: Hands, start: _State, rounds: int) -> Settled:
+def _made_exact(hands: Hands, start: _State, rounds: int, budget: Budget) -> Settled:
     """Make the point exact at which a search ended without proof."""
     now = start = _State.of(hands, start.point, START)._replace(error=start.error)
     for _ in range(REPAIRS):
         outcome = program.margin(now.sets.data)
+        budget.spend()
         if now.measure.exact(hands) and outcome.solved:
             used = start.measure.utilisation
             if now.measure.utilisation - used <= GIVEN * max(1.0, used):

@@ -256,7 +256,8 @@ class _Program(ABC):
         """Solve; where the tuned settings fail, once more with the solver's own."""
         outcome = Outcome(False, "error", 0, float("nan"))
         for settings in (SETTINGS, CAREFUL):
-            with warnings.catch_warnings():
+            # a solve that diverges leaves loads whose squares overflow: its value is not finite
+            with warnings.catch_warnings(), np.errstate(over="ignore"):
                 warnings.simplefilter("ignore", UserWarning)
                 try:
                     self.problem.solve(solver=SOLVER, enforce_dpp=True, **settings)
@@ -266,7 +267,7 @@ class _Program(ABC):
             stats = self.problem.solver_stats
             iterations = int(stats.num_iters or 0) if stats else 0
             outcome = Outcome(False, self.problem.status, iterations, float("nan"))
-            if self.problem.status in SOLVED:
+            if self.problem.status in SOLVED and np.isfinite(self.problem.value):
                 return Outcome(
                     solved=True,
                     status=self.problem.status,

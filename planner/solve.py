@@ -21,6 +21,8 @@ from hand_models.hand import SettledHand
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_space import Row, WrenchSpace
 from planner import program
+from planner.budget import Budget
+from planner.continuation import PROGRAMS, LargestFactor, least_use, most_load
 from planner.explain import (
     LEAST_FACTOR,
     NO_FACTOR,
@@ -30,8 +32,8 @@ from planner.explain import (
     warnings,
 )
 from planner.floating import Settled
+from planner.floating_warnings import far_wrists, idle_preloads, strained_preloads
 from planner.hand_sets import Hands, widest_at_rest
-from planner.palm_choice import least_use, most_load
 from planner.plan import (
     Certificate,
     HandPlan,
@@ -239,7 +241,11 @@ class _Answer:
         self.parts = hands
         self.spaces, self.data = hands.sets(hands.at_rest(hands.idle))
         self.wrench = wrench
+        limbs = [hand.limb for hand in question.stance.hands]
+        self.idle_preloads = idle_preloads(limbs, settled, hands.wrists)
         self.search: Settled | None = None
+        self.budget = Budget(PROGRAMS)
+        self.known_factor: LargestFactor | None = None
         self.outcome: Outcome
         self.loads: tuple[Array, ...] = ()
         self.hands: tuple[HandPlan, ...] = ()
@@ -266,7 +272,7 @@ class _Answer:
 
     def _settle_wrists(self) -> None:
         """Find where floating wrists go, and take the plan there."""
-        self.search = least_use(self.parts)
+        self.search, self.known_factor = least_use(self.parts, self.budget)
         self.outcome = self.search.outcome
         if self.search.exact:
             self.spaces, self.data = self.search.sets
@@ -372,7 +378,7 @@ class _Answer:
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
             return
         if self.search is not None:
-            most = most_load(self.parts, self.search)
+            most = most_load(self.parts, self.search, self.known_factor, self.budget)
             if most is not None:
                 self.load_factor, self.least_factor = most.factor, not most.sure
             return
@@ -420,7 +426,9 @@ class _Answer:
             if self.parts.floating:
                 reason += "; floating hands as they give way where the search for a plan ended"
         elif self.search is not None:
-            reason = f"the floating wrists came to no balance in {self.search.rounds} rounds"
+            reason = "no pose of the floating wrists was found that balances the body"
+            if self.idle_preloads:
+                reason += f"; {self.idle_preloads[0]}"
         else:
             reason = f"the solver gave no usable answer ({self.outcome.status})"
         return Plan(
@@ -443,6 +451,11 @@ class _Answer:
 
     def _warnings(self) -> tuple[str, ...]:
         found = warnings(self.question.stance, self.settled)
+        limbs = [hand.limb for hand in self.question.stance.hands]
+        cap = self.question.limits.tendon_tension
+        found += (*self.idle_preloads, *strained_preloads(limbs, self.parts.wrists, cap))
+        if self.outcome.solved:
+            found += tuple(far_wrists(self.hands))
         if self.search is not None and self.search.found == "unproven":
             found += (UNPROVEN,)
         asked = "load_factor" in self.question.want and not self.unbounded

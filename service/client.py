@@ -109,7 +109,10 @@ class CruxClient:
             return self._read(reply.ok.payload, reply.ok.encoding, kind)
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
-            raise ServiceTimeout(f"no answer at {key} within {self.timeout:g} s")
+            raise ServiceTimeout(
+                f"no answer at {key} within {self.timeout:g} s; the service may be busy with "
+                "another question: allow it longer (--timeout)"
+            )
         detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
         raise ServiceError(detail.kind, detail.message, field=detail.field)
 

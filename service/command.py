@@ -101,14 +101,25 @@ def _check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> 
     return path
 
 
-def _read_hand(_: click.Context, __: click.Parameter, path: Path | None) -> ParameterTable | None:
-    return None if path is None else read_hand(path)
+def _read_hand(
+    _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
+) -> ParameterTable | None:
+    if not paths:
+        return None
+    if len(paths) > 1:
+        raise click.BadParameter(f"one FILE at most, got {', '.join(map(str, paths))}")
+    if paths[0].suffix != HAND_FILE and not paths[0].exists():
+        raise click.BadParameter(
+            f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
+        )
+    return read_hand(paths[0])
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
     "--hand",
     type=click.Path(path_type=Path),
+    multiple=True,
     callback=_read_hand,
     metavar="FILE",
     help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
@@ -141,10 +152,11 @@ def plan(stance: str, picture: Path | None, hand: ParameterTable | None, as_json
     from service import dispatch
 
     request = _with_extras(with_hand(read_request(stance), hand))
-    reply = dispatch.plan(request)
-    if picture is not None:
-        _draw_plan(request, picture)
-    bare = dispatch.plan(_without_palms(request))
+    with _waiting(f"planning {stance}", request):
+        reply = dispatch.plan(request)
+        if picture is not None:
+            _draw_plan(request, picture)
+        bare = dispatch.plan(_without_palms(request))
     if as_json:
         _say(msgspec.to_builtins(reply) | {"load_factor_without_palm": bare.load_factor})
     else:
@@ -248,10 +260,13 @@ def wrench_space(
     if picture is not None:
         from planner import hand_plots
 
-        settled, space = solve.hand_space(questions.stance(request.stance), limb)
-        shown = space if reply.vertices else None
+        drawn = questions.stance(request.stance)
+        settled, space = solve.hand_space(drawn, limb)
+        shown, preload = space if reply.vertices else None, None
+        if reply.wrist.mode == "floating":
+            preload = solve.floating_wrist(drawn, limb).hand.preload
         with _writing(picture):
-            hand_plots.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}")
+            hand_plots.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}", preload)
     if as_json:
         searched = {} if found is None else {"search": survey_json(found)}
         _say(msgspec.to_builtins(reply) | searched)
@@ -383,14 +398,36 @@ def _folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., An
 
 
 @contextmanager
-def _progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on standard error while the work lasts; yields what tells it done and total."""
+def _progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard error while the work lasts; yields what tells it done and total.
+
+    Where no bar can be shown, the line, if there is one, is written when the first step is told.
+    """
     from rich.progress import Progress
 
     screen = console(stderr=True)
+    lines = [line] if line is not None and not screen.is_terminal else []
     with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+        def tell(done: int, total: int) -> None:
+            if lines:
+                click.echo(lines.pop(), err=True)
+            bar.update(task, completed=done, total=total)
+
+        yield tell
+
+
+@contextmanager
+def _waiting(title: str, request: PlanRequest) -> Iterator[None]:
+    """Show on a terminal's standard error that hands with floating wrists take a while."""
+    screen = console(stderr=True)
+    slow = any(hand.wrist == "floating" for hand in request.stance.hands)
+    if slow and screen.is_terminal:
+        with screen.status(title):
+            yield
+    else:
+        yield
 
 
 @contextmanager
@@ -452,7 +489,8 @@ def study(
     """
     asked = chosen_study(name, **options)
     numbers = None if hand is None else own_hand(hand)
-    with _filling_folder(), _progress(name) as tell:
+    line = None if as_json else f"crux: study {name}: started; it may take minutes"
+    with _filling_folder(), _progress(name, line=line) as tell:
         result, files = studies.run_study(asked, folder, tell, numbers)
     if as_json:
         _say(studies.as_json(result) | {"files": [str(path) for path in files]})

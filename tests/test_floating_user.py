@@ -1,0 +1,176 @@
+"""Floating hands as a user asks for them: hard loads, bad preloads, far wrists, what is told."""
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+from rich.console import Console
+
+from hand_models.compliant_hand import CompliantHand
+from hand_models.floating_wrist import FloatingWrist
+from planner import continuation, program
+from planner.budget import Budget
+from planner.floating_warnings import far_wrists
+from planner.plan import Plan
+from planner.solve import plan, settle
+from planner.stance import Question
+from service import command
+from service.questions import question
+from service.requests import PlanRequest
+from service.stances import read_request
+
+REAR = ("rear_right", "rear_left")
+
+
+def request(limbs=REAR, preload=50.0, closing=None, **changes) -> PlanRequest:
+    """The bundled stance, these hands floating with one preload for all fingers [N]."""
+    bundled = read_request("wall-300-floating")
+    hands = []
+    for hand in bundled.stance.hands:
+        if hand.limb in limbs:
+            grasp = msgspec.structs.replace(hand.grasp, closing_tension=closing)
+            hand = msgspec.structs.replace(
+                hand, wrist="floating", tendon_preload=[preload] * 4, grasp=grasp
+            )
+        hands.append(hand)
+    stance = msgspec.structs.replace(bundled.stance, hands=hands)
+    return msgspec.structs.replace(bundled, stance=stance, **changes)
+
+
+SOLVED: list[int] = []
+"""How many programs the plan of `all_float` took."""
+
+
+@contextmanager
+def counted() -> Iterator[list[int]]:
+    """Count the programs that are solved."""
+    run, solved = program._Program._run, []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(program._Program, "_run", lambda self: solved.append(1) or run(self))
+        yield solved
+
+
+@cache
+def all_float() -> tuple[Question, Plan]:
+    """All four hands float."""
+    limbs = tuple(hand.limb for hand in read_request("wall-300-floating").stance.hands)
+    asked = question(request(limbs, want=["load_factor"]))
+    with counted() as solved:
+        answer = plan(asked)
+    SOLVED.append(len(solved))
+    return asked, answer
+
+
+def test_load_factor_is_no_less_than_a_smaller_load_proves():
+    asked, whole = all_float()
+    wrench = 0.75 * whole.body_wrench
+    part = plan(replace(asked, body_wrench=wrench, load=None))
+    assert part.load_factor > 1.0
+    assert whole.load_factor >= 0.75 * part.load_factor * (1.0 - 3e-3)
+
+
+@pytest.mark.parametrize("preload", [None, 80.0, 37.0])
+def test_utilisation_and_load_factor_agree(preload):
+    if preload is None:
+        _, answer = all_float()
+    else:
+        answer = plan(question(request(preload=preload, want=["load_factor"])))
+    assert answer.load_factor is not None
+    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + program.SLACK)
+
+
+def test_budget_ends_a_search(monkeypatch):
+    """With next to no programs left an answer comes at once, and is honest."""
+    asked, whole = all_float()
+    assert SOLVED[0] <= 1.2 * continuation.PROGRAMS
+    monkeypatch.setattr("planner.solve.PROGRAMS", 30)
+    with counted() as solved:
+        answer = plan(asked)
+    assert len(solved) <= 90 < SOLVED[0]
+    assert answer.status in ("overloaded", "failed", "infeasible")
+    if answer.utilisation is not None:
+        assert answer.utilisation >= whole.utilisation * (1.0 - 1e-6)
+
+
+def test_parts_of_a_budget_spend_the_whole():
+    whole = Budget(10)
+    part = whole.part(4)
+    part.spend(4)
+    assert part.ended
+    assert not whole.ended
+    other = whole.part(20)
+    other.spend(6)
+    assert other.ended
+    assert whole.ended
+
+
+def test_tension_that_a_slack_hand_needs_holds_its_tiles():
+    asked = question(request(preload=20.0))
+    answer = plan(asked)
+    assert answer.status != "optimal"
+    told = [text for text in answer.warnings if "tendon_preload of 20 N" in text]
+    assert [text.split(":")[0] for text in told] == list(REAR)
+    if answer.status == "failed":
+        assert told[0] in answer.reason
+    need = float(told[0].split("it needs about ")[1].split(" N")[0])
+    place = asked.stance.hands[1]
+    hand = settle(place, asked.stance)
+    for tension, holds in ((need + 1.0, True), (need - 1.0, False)):
+        loads = CompliantHand(hand, np.full(4, tension)).loads(np.zeros((1, 6)))
+        assert bool((loads.shears[0][hand.touching] >= -1e-6).all()) == holds
+
+
+def test_preload_that_alone_overloads_is_named():
+    asked = question(request(("rear_right", "rear_left"), preload=95.0, want=["load_factor"]))
+    answer = plan(asked)
+    told = [text for text in answer.warnings if "tendon_preload alone" in text]
+    place = asked.stance.hands[1]
+    wrist = FloatingWrist(CompliantHand(settle(place, asked.stance), place.tendon_preload))
+    used = wrist.judge(np.zeros((1, 6))).utilisation[0]
+    assert used > 1.0
+    assert f"utilisation {used:.3g} at rest" in told[0]
+    limits = replace(asked.limits, tendon_tension=60.0)
+    capped = plan(replace(asked, limits=limits, want=frozenset()))
+    assert any("tendon_preload of 95 N is above the limit of 60 N" in t for t in capped.warnings)
+
+
+def test_no_raw_warning_leaves():
+    asked = command._without_palms(request(preload=20.0, closing=20.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plan(question(asked))
+
+
+@pytest.mark.parametrize(
+    ("twist", "told"),
+    [
+        ([4e-3, 0, 0, 0, 0, 0], False),
+        ([0, 0, 10e-3, 0, 0, 0], True),
+        ([0, 0, 0, 0, 60e-3, 0], True),
+    ],
+)
+def test_far_wrist_is_told(twist, told):
+    _, answer = all_float()
+    hand = answer.hands[0]
+    hand = replace(hand, wrist=replace(hand.wrist, twist=np.array(twist, dtype=float)))
+    assert bool(list(far_wrists([hand]))) == told
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_wait_is_shown_on_terminals_alone(monkeypatch, capsys, terminal):
+    monkeypatch.setattr(
+        command,
+        "console",
+        lambda stderr=False: Console(file=sys.stderr, force_terminal=terminal, width=80),
+    )
+    with command._waiting("planning this", request()):
+        pass
+    captured = capsys.readouterr()
+    assert ("planning this" in captured.err) == terminal
+    assert captured.out == ""
