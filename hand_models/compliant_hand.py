@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.compliant_finger import STEP, CompliantFinger, FingerLoads
 from hand_models.errors import InvalidInputError, UnsupportedError
 from hand_models.finger import PHALANGES
-from hand_models.frames import Array, Indices
+from hand_models.frames import Array, Indices, skew
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.palm import share_load
 from hand_models.resettling import Numbers
@@ -214,8 +214,12 @@ class CompliantHand:
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
         v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
-        moved = [_moved(self.settled.positions[t], v, turn) @ across for t in self.tiles_of(i)]
-        return np.asarray(np.stack(moved, axis=-1) @ self._across[i].T)
+        places = self.settled.positions[self.tiles_of(i)]
+        # b · (v + ω × p + ω × (ω × p) / 2) for all places p at once
+        first = (v @ across)[:, None] + turn @ np.cross(places, across).T
+        square = (turn * turn).sum(axis=1)[:, None]
+        second = (turn @ across)[:, None] * (turn @ places.T) - square * (places @ across)
+        return np.asarray((first + 0.5 * second) @ self._across[i].T)
 
     def tiles_of(self, i: int) -> Indices:
         """Return the tiles of a finger."""
@@ -270,8 +274,10 @@ class CompliantHand:
 
 def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:
     """Return how far a place moves with the wrist, to second order in its turn, shape (m, 3)."""
-    first = np.cross(turn, place)
-    return np.asarray(v + first + 0.5 * np.cross(turn, first))
+    # ω × p, and ω × (ω × p) = ω (ω · p) − p (ω · ω)
+    first = turn @ skew(place)
+    square = (turn * turn).sum(axis=1)[:, None]
+    return np.asarray(v + first + 0.5 * ((turn @ place)[:, None] * turn - square * place))
 
 
 def _preload(preload: ArrayLike | None, settled: SettledHand) -> Array:
