@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike
 from hand_models.errors import EmptySetError
 from hand_models.frames import Array
 from hand_models.wrench_space import WrenchSpace
+from hand_models.wrist_box import search_box
 from hand_models.wrist_limit import farthest, linear_extreme
 from hand_models.wrist_pose import CompliantGrasp
-from hand_models.wrist_search import WristSearch, boundary, search_box
+from hand_models.wrist_search import WristSearch, boundary
 
 __all__ = ["Piece", "PieceList", "pieces"]
 

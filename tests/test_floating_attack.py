@@ -14,9 +14,10 @@ from hand_models.compliant_hand import CompliantHand
 from hand_models.errors import EmptySetError
 from hand_models.floating_wrist import FloatingWrist
 from hand_models.gripper import Gripper
+from hand_models.wrist_box import linear_box, search_box
 from hand_models.wrist_inverse import wrist_pose
 from hand_models.wrist_limit import farthest
-from hand_models.wrist_search import boundary, linear_box, search, search_box
+from hand_models.wrist_search import boundary, search
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 OPEN = Grasp(lateral=False, palm=False)

@@ -19,10 +19,11 @@ from hand_models.settling import settle
 from hand_models.spines import Surface
 from hand_models.tendon import FingerTendon
 from hand_models.wrench_space import SCALE
+from hand_models.wrist_box import search_box
 from hand_models.wrist_inverse import wrist_pose
 from hand_models.wrist_limit import farthest, linear_extreme
 from hand_models.wrist_pieces import pieces
-from hand_models.wrist_search import PLANAR, boundary, search, search_box
+from hand_models.wrist_search import PLANAR, boundary, search
 from tests.hands import HAND
 
 PINCH = Grasp(outer_rotation=math.pi)

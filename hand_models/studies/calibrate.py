@@ -30,7 +30,8 @@ from hand_models.parameters import ParameterTable, Quantity, experiment_table, h
 from hand_models.spines import Surface
 from hand_models.studies import Claim, Progress, StudyResult, save_picture
 from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
-from hand_models.wrist_search import boundary, linear_box
+from hand_models.wrist_box import linear_box
+from hand_models.wrist_search import boundary
 
 __all__ = ["plot", "run"]
 

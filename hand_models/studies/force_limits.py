@@ -20,8 +20,9 @@ from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.spines import Surface
 from hand_models.studies.wrench_hull import PULL_OFF, cut, in_paper_signs, volume
 from hand_models.wrench_space import Row
+from hand_models.wrist_box import search_box
 from hand_models.wrist_limit import Farthest, farthest
-from hand_models.wrist_search import PLANAR, boundary, search_box
+from hand_models.wrist_search import PLANAR, boundary
 
 __all__ = [
     "MEASURES",

@@ -10,9 +10,10 @@ from hand_models import Cylinder, Grasp, wrench_space
 from hand_models.compliant_hand import CompliantHand
 from hand_models.floating_wrist import FloatingWrist
 from hand_models.gripper import Gripper
+from hand_models.wrist_box import search_box
 from hand_models.wrist_inverse import wrist_pose
 from hand_models.wrist_limit import farthest
-from hand_models.wrist_search import search, search_box
+from hand_models.wrist_search import search
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
