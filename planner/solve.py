@@ -9,8 +9,6 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.optimize import linprog
 
 from hand_models.compliant_hand import CompliantHand
 from hand_models.errors import InvalidInputError, UnsupportedError
@@ -19,9 +17,10 @@ from hand_models.floating_wrist import FloatingWrist, PalmMode
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
-from hand_models.wrench_space import Row, WrenchSpace
+from hand_models.wrench_space import WrenchSpace
 from planner import program
 from planner.budget import Budget
+from planner.certificate import certify, limit_name
 from planner.continuation import PROGRAMS, LargestFactor, least_use, most_load
 from planner.explain import (
     LEAST_FACTOR,
@@ -45,7 +44,7 @@ from planner.plan import (
     Times,
     WristPlan,
 )
-from planner.program import LOAD_UNIT, SLACK, SOLVER, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.program import LOAD_UNIT, SLACK, SOLVER, WRENCH_UNIT, Outcome, StanceData
 from planner.reading import read_floating_hand, read_hand
 from planner.stance import HandOnHold, Question, Stance
 from planner.verify import problems
@@ -64,14 +63,8 @@ BINDING: Final = 1e-6
 ALIKE: Final = 5
 """Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
 
-BLOCKING: Final = 1e-6
-"""Multipliers of hard rows below this do not count as blocking a direction of unit length."""
-
 UNITS: Final = {"motor_torque": "N·m", "motor_current": "A"}
 """Of limits that are not in newtons."""
-
-CLOSE: Final = 0.1
-"""What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
 
 
 def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
@@ -314,7 +307,12 @@ class _Answer:
         if not nearest.solved:
             return
         if nearest.value > BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench))):
-            self.certificate = self._certify(nearest)
+            self.certificate = certify(
+                self.data,
+                [place.limb for place in self.question.stance.hands],
+                self.spaces,
+                nearest,
+            )
             if self.certificate is not None:
                 self.outcome = replace(self.outcome, solved=False)
         elif not self.outcome.solved and not self.parts.floating:
@@ -322,55 +320,6 @@ class _Answer:
             inside = program.body_wrench(self.data, nearest.loads)
             self.outcome = program.margin(StanceData(self.data.hands, inside))
             self._settle_tie()
-
-    def _certify(self, nearest: Outcome) -> Certificate | None:
-        """Return a checked proof that no loads at any utilisation give the body wrench.
-
-        With the direction d and multipliers λ ≥ 0 of the hard rows, every z with H z ≤ h has
-
-            d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h
-
-        over the box |z| ≤ X of `UNLIMITED`. The bound must be below d · W.
-        """
-        hands = self.data.hands
-        reached = program.body_wrench(self.data, nearest.loads)
-        missing = self.data.wrench - reached
-        direction, multipliers = _polish(
-            missing,
-            self.data.wrench - sum(hand.g for hand in hands),
-            np.hstack([hand.G for hand in hands]),
-            block_diag(*(hand.H for hand in hands)),
-            np.concatenate([hand.h for hand in hands]),
-        )
-        supremum = 0.0
-        blocking: list[tuple[float, LimitName]] = []
-        splits = np.cumsum([len(hand.h) for hand in hands])[:-1]
-        for place, space, hand, mine in zip(
-            self.question.stance.hands,
-            self.spaces,
-            hands,
-            np.split(multipliers, splits),
-            strict=True,
-        ):
-            leak = np.abs(hand.G.T @ direction - hand.H.T @ mine).sum() * UNLIMITED
-            supremum += float(direction @ hand.g + mine @ hand.h + leak)
-            hard_rows = space.rows[len(space.s) :]
-            blocking += [
-                (float(value), _name(place.limb, row))
-                for row, value in zip(hard_rows, mine, strict=True)
-                if value > BLOCKING
-            ]
-        needed = float(direction @ self.data.wrench)
-        if not supremum < needed:
-            return None
-        return Certificate(
-            direction=direction / WRENCH_UNIT,
-            supremum=supremum,
-            needed=needed,
-            shortfall=missing * WRENCH_UNIT,
-            nearest=reached * WRENCH_UNIT,
-            blocking=tuple(name for _, name in sorted(blocking, key=lambda pair: -pair[0])),
-        )
 
     def _find_load_factor(self) -> None:
         if not np.abs(self.data.wrench).max() > 1e-9:
@@ -503,7 +452,7 @@ class _Answer:
         held = utilisation <= 1.0 + SLACK
         for hand, space, y in zip(hands, self.spaces, self.loads, strict=True):
             for row, used in enumerate(space.utilisations(y)):
-                name = _name(hand.limb, space.rows[row])
+                name = limit_name(hand.limb, space.rows[row])
                 rank = (bool(used >= close), rank_of.get(name, 0), float(used))
                 if best is None or rank > best:
                     best, limiting = rank, name
@@ -527,7 +476,7 @@ class _Answer:
         ):
             for row, multiplier, capacity in zip(space.rows, duals, space.s, strict=False):
                 if multiplier > BINDING:
-                    name = _name(place.limb, row)
+                    name = limit_name(place.limb, row)
                     price = float(multiplier * self.outcome.value / capacity)
                     prices[name] = prices.get(name, 0.0) + price
                     worth[name] = worth.get(name, 0.0) + float(multiplier)
@@ -535,39 +484,3 @@ class _Answer:
             Price(name, prices[name], UNITS.get(name.limit, "N"))
             for name in sorted(worth, key=lambda name: -round(worth[name], ALIKE))
         )
-
-
-def _polish(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tuple[Array, Array]:
-    """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
-
-    A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error
-    of an interior-point solution would be magnified by a box as large as X.
-    """
-    rows, size = H.shape
-    length = float(np.linalg.norm(missing))
-    near = missing / length
-    # variables: d (6), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
-    one, none = np.eye(6), np.zeros((6, rows + 2 * size))
-    leak = np.eye(size)
-    result = linprog(
-        np.concatenate(
-            [-offset / length, np.full(6, CLOSE), h / length, np.full(2 * size, UNLIMITED / length)]
-        ),
-        A_ub=np.vstack([np.hstack([one, -one, none]), np.hstack([-one, -one, none])]),
-        b_ub=np.concatenate([near, -near]),
-        A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T, -leak, leak]),
-        b_eq=np.zeros(size),
-        bounds=[(-1.0, 1.0)] * 6 + [(0.0, None)] * (6 + rows + 2 * size),
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    if result.status != 0 or result.x is None:
-        return near, np.zeros(rows)
-    length = float(np.linalg.norm(result.x[:6]))
-    if length < BLOCKING:
-        return near, np.zeros(rows)
-    return result.x[:6] / length, np.maximum(result.x[12 : 12 + rows], 0.0) / length
-
-
-def _name(limb: str, row: Row) -> LimitName:
-    return LimitName(limb, row.finger, row.phalanx, row.limit)
