@@ -19,6 +19,7 @@ that stays.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from hand_models.frames import Array, Indices, skew
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.palm import share_load
 from hand_models.resettling import Numbers
-from hand_models.tendon import FingerTendon, TendonState
+from hand_models.tendon import FingerTendon
 from hand_models.tendon_regimes import MotorScheme
 
 __all__ = ["CompliantHand", "HandLoads"]
@@ -132,21 +133,16 @@ class CompliantHand:
         tension = float(self.preload[i])
         tendon = FingerTendon.from_table(hand.table, base_tile)
         shears = settled.loads[own, 0] @ np.array([1.0, tension])
-        losses = np.asarray((1.0 - hand.finger.friction) ** np.arange(len(shears)), dtype=float)
         stiffness = np.where(settled.touching[own], np.array(tendon.contact_stiffness), 0.0)
-        rest = np.zeros(len(shears))
         return CompliantFinger(
             settled.fingers[i],
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),
-            FingerTendon(
-                tendon.pulley_ratio,
-                tuple(stiffness.tolist()),
-                tendon.spring_stiffness,
-                tendon.pulley_radii,
-                max(tendon.friction, hand.tendon_friction),
-                tendon.entry_friction,
+            replace(
+                tendon,
+                contact_stiffness=tuple(stiffness.tolist()),
+                friction=max(tendon.friction, hand.tendon_friction),
             ),
-            TendonState(tension, tension * losses, shears, rest, rest),
+            tendon.closed(tension, shears),
             scheme,
         )
 

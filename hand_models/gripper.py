@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -25,7 +25,7 @@ from hand_models.row_layout import named_row
 from hand_models.sections import RoundSection
 from hand_models.settling import settle
 from hand_models.spines import Surface
-from hand_models.tendon import FingerTendon, TendonState
+from hand_models.tendon import FingerTendon
 from hand_models.tendon_regimes import MotorScheme
 from hand_models.wrench_space import Row, WrenchSpace
 from hand_models.wrist_pose import Evaluation, Verdict, range_rows
@@ -145,20 +145,17 @@ class Gripper:
                 f"the fingers do not lie on a surface of {1e3 * diameter:g} mm", field="diameter"
             )
         shears = finger.shears(tension) @ np.array([1.0, tension])
-        rest = np.zeros(len(PHALANGES))
-        losses = np.asarray((1.0 - model.friction) ** np.arange(len(PHALANGES)), dtype=float)
+        tendon = FingerTendon.from_table(table)
         self.finger = CompliantFinger(
             finger,
             self.section,
-            FingerTendon(
-                table.scalar("tile", "pulley_ratio"),
-                self.numbers.contact_stiffness,
-                table.scalar("tile", "spring_stiffness"),
-                model.pulley_radii,
-                max(table.scalar("tendon", "holding_friction"), model.friction),
-                self.numbers.entry_friction,
+            replace(
+                tendon,
+                contact_stiffness=self.numbers.contact_stiffness,
+                friction=max(table.scalar("tendon", "holding_friction"), tendon.friction),
+                entry_friction=self.numbers.entry_friction,
             ),
-            TendonState(tension, tension * losses, shears, rest, rest),
+            tendon.closed(tension, shears),
             scheme,
         )
         self._pieces = self.surface.pieces()

@@ -149,7 +149,6 @@ class _Extremes:
     def add(self, t: Array, wrenches: Array) -> None:
         """Take the outermost of some more."""
         scaled = (wrenches * SCALE)[:, self._components]
-        some: Indices = np.arange(len(t))
         if self._directions is not None:
             some = _outermost(scaled, self._directions)
         else:

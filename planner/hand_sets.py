@@ -232,7 +232,7 @@ def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
     for direction in np.vstack([np.eye(6), -np.eye(6)]):
         slope = -(direction @ space.generators) * TWIST_UNIT
         result = linprog(slope, A_ub=space.A * TWIST_UNIT, b_ub=space.b, bounds=(None, None))
-        if result.status != 0:
+        if result.status != 0 or result.x is None:
             continue
         twist = result.x * TWIST_UNIT
         exact = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from hand_models.floating_wrist import PalmMode
+from hand_models.floating_wrist import PALM_MODES, PalmMode
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from planner import program
 from planner.budget import Budget
@@ -21,14 +21,6 @@ from planner.hand_sets import Hands
 from planner.program import SLACK
 
 __all__ = ["NEARBY", "exchanged", "first_plan", "starts"]
-
-MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
-    (False, False): "off",
-    (True, False): "drags",
-    (False, True): "presses",
-    (True, True): "drags_and_presses",
-}
-"""By whether the palm drags, and whether it presses."""
 
 STARTS: Final = 5
 """Choices of modes from which a point is sought, if the first ones give none."""
@@ -71,13 +63,13 @@ def starts(hands: Hands, factor: float, budget: Budget) -> Iterator[Palms]:
     engaged = [i for i, modes in enumerate(choices) if modes is not None and len(modes) > 1]
     common: list[Palms] = [
         tuple(None if modes is None else (mode if mode in modes else "off") for modes in choices)
-        for mode in MODES.values()
+        for mode in PALM_MODES.values()
     ]
     common = list(dict.fromkeys(common))
     ranks = {palms: _rank(hands, palms, factor, budget) for palms in common}
     best = min(common, key=lambda palms: ranks[palms])
     for i in engaged:
-        others = [_with(best, i, mode) for mode in MODES.values()]
+        others = [_with(best, i, mode) for mode in PALM_MODES.values()]
         for palms in others:
             if palms not in ranks:
                 ranks[palms] = _rank(hands, palms, factor, budget)
@@ -122,10 +114,10 @@ def _turned(found: Settled) -> Iterator[Palms]:
     for i, (space, mode) in enumerate(zip(found.sets.spaces, palms, strict=True)):
         if mode is None:
             continue
-        drags, presses = next(key for key, value in MODES.items() if value == mode)
+        drags, presses = next(key for key, value in PALM_MODES.items() if value == mode)
         rows = space.rows[len(space.s) :]
         for row, multiplier in zip(rows, found.outcome.hard_duals[i], strict=True):
             if multiplier > HELD_BACK and row.limit == f"{PALM_SHEAR}_reversed":
-                yield _with(palms, i, MODES[not drags, presses])
+                yield _with(palms, i, PALM_MODES[not drags, presses])
             elif multiplier > HELD_BACK and row.limit == f"{PALM_PRESSING}_reversed":
-                yield _with(palms, i, MODES[drags, not presses])
+                yield _with(palms, i, PALM_MODES[drags, not presses])

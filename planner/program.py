@@ -37,6 +37,7 @@ import numpy as np
 from hand_models.floating_wrist import WRIST
 from hand_models.frames import Array
 from hand_models.wrench_space import WrenchSpace
+from hand_models.wrist_limit import pose_units
 
 __all__ = [
     "LOAD_UNIT",
@@ -59,7 +60,7 @@ SOLVER: Final = "CLARABEL"
 LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
 
-TWIST_UNIT: Final = np.array([1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2])
+TWIST_UNIT: Final = pose_units(WRIST)
 """Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
