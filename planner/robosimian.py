@@ -1,19 +1,23 @@
-"""RoboSimian: what the planner knows of the robot until joint angles come in."""
+"""Robots: RoboSimian, which is bundled, and those that a file describes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
+from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Pose
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
+from planner.robot_file import RobotDescription, RobotFile
+from planner.robot_model import RobotModel
 
-__all__ = ["Robot", "robosimian"]
+__all__ = ["Robot", "RobotFile", "load_robot", "robosimian", "robot_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,37 +31,55 @@ class Robot:
     mass : float
         With its hands [kg].
     com : ndarray, shape (3,)
-        Centre of mass in B [m].
+        Centre of mass in B while no joint angles are given [m].
     shoulders : mapping of str to ndarray, shape (3,)
-        By limb: where its first two joints meet, in B [m].
-    reach : float
-        Farthest that a limb's last link can be from its shoulder [m].
-    hand_in_link : ndarray, shape (3,)
-        Origin of H in the last link, axes parallel [m].
+        By limb: where it begins, which none of its joints moves, in B [m].
+    reaches : mapping of str to float
+        By limb: farthest that the link with the hand can be from the shoulder [m].
+    hand_in_link : mapping of str to Pose
+        By limb: H in the link that carries it.
     hand : SpinyHand
         The hand on every limb.
+    model : RobotModel
+        Kinematics and statics by joint angles.
+    torque_limits : mapping of str to ndarray, shape (n,)
+        By limb: what its joints bear, from the body outward [N·m].
     """
 
     name: str
     mass: float
     com: Array
     shoulders: Mapping[str, Array]
-    reach: float
-    hand_in_link: Array
+    reaches: Mapping[str, float]
+    hand_in_link: Mapping[str, Pose]
     hand: SpinyHand
+    model: RobotModel
+    torque_limits: Mapping[str, Array]
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Names of the limbs, in the order of the published model."""
+        """Names of the limbs, in the order of the robot's file."""
         return tuple(self.shoulders)
+
+    @property
+    def reach(self) -> float:
+        """The longest limb's reach [m]."""
+        return max(self.reaches.values())
+
+    def beyond(self, limb: str, hand_in_body: Pose) -> float:
+        """Return how far a hand's pose puts its link from the shoulder [m], less the limb's reach.
+
+        Above zero the pose is out of reach, and this is the distance that is missing.
+        """
+        link = hand_in_body @ self.hand_in_link[limb].inverse()
+        away = float(np.linalg.norm(link.position - self.shoulders[limb]))
+        return away - self.reaches[limb]
 
     def stretch(self, limb: str, hand_in_body: Pose) -> float:
         """Return how much of a limb's reach a hand's pose asks for; above 1 is out of reach."""
-        link = hand_in_body.position - hand_in_body.rotation @ self.hand_in_link
-        return float(np.linalg.norm(link - self.shoulders[limb])) / self.reach
+        return 1.0 + self.beyond(limb, hand_in_body) / self.reaches[limb]
 
 
-@lru_cache(maxsize=32)
 def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
     """Return RoboSimian with four SpinyHands, from ``parameters/robosimian.toml``, built once.
 
@@ -71,17 +93,69 @@ def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
     InvalidInputError
         If a number of the hand is missing or impossible.
     """
-    name = "robosimian.toml"
-    text = resources.files("planner.parameters").joinpath(name).read_text(encoding="utf-8")
-    table = ParameterTable.read(text, name)
+    return robot_of(_bundled(), hand_numbers)
+
+
+def load_robot(path: Path, hand_numbers: ParameterTable | None = None) -> Robot:
+    """Return the robot that a file describes; raises what `RobotFile.load` and `robot_of` raise."""
+    return robot_of(RobotFile.load(path), hand_numbers)
+
+
+@lru_cache(maxsize=32)
+def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Robot:
+    """Return the robot of a file's content, built once.
+
+    Parameters
+    ----------
+    file : RobotFile
+    hand_numbers : ParameterTable, optional
+        All numbers of its hands; the bundled ones by default.
+
+    Raises
+    ------
+    InvalidInputError
+        In one line that names the file and the entry, if one is unknown, missing or impossible, or
+        does not fit the URDF; or names a number of the hand.
+    """
     hand = spiny_hand(hand_numbers)
-    limbs = tuple(table.sections["shoulders"])
+    try:
+        described = RobotDescription.read(file.toml)
+        model = RobotModel(file.urdf, described.body, described.mounts, hand.mass)
+        torque_limits = {
+            limb: _per_joint(described.torque_limits[limb], model, limb) for limb in model.limbs
+        }
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), field=file.origin) from None
     return Robot(
-        name="robosimian",
-        mass=table.scalar("robot", "mass") + len(limbs) * hand.mass,
-        com=np.array(table.vector("robot", "com")),
-        shoulders={limb: np.array(table.vector("shoulders", limb)) for limb in limbs},
-        reach=table.scalar("limb", "reach"),
-        hand_in_link=np.array(table.vector("mount", "hand_in_link7")),
+        name=described.name,
+        mass=model.mass,
+        com=model.com({}) if described.com is None else np.array(described.com),
+        shoulders=model.shoulders,
+        reaches=model.reach,
+        hand_in_link={limb: mount.pose for limb, mount in described.mounts.items()},
         hand=hand,
+        model=model,
+        torque_limits=torque_limits,
     )
+
+
+def _per_joint(limits: tuple[float, ...], model: RobotModel, limb: str) -> Array:
+    """Return torque limits, one a joint; refuse a list of another length."""
+    joints = len(model.joint_names[limb])
+    if len(limits) not in (1, joints):
+        raise InvalidInputError(
+            f"one number is needed, or {joints}, one for each joint from the body outward, "
+            f"got {len(limits)}",
+            field=f"limbs.{limb}.torque_limit",
+        )
+    return np.broadcast_to(np.array(limits), joints).copy()
+
+
+@cache
+def _bundled() -> RobotFile:
+    folder = resources.files("planner.parameters")
+    toml, urdf = (
+        folder.joinpath(f"robosimian.{kind}").read_text(encoding="utf-8")
+        for kind in ("toml", "urdf")
+    )
+    return RobotFile("robosimian", toml, urdf, "robosimian.toml")
