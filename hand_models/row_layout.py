@@ -18,12 +18,21 @@ from hand_models.limit_pieces import HalfPlane
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row
 
-__all__ = ["HAND_LOAD", "PALM_PRESSING", "PALM_SHEAR", "RowLayout", "named_row", "row_layout"]
+__all__ = [
+    "HAND_LOAD",
+    "PALM_PRESSING",
+    "PALM_SHEAR",
+    "TENDON_TENSION",
+    "RowLayout",
+    "named_row",
+    "row_layout",
+]
 
 PALM_SHEAR = "palm_shear"
 PALM_PRESSING = "palm_pressing"
 HAND_LOAD = "hand_load"
-TENDON_LIMITS = ("tendon_tension", "motor_torque", "motor_current")
+TENDON_TENSION = "tendon_tension"
+TENDON_LIMITS = (TENDON_TENSION, "motor_torque", "motor_current")
 """Limits of each tendon, in the order of their rows."""
 
 

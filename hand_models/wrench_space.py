@@ -72,6 +72,8 @@ class Row(NamedTuple):
     kind : {'limit', 'hard'}
     label : str
         Unique in its set.
+    joint : str or None
+        Of the limb that carries the hand, where the limit is that joint's.
     """
 
     finger: str | None
@@ -79,6 +81,7 @@ class Row(NamedTuple):
     limit: str
     kind: Literal["limit", "hard"]
     label: str
+    joint: str | None = None
 
 
 class HalfSpaces(NamedTuple):

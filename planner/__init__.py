@@ -4,7 +4,9 @@ stance + question → WrenchSpace of every hand → conic program → solution �
 """
 
 from planner.plan import Plan
-from planner.solve import hand_space, plan
-from planner.stance import HandOnHold, Limits, Load, Question, Stance
+from planner.question import Limits, Load, Question
+from planner.settling import hand_space
+from planner.solve import plan
+from planner.stance import HandOnHold, Stance
 
 __all__ = ["HandOnHold", "Limits", "Load", "Plan", "Question", "Stance", "hand_space", "plan"]

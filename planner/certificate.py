@@ -1,128 +1,181 @@
-"""The proof that a body wrench cannot be had at any utilisation."""
+"""The proof that a body wrench cannot be had: at any utilisation, or within a cap on it.
+
+The limits at a cap are hard rows like any other, so both are one proof. Where a hand's own rows
+already contradict each other, or the wrench that it is given, the direction has no part for the
+body: whatever the body needs, there are no loads.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.optimize import linprog
 
 from hand_models.frames import Array
-from hand_models.wrench_space import Row, WrenchSpace
-from planner import program
-from planner.plan import Certificate, LimitName
-from planner.program import UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from hand_models.wrench_space import WrenchSpace
+from planner import program, stance_data
+from planner.barriers import HELD_WRENCH, System, ranked, vertex
+from planner.binding import Used
+from planner.irreducible import irreducible_set
+from planner.plan import Certificate
+from planner.program import UNLIMITED, Outcome
+from planner.stance_data import WRENCH_UNIT, StanceData
 
-__all__ = ["certify", "limit_name"]
+__all__ = ["Hindered", "certify", "certify_idle"]
 
 BLOCKING: Final = 1e-6
-"""Multipliers of hard rows below this do not count as blocking a direction of unit length."""
+"""A direction shorter than this, in the body's six components, is none."""
 
 CLOSE: Final = 0.1
 """What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
 
+CONTRADICTS: Final = 1e-7
+"""Rows of a hand that must be broken by more than this contradict each other."""
 
-def certify(
-    data: StanceData, limbs: Sequence[str], spaces: Sequence[WrenchSpace], nearest: Outcome
-) -> Certificate | None:
-    """Return a checked proof that no loads at any utilisation give the body wrench.
+DISTANT: Final = 1e-9
+"""Distance to the nearest body wrench below which there is nothing to prove."""
 
-    With the direction d and multipliers λ ≥ 0 of the hard rows, every z with H z ≤ h has
 
-        d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h
+class Hindered(NamedTuple):
+    """A stance whose loads do not balance.
 
-    over the box |z| ≤ X of `UNLIMITED`. The bound must be below d · W.
-
-    Parameters
+    Attributes
     ----------
     data : StanceData
     limbs : sequence of str
         Of the hands.
     spaces : sequence of WrenchSpace
         Their sets, for the rows' names.
-    nearest : Outcome
-        The loads that come nearest to the body wrench.
+    held : sequence of ndarray, shape (nb − 6, 6)
+        What the further rows of the balance take of each hand's wrench.
+    utilisation : float or None
+        The cap within which they do not; None: at any utilisation.
+    """
+
+    data: StanceData
+    limbs: Sequence[str]
+    spaces: Sequence[WrenchSpace]
+    held: Sequence[Array]
+    utilisation: float | None = None
+
+
+def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | None:
+    """Return a checked proof that no loads give the body wrench.
+
+    With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
+    `System.bound`; it must be below d · W.
+
+    Parameters
+    ----------
+    stance : Hindered
+    nearest : Outcome, optional
+        The loads that come nearest to the body wrench, with given wrenches of hands as they are
+        given; found here by default.
 
     Returns
     -------
     Certificate or None
         None if the bound proves nothing.
     """
-    hands = data.hands
-    reached = program.body_wrench(data, nearest.loads)
-    missing = data.wrench - reached
-    direction, multipliers = _polished(
-        missing,
-        data.wrench - sum(hand.g for hand in hands),
-        np.hstack([hand.G for hand in hands]),
-        block_diag(*(hand.H for hand in hands)),
-        np.concatenate([hand.h for hand in hands]),
-    )
-    supremum = 0.0
-    blocking: list[tuple[float, LimitName]] = []
-    splits = np.cumsum([len(hand.h) for hand in hands])[:-1]
-    for limb, space, hand, mine in zip(
-        limbs,
-        spaces,
-        hands,
-        np.split(multipliers, splits),
-        strict=True,
-    ):
-        leak = np.abs(hand.G.T @ direction - hand.H.T @ mine).sum() * UNLIMITED
-        supremum += float(direction @ hand.g + mine @ hand.h + leak)
-        hard_rows = space.rows[len(space.s) :]
-        blocking += [
-            (float(value), limit_name(limb, row))
-            for row, value in zip(hard_rows, mine, strict=True)
-            if value > BLOCKING
-        ]
-    needed = float(direction @ data.wrench)
-    if not supremum < needed:
+    data, limbs, spaces, held, cap = stance
+    system = System.of(data, limbs, spaces, held, cap)
+    if nearest is None:
+        nearest = program.nearest_body(data if cap is None else data.capped(cap))
+    missing: Array | None = None
+    if nearest.solved:
+        missing = data.wrench - stance_data.body_wrench(data, nearest.loads)
+        missing[6:] = 0.0
+        direction, multipliers = _polished(system, missing)
+    else:
+        found = _contradiction(system, limbs)
+        if found is None:
+            return None
+        direction, multipliers = found
+    if not system.proves(direction, multipliers):
         return None
+    weights = system.weights(direction, multipliers)
     return Certificate(
-        direction=direction / WRENCH_UNIT,
-        supremum=supremum,
-        needed=needed,
-        shortfall=missing * WRENCH_UNIT,
-        nearest=reached * WRENCH_UNIT,
-        blocking=tuple(name for _, name in sorted(blocking, key=lambda pair: -pair[0])),
+        utilisation=cap,
+        direction=direction[:6] / WRENCH_UNIT,
+        held={
+            limb: mine.T @ direction[6:] / WRENCH_UNIT
+            for limb, mine in zip(limbs, held, strict=True)
+            if mine.any()
+        },
+        supremum=system.bound(direction, multipliers),
+        needed=float(direction @ data.wrench),
+        shortfall=None if missing is None else missing[:6] * WRENCH_UNIT,
+        nearest=None if missing is None else (data.wrench - missing)[:6] * WRENCH_UNIT,
+        blocking=tuple(name for name in ranked(weights) if name.limit != HELD_WRENCH),
+        irreducible=irreducible_set(system, weights),
+        spaces=dict(zip(limbs, spaces, strict=True)),
     )
 
 
-def _polished(missing: Array, offset: Array, G: Array, H: Array, h: Array) -> tuple[Array, Array]:
+def certify_idle(used: Used, cap: float) -> Certificate:
+    """Return the proof that a joint of a limb without a hand bears more than a cap allows."""
+    return Certificate(
+        utilisation=cap,
+        direction=np.zeros(6),
+        held={},
+        supremum=cap - used.utilisation,
+        needed=0.0,
+        shortfall=None,
+        nearest=None,
+        blocking=(used.name,),
+        irreducible=(used.name,),
+        spaces={},
+    )
+
+
+def _contradiction(system: System, limbs: Sequence[str]) -> tuple[Array, Array] | None:
+    """Return d and λ that show that one hand's rows and given wrench have no loads, if so."""
+    for limb in limbs:
+        mine = [name for name in system.barriers if name.limb == limb]
+        found = system.least_violation(mine, balance=False)
+        if found is not None and found.size > CONTRADICTS:
+            return found.direction, found.multipliers
+    return None
+
+
+def _polished(system: System, missing: Array) -> tuple[Array, Array]:
     """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
 
     A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error
-    of an interior-point solution would be magnified by a box as large as X.
+    of an interior-point solution would be magnified by a box as large as X. The parts of d for
+    given wrenches are free.
     """
-    rows, size = H.shape
+    rows, size = system.H.shape
     length = float(np.linalg.norm(missing))
-    near = missing / length
-    # variables: d (6), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
-    one, none = np.eye(6), np.zeros((6, rows + 2 * size))
-    leak = np.eye(size)
-    result = linprog(
-        np.concatenate(
-            [-offset / length, np.full(6, CLOSE), h / length, np.full(2 * size, UNLIMITED / length)]
-        ),
-        A_ub=np.vstack([np.hstack([one, -one, none]), np.hstack([-one, -one, none])]),
-        b_ub=np.concatenate([near, -near]),
-        A_eq=np.hstack([G.T, np.zeros((size, 6)), -H.T, -leak, leak]),
-        b_eq=np.zeros(size),
-        bounds=[(-1.0, 1.0)] * 6 + [(0.0, None)] * (6 + rows + 2 * size),
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    nothing = np.zeros(len(missing)), np.zeros(rows)
+    if not length > DISTANT:
+        return nothing
+    near = missing[:6] / length
+    count, given = 6, len(missing) - 6
+    # variables: d (nb), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
+    one, leak = np.eye(count), np.eye(size)
+    none = np.zeros((count, rows + 2 * size))
+    free = np.zeros((count, given))
+    turn = np.full(count, CLOSE * length)
+    costs = [-system.goal, turn, system.h, np.full(2 * size, UNLIMITED)]
+    others = count + rows + 2 * size
+    low = np.concatenate([np.full(count, -1.0), np.full(given, -np.inf), np.zeros(others)])
+    high = np.concatenate([np.full(count, 1.0), np.full(given + others, np.inf)])
+    result = vertex(
+        np.concatenate(costs) / length,
+        (low, high),
+        np.vstack([np.hstack([one, free, -one, none]), np.hstack([-one, free, -one, none])]),
+        np.concatenate([near, -near]),
+        np.hstack([system.G.T, np.zeros((size, count)), -system.H.T, -leak, leak]),
+        np.zeros(size),
     )
-    if result.status != 0 or result.x is None:
-        return near, np.zeros(rows)
-    length = float(np.linalg.norm(result.x[:6]))
+    if result is None:
+        return nothing
+    direction = result.x[: count + given]
+    length = float(np.linalg.norm(direction[:count]))
     if length < BLOCKING:
-        return near, np.zeros(rows)
-    return result.x[:6] / length, np.maximum(result.x[12 : 12 + rows], 0.0) / length
-
-
-def limit_name(limb: str, row: Row) -> LimitName:
-    """Return the name of a row of a limb's hand."""
-    return LimitName(limb, row.finger, row.phalanx, row.limit)
+        return nothing
+    start = 2 * count + given
+    multipliers = np.maximum(result.x[start : start + rows], 0.0)
+    return direction / length, multipliers / length

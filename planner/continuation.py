@@ -100,7 +100,7 @@ def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | No
     choices = starts(hands, 1.0, budget)
     plan = first_plan(hands, 1.0, choices, budget.part(FIRST))
     most: LargestFactor | None = None
-    if not _held(plan) and np.abs(hands.wrench).max() > NO_WRENCH:
+    if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
         along = budget.part(ALONG)
         for way in _ways(hands, plan, along):
             if most is None or way.most.factor > most.factor:
@@ -208,7 +208,7 @@ def _way(hands: Hands, start: Settled, budget: Budget) -> _Way | None:
             sure = overloaded
             break
         assert now.outcome.balance_dual is not None
-        slope = -float(now.outcome.balance_dual @ hands.wrench)
+        slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
         aim = math.inf if used < 1.0 else 0.0
         if slope > SLOPE:
             aim = factor + (1.0 - used) / slope

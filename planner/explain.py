@@ -8,22 +8,31 @@ from typing import Final
 
 import numpy as np
 
+from hand_models.frames import Array
 from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.row_layout import HAND_LOAD
+from planner.barriers import HELD_WRENCH
+from planner.binding import Used
+from planner.hand_rows import FORCE_CAP, TENSION_CHANGE
 from planner.plan import Certificate, HandPlan, LimitName
-from planner.program import WRENCH_UNIT
 from planner.stance import Stance
+from planner.stance_data import JOINT_TORQUE, WRENCH_UNIT
 
 __all__ = [
     "LEAST_FACTOR",
     "NO_FACTOR",
     "UNPROVEN",
     "limit_sentence",
+    "overload_sentence",
     "shortfall_sentence",
     "warnings",
 ]
 
 NOTABLE: Final = 0.3
 """Components of what is missing are told from this part of the largest on."""
+
+FOREMOST: Final = 2
+"""So many of the barriers that leave no loads are told; the rest are counted."""
 
 MANNERS: Final = {
     "shear": " in shear",
@@ -33,6 +42,7 @@ MANNERS: Final = {
     "finger_shear": " in shear together",
     "nail_shear": " along its finger",
     "fingertip_force": " in pressing",
+    FORCE_CAP: " allowed",
 }
 """How a limit is loaded."""
 
@@ -42,6 +52,29 @@ BEARERS: Final = {
     "finger_shear": "tiles",
 }
 """What of a finger a limit is about; its tendon by default."""
+
+WHOLES: Final = {
+    HAND_LOAD: "the hand",
+    FORCE_CAP: "the hand",
+    HELD_WRENCH: "the hand",
+    JOINT_TORQUE: "its joints",
+}
+"""What of a hand or its limb a limit is about; its palm by default."""
+
+AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Components of a body wrench."""
+
+VERBS: Final = {
+    "motor_torque": ("gives", "give"),
+    "motor_current": ("draws", "draw"),
+    "finger_shear": ("carry", "carry"),
+    HAND_LOAD: ("holds", "hold"),
+    FORCE_CAP: ("exerts", "exert"),
+    JOINT_TORQUE: ("bears", "bear"),
+}
+"""What is done to a limit: it does, it would do; `CARRIES` by default."""
+
+CARRIES: Final = ("carries", "carry")
 
 BARRIERS: Final = {
     "slack_tendon": "cannot push",
@@ -54,8 +87,11 @@ BARRIERS: Final = {
     "palm_shear_reversed": "cannot drag the rock along +x of the hand",
     "palm_pressing_reversed": "cannot pull",
     "wrist_range": "goes no farther",
+    FORCE_CAP: "may exert no more that way",
+    TENSION_CHANGE: "may not change that much",
+    HELD_WRENCH: "must exert the wrench that it is given",
 }
-"""What a hard row forbids."""
+"""What a hard row or a cap forbids, or a given wrench demands."""
 
 
 UNPROVEN: Final = (
@@ -81,33 +117,37 @@ def _spoken(name: LimitName) -> str:
     if name.phalanx is not None:
         tile = "" if name.phalanx == NAIL else " tile"
         return f"{name.limb}: {name.phalanx}{tile} of {name.finger}"
+    if name.joint is not None:
+        return f"{name.limb}: joint {name.joint}"
     if name.finger is not None:
         return f"{name.limb}: {BEARERS.get(name.limit, 'tendon')} of {name.finger}"
-    return f"{name.limb}: {'the hand' if name.limit == 'hand_load' else 'palm'}"
+    return f"{name.limb}: {WHOLES.get(name.limit, 'palm')}"
 
 
 def _verb(limit: str, held: bool) -> str:
     """Say what is done to a limit, or would be."""
-    does, would_do = {
-        "motor_torque": ("gives", "give"),
-        "motor_current": ("draws", "draw"),
-        "finger_shear": ("carry", "carry"),
-        "hand_load": ("holds", "hold"),
-    }.get(limit, ("carries", "carry"))
+    does, would_do = VERBS.get(limit, CARRIES)
     return does if held else f"would {would_do}"
+
+
+def _barrier(limit: str) -> str:
+    """Say what a barrier forbids."""
+    if limit in BARRIERS:
+        return BARRIERS[limit]
+    return f"cannot {VERBS.get(limit, CARRIES)[1]} more{MANNERS.get(limit, '')}"
 
 
 def _spoken_load(limit: str, load: float) -> str:
     if limit == "motor_torque":
         return f"{1e3 * load:.3g} mN·m"
+    if limit == JOINT_TORQUE:
+        return f"{load:.3g} N·m"
     if limit == "motor_current":
         return f"{load:.3g} A"
     return f"{load:.0f} N" if abs(load) >= 10.0 else f"{load:.2g} N"
 
 
-def limit_sentence(
-    name: LimitName, load: float, capacity: float, hand: HandPlan, *, held: bool
-) -> str:
+def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
     """Say how much of a limit is used.
 
     A tile's force is told with what the tile would hold in that direction, not with the distances
@@ -115,28 +155,28 @@ def limit_sentence(
 
     Parameters
     ----------
-    name : LimitName
-    load, capacity : float
-        Of its row [N], [N·m] or [A].
-    hand : HandPlan
-        Whose limit it is.
+    used : Used
+        Load and capacity of its row [N], [N·m] or [A].
+    hand : HandPlan or None
+        Whose limit it is; None for a limb without a hand.
     held : bool
         Whether the plan is within its limits.
     """
+    name, load, capacity = used
     force = 0.0
-    if name.limit == "hand_load":
+    if name.limit == HAND_LOAD and hand is not None:
         fx, fy, fz = hand.wrench[:3]
         force = math.hypot(fx, fy, min(fz, 0.0))
-    elif name.limit in ("shear", "pull_off"):
+    elif name.limit in ("shear", "pull_off") and hand is not None:
         finger = next(f for f in hand.fingers if f.name == name.finger)
         tile = next(t for t in finger.tiles if t.phalanx == name.phalanx)
         pull = tile.normal if name.limit == "pull_off" else 0.0
         force = math.hypot(tile.shear, pull, tile.lateral)
     if force > 0.0 and load > 0.0:
         load, capacity = force, force * capacity / load
-    used, most = (_spoken_load(name.limit, value) for value in (load, capacity))
+    carried, most = (_spoken_load(name.limit, value) for value in (load, capacity))
     manner = MANNERS.get(name.limit, "")
-    return f"{_spoken(name)} {_verb(name.limit, held)} {used} of {most}{manner}"
+    return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
 
 
 def shortfall_sentence(certificate: Certificate, touching: bool) -> str:
@@ -145,21 +185,66 @@ def shortfall_sentence(certificate: Certificate, touching: bool) -> str:
     Parameters
     ----------
     certificate : Certificate
+        Of a body wrench that cannot be had at any utilisation.
     touching : bool
         Whether any hand touches rock at all.
     """
-    axes = ("fx", "fy", "fz", "mx", "my", "mz")
-    units = ("N",) * 3 + ("N·m",) * 3
-    size = np.abs(certificate.shortfall / WRENCH_UNIT)
-    order = [int(i) for i in np.argsort(-size) if size[i] >= NOTABLE * size.max()]
-    missing = ", ".join(f"{axes[i]} {certificate.shortfall[i]:+.3g} {units[i]}" for i in order)
+    names = certificate.irreducible
+    barriers = _barriers(certificate.blocking if names is None else names)
+    if certificate.shortfall is None:
+        return f"no loads at any utilisation, whatever the body needs: {barriers}"
+    missing = _missing(certificate.shortfall)
     sentence = f"no loads balance the body at any utilisation: missing {missing} (in B)"
     if not touching:
         return f"{sentence}; no hand touches rock"
-    if certificate.blocking:
-        first = certificate.blocking[0]
-        sentence += f"; {_spoken(first)} {BARRIERS.get(first.limit, first.limit)}"
-    return sentence
+    if names == ():
+        return f"{sentence}; these hands have no loads at all, of any sign, that give it"
+    return f"{sentence}; {barriers}" if barriers else sentence
+
+
+def overload_sentence(certificate: Certificate | None, *, floats: bool) -> str:
+    """Say what would be missing within the limits; nothing without a proof of it.
+
+    Parameters
+    ----------
+    certificate : Certificate or None
+        Of a body wrench that cannot be had within a cap on the utilisation.
+    floats : bool
+        Whether some hand floats.
+    """
+    if certificate is None:
+        return ""
+    if not certificate.spaces:
+        return "; it holds nothing on, so no plan changes that"
+    if certificate.shortfall is None:
+        barriers = _barriers(certificate.irreducible or certificate.blocking)
+        sentence = f"; whatever the body needs, no loads keep within all limits: {barriers}"
+    else:
+        cap = certificate.utilisation
+        within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
+        sentence = f"; {within} {_missing(certificate.shortfall)} (in B) would be missing"
+    return sentence + (", with floating hands as they give way at this plan" if floats else "")
+
+
+def _missing(shortfall: Array) -> str:
+    """Name the components of what is missing that matter, the largest first."""
+    units = ("N",) * 3 + ("N·m",) * 3
+    size = np.abs(shortfall / WRENCH_UNIT)
+    order = [int(i) for i in np.argsort(-size) if size[i] >= NOTABLE * size.max()]
+    return ", ".join(f"{AXES[i]} {shortfall[i]:+.3g} {units[i]}" for i in order)
+
+
+def _barriers(names: Sequence[LimitName]) -> str:
+    """Say what is in the way, the foremost first; a limb's name once in a row."""
+    told: list[str] = []
+    for i, name in enumerate(names[:FOREMOST]):
+        sentence = f"{_spoken(name)} {_barrier(name.limit)}"
+        again = i > 0 and names[i - 1].limb == name.limb
+        told.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)
+    more = len(names) - len(told)
+    if more:
+        told.append(f"and {more} more")
+    return ", ".join(told)
 
 
 def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:

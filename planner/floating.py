@@ -8,9 +8,10 @@ is the next point:
     ξ_k → sets at ξ_k → loads → ξ_{k+1} → … until the sets at ξ_k have nothing better than ξ_k.
 
 A set is exact where it is linearised, so balance, limits and hard rows *at the point* are those of
-the model itself, and so is the plan. Steps must lower the merit
+the model itself, and so is the plan. What is better is a goal's to say: less utilisation u, or less
+effort under a cap on it. Steps must lower the merit
 
-    u + ρ (|missing body wrench| + what hard rows are broken by),
+    value + ρ (|missing body wrench| + what hard rows are broken by + excess over the cap),
 
 once repaired, or are tried again in a narrower range: sequential programming with a trust region,
 an exact penalty and second-order corrections (Fletcher, Practical Methods of Optimization, ch. 14).
@@ -28,10 +29,11 @@ from scipy.linalg import block_diag
 
 from hand_models.frames import Array
 from hand_models.wrench_space import SCALE
-from planner import program
+from planner import stance_data
 from planner.budget import Budget
+from planner.floating_goals import RANK, Goal, LeastUse
 from planner.hand_sets import Hands, Measure, Point, Sets
-from planner.program import SLACK, Outcome
+from planner.program import Outcome
 
 __all__ = ["Settled", "settle_wrists"]
 
@@ -39,12 +41,9 @@ ROUNDS: Final = 40
 """Most rounds for one choice of palm modes."""
 
 
-TIDY: Final = 5
-"""Rounds that break ties by effort; later ones stay near the point and mind the sets' curvature."""
-
-
-NEAR: Final = 0.002
-"""Weight with which later rounds stay near the point, for one unit of z."""
+EARLY: Final = 5
+"""Rounds that go where the sets are best; later ones stay near the point and mind their curvature.
+"""
 
 
 START: Final = 4.0
@@ -63,11 +62,6 @@ SHRINK: Final = 0.3
 """By how much a range narrows where steps do not lower the merit."""
 
 
-PENALTY: Final = 10.0
-"""Least ρ: utilisation for what is missing of the body wrench, per `WRENCH_UNIT`. Twice the largest
-multiplier of the balance if that is more."""
-
-
 KINK: Final = 1e-3
 """Range in which only a kink spoils steps, in `TWIST_UNIT`."""
 
@@ -77,19 +71,11 @@ REPAIRS: Final = 12
 
 
 BESIDE: Final = 1e-5
-"""Room of hard rows that just hold, in `program.LOAD_UNIT`."""
+"""Room of hard rows that just hold, in `stance_data.LOAD_UNIT`."""
 
 
 GIVEN: Final = 1e-3
-"""How much utilisation those may cost, relative."""
-
-
-BINDING: Final = 1e-6
-"""Multipliers above this bind."""
-
-
-RANK: Final = 1e-8
-"""Relative size below which binding rows count as dependent."""
+"""How much of the goal's value those may cost, relative."""
 
 
 CLOSE: Final = 4e-6
@@ -119,7 +105,7 @@ class Settled:
     sets : Sets
         About it.
     outcome : Outcome
-        Of `program.Margin` on these sets; not solved where nothing was found.
+        Of the goal's program on these sets; not solved where nothing was found.
     rounds : int
     error : float
         Largest disagreement of a hand's wrench with the sets of the last step: forces, and moments
@@ -153,77 +139,81 @@ class _State(NamedTuple):
     error: float
 
     @classmethod
-    def of(cls, hands: Hands, point: Point, within: float, before: Sets | None = None) -> _State:
-        sets = hands.sets(point, within)
+    def of(
+        cls, hands: Hands, goal: Goal, point: Point, within: float, before: Sets | None = None
+    ) -> _State:
+        sets = hands.sets(point, within, goal.farthest)
         error = 0.0 if before is None else _disagreement(hands, before, sets, point.loads)
         return cls(point, sets, sets.measure(point.loads), error)
 
 
-def settle_wrists(hands: Hands, start: Point, budget: Budget, most: int = ROUNDS) -> Settled:
-    """Find the point of least utilisation, from a start and with the start's palm modes.
+def settle_wrists(
+    hands: Hands, start: Point, budget: Budget, most: int = ROUNDS, goal: Goal | None = None
+) -> Settled:
+    """Find the best point for a goal, from a start and with the start's palm modes.
 
-    Of several such points it is the one of about least effort. Where the search ends without proof,
-    or its budget does, the point is made exact there.
+    The goal is the least utilisation if none is given. Where the search ends without proof, or its
+    budget does, the point is made exact there.
     """
-    now = _State.of(hands, start, START)
-    within, penalty, stalled = START, PENALTY, 0
-    duals, root, rounds = UNSOLVED, None, 0
+    goal = LeastUse() if goal is None else goal
+    now = _State.of(hands, goal, start, START)
+    within, penalty, stalled = START, goal.least_penalty, 0
+    weights, root, rounds = UNSOLVED, None, 0
     for rounds in range(1, most + 1):
         if budget.ended:
             break
-        outcome = program.margin(now.sets.data)
+        outcome = goal.solve(now.sets.data)
         budget.spend(2)
         if outcome.solved:
-            if now.measure.exact(hands) and _gap(now, outcome) <= CLOSE:
+            if goal.exact(now.measure, hands) and _gap(goal, now, outcome) <= CLOSE:
                 return Settled("least", now.point, now.sets, outcome, rounds, now.error)
-            assert outcome.balance_dual is not None
-            penalty = max(penalty, 2.0 * float(np.abs(outcome.balance_dual).max()))
+            penalty = max(penalty, 2.0 * goal.dearest(outcome))
             step, stalled = outcome, 0
-            if rounds <= TIDY:
-                cap = outcome.value + SLACK * max(1.0, abs(outcome.value))
-                chosen = program.effort(now.sets.data, cap)
+            if rounds <= EARLY:
+                chosen = goal.first_step(now.sets.data, outcome, now.point.loads)
             else:
                 if root is None:
-                    weights = duals if duals.solved else outcome
-                    bent = hands.curvature(now.point, within, weights)
-                    root = _root(now.sets, weights, bent)
-                chosen = duals = program.curved(now.sets.data, root, now.point.loads)
+                    duals = weights if weights.solved else outcome
+                    root = goal.root(hands, now.point, now.sets, within, duals)
+                chosen = weights = goal.later_step(now.sets.data, root, now.point.loads)
             if chosen.solved:
                 step = chosen
         else:
             # no balance in this range: come as near as it lets
-            step = program.nearest(now.sets.data)
+            step = goal.restore(now.sets.data)
             if not step.solved or stalled > STALLED:
                 break
         size = hands.step(now.point, step.loads)
-        there = _State.of(hands, replace(now.point, loads=step.loads), within, now.sets)
-        before, after = now.measure.merit(penalty), there.measure.merit(penalty)
+        there = _State.of(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
+        before, after = (goal.merit(state.measure, penalty) for state in (now, there))
         if not outcome.solved:
             stalled += not after < before - 0.02 * abs(before)
         direct = after < before
         if outcome.solved and there.sets.finite and not direct:
-            there = _repaired(hands, there, within)
-            after = there.measure.merit(penalty)
+            there = _repaired(hands, goal, there, within)
+            after = goal.merit(there.measure, penalty)
         if hands.near_rest(there.point) and there.sets.finite and after < before:
+            if not direct and outcome.solved and goal.promised is not None:
+                direct = before - after >= goal.promised * (before - outcome.value)
             if direct and size > 0.8 * within:
                 within = min(WIDEN * within, WIDEST)
-                there = _State.of(hands, there.point, within)._replace(error=there.error)
+                there = _State.of(hands, goal, there.point, within)._replace(error=there.error)
             now, root = there, None
         else:
             within = SHRINK * min(within, size)
             if within < KINK:
                 break
-            now = _State.of(hands, now.point, within)._replace(error=now.error)
-    return _made_exact(hands, now, rounds, budget)
+            now = _State.of(hands, goal, now.point, within)._replace(error=now.error)
+    return _made_exact(hands, goal, now, rounds, budget)
 
 
-def _repaired(hands: Hands, state: _State, within: float) -> _State:
+def _repaired(hands: Hands, goal: Goal, state: _State, within: float) -> _State:
     """Return a point with less missing and broken, hardly moving: a second-order correction.
 
     The smallest step that balances, and puts hard rows that are broken on their limits; those that
     just hold stay as they are.
     """
-    data, loads = state.sets.data, state.point.loads
+    data, loads = goal.barriers(state.sets.data), state.point.loads
     if not state.sets.finite:
         return state
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
@@ -235,64 +225,38 @@ def _repaired(hands: Hands, state: _State, within: float) -> _State:
             block_diag(*(hand.H for hand in data.hands))[those],
         ]
     )
-    missing = data.wrench - program.body_wrench(data, loads)
+    missing = data.wrench - stance_data.body_wrench(data, loads)
     aims = np.concatenate([missing, np.minimum(room[those], 0.0)])
     step = np.linalg.lstsq(rows, aims, rcond=RANK)[0]
     parts = np.split(step, np.cumsum([len(x) for x in z])[:-1])
     moved = tuple(
         y + hand.unit * part for hand, y, part in zip(data.hands, loads, parts, strict=True)
     )
-    return _State.of(hands, replace(state.point, loads=moved), within, state.sets)
+    return _State.of(hands, goal, replace(state.point, loads=moved), within, state.sets)
 
 
-def _made_exact(hands: Hands, start: _State, rounds: int, budget: Budget) -> Settled:
+def _made_exact(hands: Hands, goal: Goal, start: _State, rounds: int, budget: Budget) -> Settled:
     """Make the point exact at which a search ended without proof."""
-    now = start = _State.of(hands, start.point, START)._replace(error=start.error)
+    now = start = _State.of(hands, goal, start.point, START)._replace(error=start.error)
     for _ in range(REPAIRS):
-        outcome = program.margin(now.sets.data)
+        outcome = goal.solve(now.sets.data)
         budget.spend()
-        if now.measure.exact(hands) and outcome.solved:
-            used = start.measure.utilisation
-            if now.measure.utilisation - used <= GIVEN * max(1.0, used):
+        if goal.exact(now.measure, hands) and outcome.solved:
+            value = goal.value(start.measure)
+            if goal.value(now.measure) - value <= GIVEN * max(1.0, value):
                 return Settled("unproven", now.point, now.sets, outcome, rounds, now.error)
             break
-        before, now, rounds = now, _repaired(hands, now, START), rounds + 1
-        lost, left = (s.measure.missing + s.measure.broken for s in (before, now))
+        before, now, rounds = now, _repaired(hands, goal, now, START), rounds + 1
+        lost, left = (goal.wrong(state.measure) for state in (before, now))
         if not now.sets.finite or not left < 0.5 * lost:
             break
     return Settled("nothing", start.point, start.sets, UNSOLVED, rounds, start.error)
 
 
-def _gap(state: _State, outcome: Outcome) -> float:
-    """Return how far a point is above the least utilisation of its sets, relative."""
-    used = state.measure.utilisation
-    return (used - outcome.value) / max(1.0, used)
-
-
-def _root(sets: Sets, duals: Outcome, curvature: Array) -> Array:
-    """Return R for `program.Curved`, shape (M, M).
-
-    RᵀR is the curvature where the binding rows leave room, as far as it bends toward more (the
-    rest of it has no part in the solution, and need not be convex), and `NEAR`² everywhere.
-    """
-    hands = sets.data.hands
-    limits = block_diag(*(hand.L for hand in hands))
-    shares = np.concatenate(duals.limit_duals)
-    hard = block_diag(*(hand.H for hand in hands))
-    binding = np.concatenate(duals.hard_duals) > BINDING
-    normal = np.vstack(
-        [
-            np.hstack([hand.G for hand in hands]),
-            limits[shares > BINDING] - shares @ limits / max(float(shares.sum()), BINDING),
-            hard[binding],
-        ]
-    )
-    _, sizes, axes = np.linalg.svd(normal)
-    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
-    across, along = axes[:rank], axes[rank:]
-    values, turns = np.linalg.eigh(along @ curvature @ along.T)
-    roots = np.sqrt(np.maximum(values, 0.0) + NEAR**2)
-    return np.vstack([NEAR * across, roots[:, None] * (turns.T @ along)])
+def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
+    """Return how far a point is above the best of its sets, relative."""
+    value = goal.value(state.measure)
+    return (value - outcome.value) / max(1.0, value)
 
 
 def _disagreement(hands: Hands, sets: Sets, there: Sets, loads: Sequence[Array]) -> float:

@@ -13,14 +13,15 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
 from hand_models.floating_wrist import FloatingWrist, PalmMode
 from hand_models.frames import Array
 from hand_models.wrench_space import SCALE, WrenchSpace
-from planner import program
-from planner.program import TWIST_UNIT, HandData, Outcome, StanceData
+from planner import stance_data
+from planner.hand_rows import AddedRows
+from planner.program import Outcome
+from planner.stance_data import TWIST_UNIT, WRIST_RANGE, HandData, StanceData
 
 __all__ = ["Hands", "Measure", "Point", "Sets", "slopes_of", "widest_at_rest"]
 
@@ -37,7 +38,7 @@ BALANCED: Final = 2e-8
 
 
 UNBROKEN: Final = 1e-8
-"""By how much hard rows of an exact point may be broken, in `program.LOAD_UNIT`."""
+"""By how much hard rows of an exact point may be broken, in `stance_data.LOAD_UNIT`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,20 +71,20 @@ class Measure(NamedTuple):
         Sum of the components of the body wrench that are missing, scaled.
     broken : float
         By how much hard rows are broken at most, scaled; not below zero.
+    effort : float
+        What `program.Effort` makes least: the sum of squared relative tensions and joint torques,
+        and of fixed hands a little of what makes their other loads unique.
     """
 
     utilisation: float
     missing: float
     broken: float
+    effort: float
 
     def exact(self, hands: Hands) -> bool:
         """Whether nothing is missing, and nothing broken."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
         return self.missing <= BALANCED * size and self.broken <= UNBROKEN
-
-    def merit(self, penalty: float) -> float:
-        """Return the utilisation, and ρ for what is missing or broken."""
-        return self.utilisation + penalty * (self.missing + self.broken)
 
 
 class Sets(NamedTuple):
@@ -94,13 +95,14 @@ class Sets(NamedTuple):
 
     def measure(self, loads: Sequence[Array]) -> Measure:
         """Return what loads do, exact for those of the point."""
-        used, broken = -math.inf, 0.0
+        used, broken, effort = -math.inf, 0.0, 0.0
         for hand, y in zip(self.data.hands, loads, strict=True):
             z = y / hand.unit
             used = max(used, float((hand.L @ z + hand.l0).max()))
             broken = max(broken, float((hand.H @ z - hand.h).max(initial=0.0)))
-        missing = program.body_wrench(self.data, loads) - self.data.wrench
-        return Measure(used, float(np.abs(missing).sum()), broken)
+            effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum((hand.rest * z) ** 2))
+        missing = stance_data.body_wrench(self.data, loads) - self.data.wrench
+        return Measure(used, float(np.abs(missing).sum()), broken, effort)
 
     @property
     def finite(self) -> bool:
@@ -124,8 +126,15 @@ class Hands:
         Ad(B←H).
     reaches : tuple of ndarray or None
         Of `HandData.of`.
-    wrench : ndarray, shape (6,)
-        The body wrench, in `WRENCH_UNIT`.
+    wrench : ndarray, shape (nb,)
+        What the balance is to give: the body wrench, in `WRENCH_UNIT`, and components of hands'
+        wrenches that are given.
+    held : tuple of ndarray, shape (nb − 6, 6)
+        Of `HandData.of`.
+    added : tuple of AddedRows
+        What the stance adds to each hand's set; `spaces` have it already. Joints and their
+        Jacobians are those at which the hand rests: a floating wrist that gives way by a
+        millimetre or some ten milliradians hardly moves them.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -133,6 +142,8 @@ class Hands:
     transports: tuple[Array, ...]
     reaches: tuple[Array | None, ...]
     wrench: Array
+    held: tuple[Array, ...]
+    added: tuple[AddedRows, ...]
 
     @property
     def floating(self) -> bool:
@@ -143,9 +154,9 @@ class Hands:
     def _fixed(self) -> tuple[HandData, ...]:
         """Data of hands with a fixed wrist; of floating ones a place to fill."""
         return tuple(
-            HandData.of(space, transport, reach)
-            for space, transport, reach in zip(
-                self.spaces, self.transports, self.reaches, strict=True
+            HandData.of(space, transport, reach, held)
+            for space, transport, reach, held in zip(
+                self.spaces, self.transports, self.reaches, self.held, strict=True
             )
         )
 
@@ -159,24 +170,50 @@ class Hands:
         loads = [np.zeros(len(space.columns)) for space in self.spaces]
         return Point(tuple(loads), tuple(palms))
 
-    def sets(self, point: Point, within: float | None = None) -> Sets:
-        """Return the sets about a point, within a range in `TWIST_UNIT` if it is given."""
+    def sets(
+        self,
+        point: Point,
+        within: float | None = None,
+        farthest: Sequence[Array] | None = None,
+    ) -> Sets:
+        """Return the sets about a point.
+
+        Parameters
+        ----------
+        point : Point
+        within : float, optional
+            A range about it for wrists, in `TWIST_UNIT`; by default as far as the rows let.
+        farthest : sequence of ndarray, shape (6,), optional
+            With a range, how far from rest each wrist's twist may be [m, rad].
+        """
         reach = None if within is None else within * TWIST_UNIT
         spaces, data = list(self.spaces), list(self._fixed)
         for i, (wrist, y, palm) in enumerate(
             zip(self.wrists, point.loads, point.palms, strict=True)
         ):
             if wrist is not None:
-                spaces[i] = wrist.linearised(y, palm, reach)
-                data[i] = HandData.of(spaces[i], self.transports[i])
-        return Sets(tuple(spaces), StanceData(tuple(data), self.wrench * point.factor))
+                space = wrist.linearised(y, palm, reach)
+                if farthest is not None:
+                    space = _near_rest(space, farthest[i])
+                spaces[i] = self.added[i].on(space)
+                part = HandData.of(spaces[i], self.transports[i], held=self.held[i])
+                # where a wrist is costs nothing by itself
+                data[i] = part._replace(rest=np.zeros(len(part.rest)))
+        return Sets(tuple(spaces), StanceData(tuple(data), self.goal(point.factor)))
 
-    def curvature(self, point: Point, within: float, duals: Outcome) -> Array:
-        """Return the curvature of the rows of all hands, weighed by multipliers, (M, M).
+    def goal(self, factor: float) -> Array:
+        """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
+        return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])
 
-        ∂²(λ·L + μ·H + ν·G)/∂z², by differences of slopes; zero for fixed wrists.
+    def curvature(
+        self, point: Point, within: float, duals: Outcome, efforts: Sequence[Array] | None = None
+    ) -> list[Array]:
+        """Return the curvature of each hand's rows, weighed by multipliers, shape (m, m).
+
+        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
+        of the rows of effort are none by default.
         """
-        slopes = slopes_of(self.sets(point, within), duals)
+        slopes = slopes_of(self.sets(point, within), duals, efforts)
         bent = [np.zeros((len(slope), len(slope))) for slope in slopes]
         for j, unit in enumerate(TWIST_UNIT):
             aside = replace(
@@ -186,11 +223,10 @@ class Hands:
                     for wrist, y in zip(self.wrists, point.loads, strict=True)
                 ),
             )
-            for i, slope in enumerate(slopes_of(self.sets(aside, within), duals)):
+            for i, slope in enumerate(slopes_of(self.sets(aside, within), duals, efforts)):
                 if self.wrists[i] is not None:
                     bent[i][j] = (slope - slopes[i]) / DIFFERENCE
-        curvature = np.nan_to_num(block_diag(*bent))
-        return np.asarray(0.5 * (curvature + curvature.T))
+        return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: Point) -> bool:
         """Whether no wrist is farther from rest than a small twist."""
@@ -206,14 +242,24 @@ class Hands:
         return max(moved, default=0.0)
 
 
-def slopes_of(sets: Sets, duals: Outcome) -> list[Array]:
-    """Return Lᵀλ + Hᵀμ + Gᵀν of each hand, shape (m,)."""
+def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
+    """Return a set whose wrist, within its range, is also so far from rest at most [m, rad]."""
+    ranges = np.array([row.limit == WRIST_RANGE for row in space.rows[len(space.s) :]])
+    # rows of a range are ±ξ over its half width, in each component
+    most = np.abs(space.H) @ farthest
+    return replace(space, h=np.where(ranges, np.minimum(space.h, most), space.h))
+
+
+def slopes_of(sets: Sets, duals: Outcome, efforts: Sequence[Array] | None = None) -> list[Array]:
+    """Return Lᵀλ + Hᵀμ + Gᵀν + Eᵀε of each hand, shape (m,)."""
     balance = duals.balance_dual
     assert balance is not None
+    hands = sets.data.hands
+    weights = [np.zeros(len(hand.e0)) for hand in hands] if efforts is None else efforts
     return [
-        hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance
-        for hand, limit, hard in zip(
-            sets.data.hands, duals.limit_duals, duals.hard_duals, strict=True
+        hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance + hand.E.T @ effort
+        for hand, limit, hard, effort in zip(
+            hands, duals.limit_duals, duals.hard_duals, weights, strict=True
         )
     ]
 

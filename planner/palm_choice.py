@@ -17,6 +17,7 @@ from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from planner import program
 from planner.budget import Budget
 from planner.floating import ROUNDS, Settled, settle_wrists
+from planner.floating_goals import Goal, LeastUse
 from planner.hand_sets import Hands
 from planner.program import SLACK
 
@@ -32,7 +33,7 @@ EXCHANGES: Final = 6
 """Most trials of a palm the other way."""
 
 HELD_BACK: Final = 1e-6
-"""Multiplier above which a palm's mode holds it back, in utilisation per `program.LOAD_UNIT`."""
+"""Multiplier above which a palm's mode holds it back, of the goal per `stance_data.LOAD_UNIT`."""
 
 UNBALANCED: Final = 1e6
 """Rank of a choice without balance at rest, beside what is missing."""
@@ -93,17 +94,22 @@ def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
     return (*palms[:i], mode, *palms[i + 1 :])
 
 
-def exchanged(hands: Hands, found: Settled, budget: Budget) -> Settled:
-    """Return a better point that is had by turning palms that their mode holds back."""
+def exchanged(hands: Hands, found: Settled, budget: Budget, goal: Goal | None = None) -> Settled:
+    """Return a better point that is had by turning palms that their mode holds back.
+
+    The goal is the least utilisation if none is given.
+    """
+    goal = LeastUse() if goal is None else goal
     tried: set[Palms] = {found.point.palms}
     for _ in range(EXCHANGES):
         new = next((p for p in _turned(found) if p not in tried), None)
         if new is None or budget.ended:
             break
         tried.add(new)
-        there = settle_wrists(hands, replace(found.point, palms=new), budget, NEARBY)
-        lower = found.measure.utilisation - SLACK * max(1.0, found.measure.utilisation)
-        if there.exact and there.measure.utilisation < lower:
+        there = settle_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
+        value = goal.value(found.measure)
+        lower = value - SLACK * max(1.0, value)
+        if there.exact and goal.value(there.measure) < lower:
             found = there
     return found
 

@@ -5,13 +5,18 @@ wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give
 
     Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W.                                              (balance)
 
-Five programs share these rows:
+Below these six rows the balance has one for each component of a hand's wrench that is given
+(`held`). What joints, caps and largest changes of tension say are rows of the hands' sets.
+
+Seven programs share these rows:
 
 =============  =============================================================================
 `Margin`       min u                              least utilisation; its duals are the prices
 `Curved`       min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
-`Effort`       min Σ (tension / maximum)²         the tie-break, at the least utilisation
+`TieBreak`     min Σ (tension / maximum)²         among plans of least utilisation
+`Effort`       min Σ ‖E z + e₀‖²                  relative tensions and torques, under a cap
 `LoadFactor`   max s with s W in place of W       at utilisation 1
+`Reach`        max c·t with W + B t for W         how far body wrenches go, under a cap
 `Nearest`      min ‖S (W − Σ …)‖                  hard rows alone, loads up to `UNLIMITED`
 =============  =============================================================================
 
@@ -34,49 +39,29 @@ from typing import Any, Final, NamedTuple, Self
 import cvxpy as cp
 import numpy as np
 
-from hand_models.floating_wrist import WRIST
 from hand_models.frames import Array
-from hand_models.wrench_space import WrenchSpace
-from hand_models.wrist_limit import pose_units
+from planner.stance_data import Shape, StanceData
 
 __all__ = [
-    "LOAD_UNIT",
     "SOLVER",
-    "TWIST_UNIT",
-    "WRENCH_UNIT",
     "Curved",
     "Effort",
-    "HandData",
     "LoadFactor",
     "Margin",
     "Nearest",
     "Outcome",
-    "Shape",
-    "StanceData",
+    "Reach",
+    "Reached",
+    "TieBreak",
 ]
 
 SOLVER: Final = "CLARABEL"
-
-LOAD_UNIT: Final = 100.0
-"""Scale of a hand's loads y [N]."""
-
-TWIST_UNIT: Final = pose_units(WRIST)
-"""Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
-
-WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
-"""Scale of a body wrench [N, N·m]."""
 
 UNLIMITED: Final = 1e4
 """Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
 
 SLACK: Final = 1e-6
 """What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
-
-WRIST_RANGE: Final = "wrist_range"
-"""Name of the hard rows within which a floating hand's set is linearised."""
-
-SECONDARY: Final = 1e-4
-"""Weight in the tie-break of loads that are not tensions: enough to make them unique."""
 
 SETTINGS: Final[dict[str, Any]] = {
     "equilibrate_enable": False,
@@ -92,91 +77,7 @@ SETTINGS: Final[dict[str, Any]] = {
 CAREFUL: Final[dict[str, Any]] = {"max_threads": 1, "warm_start": False}
 """The solver's own defaults, for a second try, on a new solver: an old one keeps its settings."""
 
-STATIONARY: Final = 1e-5
-"""How far multipliers may be from stationary, and below zero, to count as a bound."""
-
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
-
-
-class HandData(NamedTuple):
-    """One hand's rows, nondimensional.
-
-    Attributes
-    ----------
-    G, g : ndarray, shapes (6, m), (6,)
-        Its part of the body wrench, G z + g.
-    L, l0 : ndarray, shapes (nl, m), (nl,)
-        Utilisations L z + l0.
-    H, h : ndarray, shapes (nh, m), (nh,)
-        Hard rows H z ≤ h.
-    effort : ndarray, shape (m,)
-        Weights of z in the tie-break.
-    unit : ndarray, shape (m,)
-        Of z: the loads are ``y = unit z`` [N], of a floating wrist [m, rad].
-    """
-
-    G: Array
-    g: Array
-    L: Array
-    l0: Array
-    H: Array
-    h: Array
-    effort: Array
-    unit: Array
-
-    @classmethod
-    def of(cls, space: WrenchSpace, transport: Array, reach: Array | None = None) -> HandData:
-        """Scale a hand's set.
-
-        Parameters
-        ----------
-        space : WrenchSpace
-        transport : ndarray, shape (6, 6)
-            Ad(B←H).
-        reach : ndarray, shape (m,), optional
-            The maximum of each column's load [N], for the tie-break; tensions come first. A
-            floating wrist's twist is measured by its unit.
-        """
-        carried = -transport / WRENCH_UNIT[:, None]
-        weights = np.array(
-            [1.0 if name.endswith("/tension") else SECONDARY**0.5 for name in space.columns]
-        )
-        floats = space.columns == WRIST
-        unit = TWIST_UNIT if floats else np.full(len(space.columns), LOAD_UNIT)
-        # hard rows are in newtons, but for those of a wrist's range
-        ranges = [row.limit == WRIST_RANGE for row in space.rows[len(space.s) :]]
-        over = np.where(ranges, 1.0, 1.0 / LOAD_UNIT)
-        return cls(
-            G=carried @ space.generators * unit,
-            g=carried @ space.origin,
-            L=space.L / space.s[:, None] * unit,
-            l0=space.l0 / space.s,
-            H=space.H * unit * over[:, None],
-            h=space.h * over,
-            effort=weights * (1.0 if reach is None else unit / reach),
-            unit=unit,
-        )
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """(m, nl, nh)."""
-        return self.G.shape[1], len(self.l0), len(self.h)
-
-
-@dataclass(frozen=True, eq=False)
-class StanceData:
-    """All hands of a stance, and the scaled body wrench (6,) they are to balance."""
-
-    hands: tuple[HandData, ...]
-    wrench: Array
-
-    @property
-    def shape(self) -> Shape:
-        """What a program is built for."""
-        return tuple(hand.shape for hand in self.hands)
-
-
-Shape = tuple[tuple[int, int, int], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +98,7 @@ class Outcome:
     limit_duals, hard_duals : tuple of ndarray
         Multipliers of each hand's rows; empty if not solved.
     balance_dual : ndarray or None
-        Multipliers of the balance, shape (6,).
+        Multipliers of the balance, shape (nb,).
     """
 
     solved: bool
@@ -215,14 +116,15 @@ class _Program(ABC):
 
     def __init__(self, shape: Shape) -> None:
         self._lock = threading.Lock()
-        self.z = [cp.Variable(m) for m, _, _ in shape]
-        self.G = [cp.Parameter((6, m)) for m, _, _ in shape]
-        self.L = [cp.Parameter((nl, m)) for m, nl, _ in shape]
-        self.l0 = [cp.Parameter(nl) for _, nl, _ in shape]
-        self.H = [cp.Parameter((nh, m)) for m, _, nh in shape]
-        self.h = [cp.Parameter(nh) for _, _, nh in shape]
-        self._units = [np.ones(m) for m, _, _ in shape]
-        self.offset = cp.Parameter(6)
+        self.shape = shape
+        self.z = [cp.Variable(m) for m, _, _, _ in shape.hands]
+        self.G = [cp.Parameter((shape.balance, m)) for m, _, _, _ in shape.hands]
+        self.L: list[cp.Parameter] = []
+        self.l0: list[cp.Parameter] = []
+        self.H = [cp.Parameter((nh, m)) for m, _, nh, _ in shape.hands]
+        self.h = [cp.Parameter(nh) for _, _, nh, _ in shape.hands]
+        self._units = [np.ones(m) for m, _, _, _ in shape.hands]
+        self.offset = cp.Parameter(shape.balance)
         """W − Σ g, or −Σ g where W is scaled apart."""
         self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
         self.hard = [H @ z <= h for H, z, h in zip(self.H, self.z, self.h, strict=True)]
@@ -235,20 +137,23 @@ class _Program(ABC):
         """Return the problem, with `limits` and `balance` set."""
 
     @classmethod
-    def built(cls, shape: Shape) -> Self:
+    def built(cls, shape: Shape, *further: int) -> Self:
         """Return the program for a shape, built on first use and kept."""
-        program = _built(cls, shape)
+        program = _built(cls, shape, *further)
         assert isinstance(program, cls)
         return program
 
     def utilisations(self) -> list[cp.Expression]:
         """Return each hand's limit rows as load over capacity."""
+        self.L = [cp.Parameter((nl, m)) for m, nl, _, _ in self.shape.hands]
+        self.l0 = [cp.Parameter(nl) for _, nl, _, _ in self.shape.hands]
         return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
 
     def _load(self, data: StanceData) -> None:
         for i, hand in enumerate(data.hands):
             self.G[i].value = hand.G
-            self.L[i].value, self.l0[i].value = hand.L, hand.l0
+            if self.L:
+                self.L[i].value, self.l0[i].value = hand.L, hand.l0
             self.H[i].value, self.h[i].value = hand.H, hand.h
             self._units[i] = hand.unit
         self.offset.value = data.wrench - sum(hand.g for hand in data.hands)
@@ -326,17 +231,48 @@ class Curved(_Program):
             return self._run()
 
 
-class Effort(_Program):
-    """min Σ (tension / maximum)² under a cap on the utilisation."""
+class TieBreak(_Program):
+    """min Σ (tension / maximum)² under a cap on the utilisation: which plan is meant of those."""
 
     def define(self) -> cp.Problem:
         self.cap = cp.Parameter()
-        self.effort = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
         self.limits = [row <= self.cap for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         effort = sum(
-            cp.sum_squares(cp.multiply(weight, z))
-            for weight, z in zip(self.effort, self.z, strict=True)
+            cp.sum_squares(cp.multiply(weights, z))
+            for weights, z in zip(self.weights, self.z, strict=True)
+        )
+        return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
+
+    def solve(self, data: StanceData, cap: float) -> Outcome:
+        """Return the plan that is meant among those with utilisation at most ``cap``."""
+        with self._lock:
+            self._load(data)
+            self.cap.value = cap
+            # weights relative to the largest: the minimiser does not change
+            largest = max(float(hand.tie.max(initial=0.0)) for hand in data.hands)
+            for parameter, hand in zip(self.weights, data.hands, strict=True):
+                parameter.value = hand.tie / largest
+            return self._run()
+
+
+class Effort(_Program):
+    """min Σ ‖E z + e₀‖² under a cap: the least sum of squared relative tensions and torques.
+
+    Small weights make loads unique that are neither: palms, lateral reactions, wrists.
+    """
+
+    def define(self) -> cp.Problem:
+        self.cap = cp.Parameter()
+        self.E = [cp.Parameter((ne, m)) for m, _, _, ne in self.shape.hands]
+        self.e0 = [cp.Parameter(ne) for _, _, _, ne in self.shape.hands]
+        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.limits = [row <= self.cap for row in self.utilisations()]
+        self.balance = self.reaction == self.offset
+        effort = sum(
+            cp.sum_squares(E @ z + e0) + cp.sum_squares(cp.multiply(weights, z))
+            for E, e0, weights, z in zip(self.E, self.e0, self.weights, self.z, strict=True)
         )
         return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
 
@@ -345,10 +281,9 @@ class Effort(_Program):
         with self._lock:
             self._load(data)
             self.cap.value = cap
-            # weights relative to the largest: the minimiser does not change
-            largest = max(float(hand.effort.max(initial=0.0)) for hand in data.hands)
-            for parameter, hand in zip(self.effort, data.hands, strict=True):
-                parameter.value = hand.effort / largest
+            for i, hand in enumerate(data.hands):
+                self.E[i].value, self.e0[i].value = hand.E, hand.e0
+                self.weights[i].value = hand.rest
             return self._run()
 
 
@@ -357,30 +292,93 @@ class LoadFactor(_Program):
 
     def define(self) -> cp.Problem:
         self.factor = cp.Variable(nonneg=True)
-        self.wrench = cp.Parameter(6)
+        self.wrench = cp.Parameter(self.shape.balance)
         self.limits = [row <= 1.0 for row in self.utilisations()]
         self.balance = self.reaction == self.offset + self.wrench * self.factor
         return cp.Problem(cp.Maximize(self.factor), [self.balance, *self.limits, *self.hard])
 
     def solve(self, data: StanceData) -> Outcome:
-        """Return the largest load factor as ``value``; the wrench must not be zero."""
-        size = float(np.abs(data.wrench).max())
+        """Return the largest load factor as ``value``; the body wrench must not be zero."""
+        body, held = data.wrench.copy(), data.wrench.copy()
+        body[6:], held[:6] = 0.0, 0.0
+        size = float(np.abs(body).max())
         with self._lock:
-            self._load(StanceData(data.hands, np.zeros(6)))
+            self._load(data.turned(held))
             # of unit size, or a small wrench and its large factor would defeat the solver
-            self.wrench.value = data.wrench / size
+            self.wrench.value = body / size
             outcome = self._run()
         return replace(outcome, value=outcome.value / size)
 
 
-class Nearest(_Program):
-    """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give."""
+class Reach(_Program):
+    """max c·t: how far along the columns of B the balance can go, under a cap.
+
+    The limit rows may change with t, too, as those of joints do with the body's acceleration:
+    L z + l0 + K t ≤ cap.
+    """
+
+    def __init__(self, shape: Shape, directions: int) -> None:
+        self.directions = directions
+        super().__init__(shape)
 
     def define(self) -> cp.Problem:
-        self.shortfall = cp.Variable(6)
+        self.t = cp.Variable(self.directions)
+        self.goal = cp.Parameter(self.directions)
+        self.cap = cp.Parameter()
+        self.B = cp.Parameter((self.shape.balance, self.directions))
+        self.K = [cp.Parameter((nl, self.directions)) for _, nl, _, _ in self.shape.hands]
+        self.limits = [
+            row + K @ self.t <= self.cap for row, K in zip(self.utilisations(), self.K, strict=True)
+        ]
+        self.balance = self.reaction == self.offset + self.B @ self.t
+        return cp.Problem(cp.Maximize(self.goal @ self.t), [self.balance, *self.limits, *self.hard])
+
+    def solve(
+        self,
+        data: StanceData,
+        goal: Array,
+        B: Array,
+        cap: float = 1.0,
+        K: Sequence[Array] | None = None,
+    ) -> Reached:
+        """Return the farthest t for the goal c (k,), with B (nb, k) and K (nl, k) of each hand."""
+        with self._lock:
+            self._load(data)
+            self.goal.value, self.B.value, self.cap.value = goal, B, cap
+            for i, hand in enumerate(data.hands):
+                none = np.zeros((len(hand.l0), self.directions))
+                self.K[i].value = none if K is None else K[i]
+            outcome = self._run()
+            t = self.t.value if outcome.solved else None
+        return Reached(outcome, np.full(self.directions, np.nan) if t is None else np.asarray(t))
+
+
+class Reached(NamedTuple):
+    """How `Reach` ended, and the t it came to, shape (k,), NaN if it was not solved."""
+
+    outcome: Outcome
+    t: Array
+
+
+class Nearest(_Program):
+    """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give.
+
+    The last ``kept`` rows of the balance, of wrenches that hands are given, are kept exactly; the
+    others count like the body's.
+    """
+
+    def __init__(self, shape: Shape, kept: int = 0) -> None:
+        self.kept = kept
+        super().__init__(shape)
+
+    def define(self) -> cp.Problem:
+        count = self.shape.balance
+        self.shortfall = cp.Variable(count)
         self.balance = self.reaction + self.shortfall == self.offset
         box = [cp.abs(z) <= UNLIMITED for z in self.z]
-        return cp.Problem(cp.Minimize(cp.norm(self.shortfall)), [self.balance, *self.hard, *box])
+        kept = [self.shortfall[count - self.kept :] == 0.0] if self.kept else []
+        objective = cp.Minimize(cp.norm(self.shortfall))
+        return cp.Problem(objective, [self.balance, *self.hard, *box, *kept])
 
     def solve(self, data: StanceData) -> Outcome:
         """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""
@@ -390,8 +388,8 @@ class Nearest(_Program):
 
 
 @lru_cache(maxsize=64)
-def _built(kind: type[_Program], shape: Shape) -> _Program:
-    return kind(shape)
+def _built(kind: type[_Program], shape: Shape, *further: int) -> _Program:
+    return kind(shape, *further)
 
 
 def margin(data: StanceData) -> Outcome:
@@ -404,6 +402,11 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     return Curved.built(data.shape).solve(data, root, near)
 
 
+def tie_break(data: StanceData, cap: float) -> Outcome:
+    """Solve `TieBreak`, built once for each shape."""
+    return TieBreak.built(data.shape).solve(data, cap)
+
+
 def effort(data: StanceData, cap: float) -> Outcome:
     """Solve `Effort`, built once for each shape."""
     return Effort.built(data.shape).solve(data, cap)
@@ -414,32 +417,18 @@ def load_factor(data: StanceData) -> Outcome:
     return LoadFactor.built(data.shape).solve(data)
 
 
+def reach(
+    data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
+) -> Reached:
+    """Solve `Reach`, built once for each shape."""
+    return Reach.built(data.shape, len(goal)).solve(data, goal, B, cap, K)
+
+
 def nearest(data: StanceData) -> Outcome:
     """Solve `Nearest`, built once for each shape."""
     return Nearest.built(data.shape).solve(data)
 
 
-def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the scaled body wrench of the hands' loads y, shape (6,)."""
-    parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
-    return np.asarray(sum(parts, start=np.zeros(6)))
-
-
-def least_bound(data: StanceData, outcome: Outcome) -> float:
-    """Return a lower bound of the least utilisation from the multipliers of `Margin`.
-
-    With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
-    u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
-    """
-    assert outcome.balance_dual is not None
-    nu = outcome.balance_dual
-    bound = -float(nu @ (data.wrench - sum(hand.g for hand in data.hands)))
-    leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
-    for hand, limit, hard in zip(data.hands, outcome.limit_duals, outcome.hard_duals, strict=True):
-        bound += float(limit @ hand.l0 - hard @ hand.h)
-        leak += float(np.abs(hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ nu).sum())
-        if min(limit.min(initial=0.0), hard.min(initial=0.0)) < -STATIONARY * max(
-            1.0, abs(outcome.value)
-        ):
-            return -np.inf
-    return bound if leak <= STATIONARY * max(1.0, abs(outcome.value)) else -np.inf
+def nearest_body(data: StanceData) -> Outcome:
+    """Solve `Nearest` with all given wrenches of hands kept, built once for each shape."""
+    return Nearest.built(data.shape, len(data.wrench) - 6).solve(data)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from planner.plan import LimitName, Plan
-from planner.plots import plot_route
-from planner.route import RouteResult, Stage
+from planner.route import OutOfReach, RouteResult, Stage
+from planner.route_plots import plot_route
 
 __all__ = ["COLUMNS", "summary", "write_report"]
 
@@ -22,6 +22,7 @@ COLUMNS: Final = (
     "utilisation",
     "margin",
     "load_factor",
+    "joint_utilisation",
     "limiting_limb",
     "limiting_finger",
     "limiting_phalanx",
@@ -70,7 +71,7 @@ def summary(result: RouteResult) -> dict[str, Any]:
     }
 
 
-def _sentence(stage: Stage, plan: Plan) -> str:
+def _sentence(stage: Stage, plan: Plan | OutOfReach) -> str:
     limb = str(stage.limb).replace("_", " ")
     what = {
         "start": "the start stance",
@@ -82,7 +83,7 @@ def _sentence(stage: Stage, plan: Plan) -> str:
     return f"The crux is {what}: {used}; {plan.reason}."
 
 
-def _row(stage: Stage, plan: Plan) -> dict[str, Any]:
+def _row(stage: Stage, plan: Plan | OutOfReach) -> dict[str, Any]:
     name = plan.limiting or LimitName("", None, None, "")
     used = plan.utilisation
     return {
@@ -94,6 +95,7 @@ def _row(stage: Stage, plan: Plan) -> dict[str, Any]:
         "utilisation": used,
         "margin": None if used is None else stage.question.limits.utilisation - used,
         "load_factor": plan.load_factor,
+        "joint_utilisation": plan.joint_utilisation,
         "limiting_limb": name.limb or None,
         "limiting_finger": name.finger,
         "limiting_phalanx": name.phalanx,

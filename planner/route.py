@@ -19,11 +19,14 @@ from typing import Final, Literal
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose
+from planner.inverse_kinematics import UnreachableError
 from planner.plan import Plan
-from planner.solve import plan, settle
-from planner.stance import HandOnHold, Limits, Load, Question, Stance
+from planner.question import Limits, Load, Objective, Question
+from planner.settling import settle
+from planner.solve import plan
+from planner.stance import SOLVE, HandOnHold, Stance
 
-__all__ = ["Move", "Route", "RouteResult", "Stage", "evaluate"]
+__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "Stage", "evaluate"]
 
 Phase = Literal["start", "shift", "lift", "place"]
 
@@ -59,6 +62,9 @@ class Route:
     load : Load
         What the body weighs; the same all the way.
     limits : Limits
+        Those of a hand count while it is on the rock.
+    objective : {'max_margin', 'min_effort'}
+        Of every stage.
     """
 
     name: str
@@ -66,6 +72,7 @@ class Route:
     moves: tuple[Move, ...]
     load: Load = field(default_factory=Load)
     limits: Limits = field(default_factory=Limits)
+    objective: Objective = "max_margin"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +98,24 @@ class Stage:
     question: Question
 
 
+@dataclass(frozen=True)
+class OutOfReach:
+    """A stage without a plan: no joint angles put its hands in their places.
+
+    Attributes
+    ----------
+    reason : str
+        Which limb, and how far it is from there.
+    """
+
+    reason: str
+    status: Literal["unreachable"] = "unreachable"
+    utilisation: None = None
+    load_factor: None = None
+    limiting: None = None
+    joint_utilisation: None = None
+
+
 @dataclass(frozen=True, eq=False)
 class RouteResult:
     """A climb, planned stage by stage.
@@ -99,13 +124,13 @@ class RouteResult:
     ----------
     route : Route
     stages : tuple of Stage
-    plans : tuple of Plan
+    plans : tuple of Plan or OutOfReach
         One for each stage.
     """
 
     route: Route
     stages: tuple[Stage, ...]
-    plans: tuple[Plan, ...]
+    plans: tuple[Plan | OutOfReach, ...]
 
     @property
     def feasible(self) -> bool:
@@ -114,12 +139,12 @@ class RouteResult:
 
     @property
     def crux(self) -> int:
-        """Index of the hardest stage: no plan first, then the largest utilisation."""
+        """Index of the hardest stage: no way there, then no plan, then the largest utilisation."""
         return max(range(len(self.plans)), key=lambda i: _hardness(self.plans[i]))
 
 
-def _hardness(answer: Plan) -> tuple[int, float]:
-    order = {"optimal": 0, "overloaded": 0, "failed": 1, "infeasible": 2}
+def _hardness(answer: Plan | OutOfReach) -> tuple[int, float]:
+    order = {"optimal": 0, "overloaded": 0, "failed": 1, "infeasible": 2, "unreachable": 3}
     used = answer.utilisation if answer.utilisation is not None else math.inf
     return order[answer.status], used
 
@@ -132,14 +157,30 @@ def stages(route: Route) -> Iterator[Stage]:
     InvalidInputError
         If a move's limb holds nothing to start with, or is the only one that does.
     """
+    if route.start.joints not in (None, SOLVE):
+        raise InvalidInputError(
+            f"the joints change with every move; valid is {SOLVE!r}, or none", field="stance.joints"
+        )
     hands = {hand.limb: hand for hand in route.start.hands}
+    for limb in route.limits.per_hand:
+        if limb not in hands:
+            raise InvalidInputError(
+                f"no hand of the start stance; it has {', '.join(hands)}",
+                field=f"limits.per_hand.{limb}",
+            )
     body = route.start.body
     index = 0
 
     def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> Stage:
         stance = replace(route.start, hands=tuple(held), body=body)
+        on_rock = {hand.limb for hand in held}
+        caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
         question = Question(
-            stance, load=route.load, limits=route.limits, want=frozenset(["load_factor"])
+            stance,
+            load=route.load,
+            limits=replace(route.limits, per_hand=caps),
+            want=frozenset(["load_factor"]),
+            objective=route.objective,
         )
         return Stage(index, move, phase, limb, question)
 
@@ -189,9 +230,9 @@ def evaluate(
     todo = tuple(stages(route))
     if workers is None:
         workers = (os.cpu_count() or 1) if len(todo) >= WORTH_A_PROCESS else 1
-    plans: dict[int, Plan] = {}
+    plans: dict[int, Plan | OutOfReach] = {}
 
-    def done(stage: Stage, answer: Plan) -> None:
+    def done(stage: Stage, answer: Plan | OutOfReach) -> None:
         plans[stage.index] = answer
         if progress is not None:
             progress(len(plans), len(todo))
@@ -204,11 +245,13 @@ def evaluate(
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 
-def _in_processes(todo: Sequence[Stage], workers: int, done: Callable[[Stage, Plan], None]) -> None:
+def _in_processes(
+    todo: Sequence[Stage], workers: int, done: Callable[[Stage, Plan | OutOfReach], None]
+) -> None:
     """Plan stages in processes; those of a process that dies are left to the caller."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(todo)), mp_context=context) as pool:
-        futures: dict[Future[Plan], Stage] = {}
+        futures: dict[Future[Plan | OutOfReach], Stage] = {}
         try:
             for stage in todo:
                 futures[pool.submit(_plan_stage, stage)] = stage
@@ -221,11 +264,13 @@ def _in_processes(todo: Sequence[Stage], workers: int, done: Callable[[Stage, Pl
             raise
 
 
-def _plan_stage(stage: Stage) -> Plan:
+def _plan_stage(stage: Stage) -> Plan | OutOfReach:
     try:
         if stage.phase == "place":
             _must_touch(stage)
         return plan(stage.question)
+    except UnreachableError as error:
+        return OutOfReach(error.message)
     except InvalidInputError as error:
         place = "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
         raise error.within(place) from None

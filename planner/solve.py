@@ -6,33 +6,35 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from hand_models.compliant_hand import CompliantHand
-from hand_models.errors import InvalidInputError, UnsupportedError
+from hand_models.errors import InvalidInputError
 from hand_models.fixed_wrist import wrench_space
-from hand_models.floating_wrist import FloatingWrist, PalmMode
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
-from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
+from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR, TENDON_TENSION
 from hand_models.wrench_space import WrenchSpace
-from planner import program
+from planner import dual_bounds, program, stance_data
+from planner.binding import Used, limiting_limit, prices, unit_of, used_limits
 from planner.budget import Budget
-from planner.certificate import certify, limit_name
+from planner.certificate import Hindered, certify, certify_idle
 from planner.continuation import PROGRAMS, LargestFactor, least_use, most_load
 from planner.explain import (
     LEAST_FACTOR,
     NO_FACTOR,
     UNPROVEN,
     limit_sentence,
+    overload_sentence,
     shortfall_sentence,
     warnings,
 )
 from planner.floating import Settled
+from planner.floating_effort import least_effort, with_room
 from planner.floating_warnings import far_wrists, idle_preloads, strained_preloads
-from planner.hand_sets import Hands, widest_at_rest
+from planner.hand_rows import AddedRows
+from planner.hand_sets import Hands
 from planner.plan import (
     Certificate,
     HandPlan,
@@ -41,127 +43,33 @@ from planner.plan import (
     Price,
     SolverInfo,
     Status,
+    TensionPath,
     Times,
     WristPlan,
 )
-from planner.program import LOAD_UNIT, SLACK, SOLVER, WRENCH_UNIT, Outcome, StanceData
+from planner.posture import Posture, posture
+from planner.program import SLACK, SOLVER, Outcome
+from planner.question import Question
 from planner.reading import read_floating_hand, read_hand
-from planner.stance import HandOnHold, Question, Stance
+from planner.settling import settle_at, wrist_at
+from planner.stance_data import JOINT_TORQUE, LOAD_UNIT, WRENCH_UNIT
+from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
 from planner.verify import problems
 
-__all__ = ["RestingHand", "floating_wrist", "hand_space", "plan", "resting_hand"]
+__all__ = ["plan"]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
 
+NO_WRENCH: Final = 1e-9
+"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
+
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
-BINDING: Final = 1e-6
-"""Multipliers below this do not count as binding."""
-
-ALIKE: Final = 5
-"""Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
-
-UNITS: Final = {"motor_torque": "N·m", "motor_current": "A"}
-"""Of limits that are not in newtons."""
-
-
-def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
-    """Close one hand of a stance on its hold."""
-    return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
-
-
-def _settle_at(stance: Stance, index: int) -> SettledHand:
-    """Close the hand of that index; an error's field is relative to the question."""
-    try:
-        return settle(stance.hands[index], stance)
-    except InvalidInputError as error:
-        raise error.within(f"stance.hands[{index}]") from None
-
-
-def _wrist_at(
-    stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
-) -> FloatingWrist | None:
-    """Return how the hand of that index gives way; None if its wrist is fixed."""
-    hand = stance.hands[index]
-    if hand.wrist == "fixed":
-        return None
-    try:
-        return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
-    except InvalidInputError as error:
-        if isinstance(error, UnsupportedError):
-            error.field = "wrist"
-        raise error.within(f"stance.hands[{index}]") from None
-
-
-def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
-    """Return one hand of a stance on its hold, and what it can carry; see `resting_hand`."""
-    hand = resting_hand(stance, limb)
-    return hand.settled, hand.space
-
-
-class RestingHand(NamedTuple):
-    """One hand of a stance on its hold, and what it can carry.
-
-    Attributes
-    ----------
-    settled : SettledHand
-    space : WrenchSpace
-        Of a floating hand the widest of its sets linearised at rest, one for each palm mode.
-    palm : PalmMode or None
-        The mode of that set; None for a fixed wrist.
-    error : float
-        How far it is off at most where it reaches farthest along ± each axis: forces, and moments
-        over 0.1 m [N].
-    """
-
-    settled: SettledHand
-    space: WrenchSpace
-    palm: PalmMode | None = None
-    error: float = 0.0
-
-
-def resting_hand(stance: Stance, limb: str) -> RestingHand:
-    """Return one hand of a stance on its hold, and what it can carry.
-
-    Raises
-    ------
-    InvalidInputError
-        If the stance has no such hand, or the hold cannot be where it is.
-    """
-    settled, wrist = _hand_at(stance, limb)
-    if wrist is None:
-        return RestingHand(settled, wrench_space(settled))
-    palm, space, error = widest_at_rest(wrist)
-    return RestingHand(settled, space, palm, error)
-
-
-def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
-    """Return how one hand of a stance gives way.
-
-    Raises
-    ------
-    InvalidInputError
-        If the stance has no such hand, its wrist is fixed, or the hold cannot be where it is.
-    """
-    _, wrist = _hand_at(stance, limb)
-    if wrist is None:
-        raise InvalidInputError(f"the wrist of {limb} is fixed; floating is needed", field="limb")
-    return wrist
-
-
-def _hand_at(stance: Stance, limb: str) -> tuple[SettledHand, FloatingWrist | None]:
-    for i, hand in enumerate(stance.hands):
-        if hand.limb == limb:
-            settled = _settle_at(stance, i)
-            return settled, _wrist_at(stance, i, settled)
-    limbs = ", ".join(hand.limb for hand in stance.hands)
-    raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")
-
 
 def plan(question: Question) -> Plan:
-    """Answer a question: the plan with the least utilisation, verified, or why there is none.
+    """Answer a question: the best plan, verified, or why there is none.
 
     Parameters
     ----------
@@ -177,19 +85,41 @@ def plan(question: Question) -> Plan:
         If the question cannot be understood; its ``field`` is relative to the question.
     """
     start = time.perf_counter()
-    stance = question.stance
+    where = posture(question)
     try:
-        wrench = question.needed_wrench()
+        wrench = question.needed_wrench(None if where is None else where.body_wrench)
     except InvalidInputError as error:
         raise error.within("load") from None
-    settled = [_settle_at(stance, i) for i in range(len(stance.hands))]
-    cap = question.limits.tendon_tension
-    wrists = [_wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)]
+    settled, hands = gather(question, where, wrench)
+    modelled = time.perf_counter()
+    answer = _Answer(question, where, settled, hands, wrench)
+    answer.solve()
+    solved = time.perf_counter()
+    return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
+
+
+def gather(
+    question: Question, where: Posture | None, wrench: Array
+) -> tuple[list[SettledHand], Hands]:
+    """Return the hands of a question on their holds, and what the programs need of them.
+
+    Parameters
+    ----------
+    question : Question
+    where : Posture or None
+    wrench : ndarray, shape (6,)
+        The body wrench that is needed, in B [N, N·m].
+    """
+    stance, cap = question.stance, question.limits.tendon_tension
+    settled = [settle_at(stance, i) for i in range(len(stance.hands))]
+    wrists = [wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)]
+    added = [_added_rows(question, where, i) for i in range(len(stance.hands))]
     spaces = [
-        wrench_space(hand, cap) if wrist is None else wrist.linearised()
-        for hand, wrist in zip(settled, wrists, strict=True)
+        rows.on(wrench_space(hand, cap) if wrist is None else wrist.linearised())
+        for hand, wrist, rows in zip(settled, wrists, added, strict=True)
     ]
     body = stance.body.inverse()
+    held, aims = _held(question)
     hands = Hands(
         spaces=tuple(spaces),
         wrists=tuple(wrists),
@@ -198,13 +128,45 @@ def plan(question: Question) -> Plan:
             _reach(space) if wrist is None else None
             for space, wrist in zip(spaces, wrists, strict=True)
         ),
-        wrench=wrench / WRENCH_UNIT,
+        wrench=np.concatenate([wrench / WRENCH_UNIT, aims]),
+        held=held,
+        added=tuple(added),
     )
-    modelled = time.perf_counter()
-    answer = _Answer(question, settled, hands, wrench)
-    answer.solve()
-    solved = time.perf_counter()
-    return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
+    return settled, hands
+
+
+def _added_rows(question: Question, where: Posture | None, index: int) -> AddedRows:
+    """Return what joints, caps and present tensions add to the set of the hand of that index."""
+    hand, limits = question.stance.hands[index], question.limits
+    cap = limits.per_hand.get(hand.limb)
+    axes = {
+        "hand": np.eye(3),
+        "body": hand.pose.rotation.T @ question.stance.body.rotation,
+        "world": hand.pose.rotation.T,
+    }
+    change = limits.tension_change
+    return AddedRows(
+        joints=None if where is None else where.joints[hand.limb],
+        cap=None if cap is None else cap.largest_force,
+        frame=None if cap is None else axes[cap.frame],
+        present=question.present.get(hand.limb),
+        change=math.inf if change is None else change,
+    )
+
+
+def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
+    """Return what of each hand's wrench is given, (k, 6) each, and its scaled values (k,)."""
+    hands = question.stance.hands
+    given = [
+        (i, j, value)
+        for i, hand in enumerate(hands)
+        for j, value in enumerate(hand.wrench or ())
+        if value is not None
+    ]
+    held = [np.zeros((len(given), 6)) for _ in hands]
+    for row, (i, j, _) in enumerate(given):
+        held[i][row, j] = 1.0
+    return tuple(held), np.array([value / WRENCH_UNIT[j] for _, j, value in given])
 
 
 def _reach(space: WrenchSpace) -> Array:
@@ -214,7 +176,7 @@ def _reach(space: WrenchSpace) -> Array:
     """
     reach = np.full(len(space.columns), LOAD_UNIT)
     for coefficients, row, capacity in zip(space.L, space.rows, space.s, strict=False):
-        if row.limit in ("tendon_tension", PALM_SHEAR, PALM_PRESSING):
+        if row.limit in (TENDON_TENSION, PALM_SHEAR, PALM_PRESSING):
             reach[np.flatnonzero(coefficients)[0]] = capacity
     return reach
 
@@ -225,11 +187,13 @@ class _Answer:
     def __init__(
         self,
         question: Question,
+        where: Posture | None,
         settled: Sequence[SettledHand],
         hands: Hands,
         wrench: Array,
     ) -> None:
         self.question = question
+        self.where = where
         self.settled = settled
         self.parts = hands
         self.spaces, self.data = hands.sets(hands.at_rest(hands.idle))
@@ -237,17 +201,22 @@ class _Answer:
         limbs = [hand.limb for hand in question.stance.hands]
         self.idle_preloads = idle_preloads(limbs, settled, hands.wrists)
         self.search: Settled | None = None
+        self.least_used: Settled | None = None
         self.budget = Budget(PROGRAMS)
         self.known_factor: LargestFactor | None = None
         self.outcome: Outcome
         self.loads: tuple[Array, ...] = ()
         self.hands: tuple[HandPlan, ...] = ()
+        self.least_effort: Outcome | None = None
         self.utilisation = math.inf
         self.wrong: list[str] = []
+        self.cap = question.limits.utilisation
         self.certificate: Certificate | None = None
         self.load_factor: float | None = None
         self.least_factor = False
         self.unbounded = False
+        self.path: TensionPath | None = None
+        self.path_unknown = False
 
     # Solving ------------------------------------------------------------------------------------
 
@@ -258,6 +227,7 @@ class _Answer:
         else:
             self.outcome = program.margin(self.data)
             self._settle_tie()
+        self._settle_effort()
         if not self.outcome.solved or self.wrong:
             self._look_again()
         if "load_factor" in self.question.want:
@@ -266,31 +236,72 @@ class _Answer:
     def _settle_wrists(self) -> None:
         """Find where floating wrists go, and take the plan there."""
         self.search, self.known_factor = least_use(self.parts, self.budget)
+        self.least_used = self.search
         self.outcome = self.search.outcome
         if self.search.exact:
-            self.spaces, self.data = self.search.sets
-            self._take(self.search.point.loads)
+            self._take_search(self.search)
         else:
             self.spaces, self.data = self.parts.sets(self.search.point)
+
+    def _take_search(self, found: Settled) -> None:
+        """Take the plan that a search for floating wrists has found."""
+        self.search = found
+        self.spaces, self.data = found.sets
+        self._take(found.point.loads)
 
     def _settle_tie(self) -> None:
         """Take the plan of least effort among those of least utilisation."""
         if not self.outcome.solved:
             return
         cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
-        tidy = program.effort(self.data, cap)
+        tidy = program.tie_break(self.data, cap)
         if tidy.solved:
             self._take(tidy.loads)
         if not tidy.solved or self.wrong:
             self._take(self.outcome.loads)
+
+    def _settle_effort(self) -> None:
+        """Take the plan of least effort, if it is asked for and any is within the cap."""
+        if self.question.objective != "min_effort" or not self.outcome.solved or self.wrong:
+            return
+        cap = self.question.limits.utilisation
+        if self.search is not None:
+            self._settle_floating_effort(self.search, cap)
+            return
+        if self.outcome.value > cap + SLACK:
+            return
+        # where the least utilisation is the cap itself, rounding must not empty the set
+        self.cap = max(cap, self.outcome.value + SLACK)
+        self.least_effort = program.effort(self.data, self.cap)
+        if self.least_effort.solved:
+            self._take(self.least_effort.loads)
+        else:
+            self.wrong = [f"least effort: {self.least_effort.status}"]
+
+    def _settle_floating_effort(self, plan: Settled, cap: float) -> None:
+        """Take the plan of least effort that floating wrists come to from that of least use."""
+        used = plan.measure.utilisation
+        if used > cap + SLACK:
+            return
+        self.cap = with_room(cap, used)
+        found = least_effort(self.parts, plan, self.cap, self.budget)
+        self.least_effort = found.outcome if found.outcome.solved else None
+        self._take_search(found)
 
     def _take(self, loads: tuple[Array, ...]) -> None:
         """Read these loads, and check them."""
         self.loads = loads
         self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
         self.utilisation = max(hand.utilisation for hand in self.hands)
+        idle = [used.utilisation for used in self._idle_joints()]
         self.wrong = problems(
-            self.question, self.settled, self.hands, self.utilisation, self.wrench
+            self.question,
+            self.settled,
+            self.hands,
+            max([self.utilisation, *idle]),
+            self.wrench,
+            self.where,
+            stance_data.used_effort(self.data, loads),
         )
 
     def _read_hand(self, index: int, y: Array) -> HandPlan:
@@ -304,37 +315,51 @@ class _Answer:
     def _look_again(self) -> None:
         """Tell no balance at all from a solver that failed."""
         nearest = program.nearest(self.data)
-        if not nearest.solved:
-            return
-        if nearest.value > BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench))):
-            self.certificate = certify(
-                self.data,
-                [place.limb for place in self.question.stance.hands],
-                self.spaces,
-                nearest,
-            )
+        far = BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench)))
+        if not nearest.solved or nearest.value > far:
+            given = len(self.data.wrench) > len(self.wrench)
+            self.certificate = certify(self._hindered(None), None if given else nearest)
             if self.certificate is not None:
                 self.outcome = replace(self.outcome, solved=False)
         elif not self.outcome.solved and not self.parts.floating:
             # rounding put the wrench a hair outside: plan for the nearest that can be had
-            inside = program.body_wrench(self.data, nearest.loads)
-            self.outcome = program.margin(StanceData(self.data.hands, inside))
+            inside = stance_data.body_wrench(self.data, nearest.loads)
+            self.data = self.data.turned(inside)
+            self.outcome = program.margin(self.data)
             self._settle_tie()
+            self._settle_effort()
+
+    def _hindered(self, cap: float | None) -> Hindered:
+        """Return what a proof is made of: at any utilisation, or within a cap."""
+        return Hindered(self.data, self._limbs, self.spaces, self.parts.held, cap)
+
+    def _overload(self, idle: Sequence[Used]) -> Certificate | None:
+        """Return the proof that no plan keeps to the cap on the utilisation; None without one.
+
+        Of floating hands with their sets linearised at the plan.
+        """
+        cap = self.question.limits.utilisation
+        most = max(idle, key=lambda used: used.utilisation, default=None)
+        if most is not None and most.utilisation > cap + SLACK:
+            return certify_idle(most, cap)
+        if self.search is not None and self.search.found == "unproven":
+            return None
+        return certify(self._hindered(cap))
 
     def _find_load_factor(self) -> None:
-        if not np.abs(self.data.wrench).max() > 1e-9:
+        if not np.abs(self.data.wrench[:6]).max() > NO_WRENCH:
             # nothing is asked of the hands: any multiple of it can be held, or none
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
             return
-        if self.search is not None:
-            most = most_load(self.parts, self.search, self.known_factor, self.budget)
+        if self.least_used is not None:
+            most = most_load(self.parts, self.least_used, self.known_factor, self.budget)
             if most is not None:
                 self.load_factor, self.least_factor = most.factor, not most.sure
             return
         result = program.load_factor(self.data)
         if result.solved:
-            scaled = StanceData(self.data.hands, self.data.wrench * result.value)
-            error = program.body_wrench(scaled, result.loads) - scaled.wrench
+            scaled = self.data.turned(self.parts.goal(result.value))
+            error = stance_data.body_wrench(scaled, result.loads) - scaled.wrench
             used = max(
                 float(np.max(hand.L @ (y / hand.unit) + hand.l0, initial=0.0))
                 for hand, y in zip(self.data.hands, result.loads, strict=True)
@@ -350,23 +375,26 @@ class _Answer:
         utilisation: float | None = None
         limiting: LimitName | None = None
         residual: Array | None = None
-        prices: tuple[Price, ...] | None = None
+        dear: tuple[Price, ...] = ()
         verified = False
         status: Status = "failed"
         if self.outcome.solved:
-            hands, utilisation = self.hands, self.utilisation
-            wrong = self.wrong or self._not_least(utilisation)
+            wrong = self.wrong or self._not_least()
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
-                hands = utilisation = None
             else:
-                verified = True
+                verified, hands = True, self.hands
+                idle = self._idle_joints()
+                utilisation = max([self.utilisation, *(used.utilisation for used in idle)])
                 cap = self.question.limits.utilisation
                 status = "optimal" if utilisation <= cap + SLACK else "overloaded"
                 residual = self._residual(hands)
-                dear = self._prices()
-                limiting, reason = self._explain(hands, utilisation, status, dear)
-                prices = dear if "prices" in self.question.want else None
+                dear = self._prices(idle)
+                limiting, reason = self._explain(utilisation, idle, dear)
+                self._find_path(idle)
+                if status == "overloaded":
+                    self.certificate = self._overload(idle)
+                    reason += overload_sentence(self.certificate, floats=self.parts.floating)
         elif self.certificate is not None:
             status = "infeasible"
             verified = True
@@ -384,19 +412,42 @@ class _Answer:
             status=status,
             body_wrench=self.wrench,
             utilisation=utilisation,
+            effort=stance_data.used_effort(self.data, self.loads) if verified and hands else None,
             load_factor=self.load_factor,
             load_factor_unbounded=self.unbounded,
             limiting=limiting,
             hands=hands,
-            prices=prices,
+            prices=dear if hands and "prices" in self.question.want else None,
+            effort_prices=self._effort_prices() if hands else None,
             certificate=self.certificate,
             residual=residual,
+            joints=None if self.where is None else self.where.angles,
+            joint_torque=self._joint_torque(hands),
+            joint_torque_limit=None
+            if self.where is None
+            else {limb: joints.limits for limb, joints in self.where.joints.items()},
+            path=self.path,
             verified=verified,
             reason=reason,
             warnings=self._warnings(),
             solver=SolverInfo(SOLVER, self.outcome.status, self.outcome.iterations),
             time=Times(times.model, times.solve, time.perf_counter() - start),
         )
+
+    def _find_path(self, idle: Sequence[Used]) -> None:
+        """Find whether the way from the present tensions, if any are given, is safe."""
+        if not self.question.present:
+            return
+        self.path = tension_path(
+            self.data,
+            self._limbs,
+            self.spaces,
+            self.loads,
+            self.question.present,
+            self.question.limits.utilisation,
+            max((used.utilisation for used in idle), default=0.0),
+        )
+        self.path_unknown = self.path is None
 
     def _warnings(self) -> tuple[str, ...]:
         found = warnings(self.question.stance, self.settled)
@@ -407,6 +458,10 @@ class _Answer:
             found += tuple(far_wrists(self.hands))
         if self.search is not None and self.search.found == "unproven":
             found += (UNPROVEN,)
+        if self.path is not None and not self.path.safe:
+            found += (unsafe_sentence(self.path),)
+        if self.path_unknown:
+            found += (UNKNOWN,)
         asked = "load_factor" in self.question.want and not self.unbounded
         if self.search is not None and asked and self.load_factor is None:
             found += (NO_FACTOR,)
@@ -414,17 +469,29 @@ class _Answer:
             found += (LEAST_FACTOR,)
         return found
 
-    def _not_least(self, utilisation: float) -> list[str]:
-        """Return what is wrong if the multipliers do not prove the utilisation the least.
+    def _not_least(self) -> list[str]:
+        """Return what is wrong if the multipliers do not prove the plan the best.
 
-        With floating hands, the least of their sets about the plan.
+        With floating hands, the best of their sets about the plan.
         """
         if self.search is not None and self.search.found == "unproven":
             return []
-        bound = program.least_bound(self.data, self.outcome)
-        if utilisation - bound <= OPTIMAL * max(1.0, utilisation):
-            return []
-        return [f"utilisation {utilisation:.6g} is only proven to be above {bound:.6g}"]
+        data = self.data
+        if self.least_used is not None and self.least_effort is not None:
+            # of these sets, which are about another point, the outcome is
+            data = self.least_used.sets.data
+        bound = dual_bounds.least_bound(data, self.outcome)
+        used = self.utilisation if self.least_effort is None else self.outcome.value
+        if used - bound > OPTIMAL * max(1.0, used):
+            return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
+        if self.least_effort is not None:
+            effort = self.least_effort.value
+            if self.search is not None:
+                effort = self.search.measure.effort
+            bound = dual_bounds.least_effort_bound(self.data, self.least_effort, self.cap)
+            if effort - bound > OPTIMAL * max(1.0, effort):
+                return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
+        return []
 
     def _residual(self, hands: Sequence[HandPlan]) -> Array:
         body = self.question.stance.body.inverse()
@@ -433,54 +500,61 @@ class _Answer:
             total = total - wrench_transport(body @ place.pose) @ hand.wrench
         return np.asarray(total)
 
+    @property
+    def _limbs(self) -> list[str]:
+        return [hand.limb for hand in self.question.stance.hands]
+
+    def _idle_joints(self) -> list[Used]:
+        """Return how much of their joints' torque limbs without a hand use."""
+        if self.where is None:
+            return []
+        found = []
+        for limb, joints in self.where.joints.items():
+            if limb not in self._limbs:
+                for name, torque, most in zip(
+                    joints.names, joints.gravity, joints.limits, strict=True
+                ):
+                    named = LimitName(limb, None, None, JOINT_TORQUE, name)
+                    found.append(Used(named, abs(float(torque)), float(most)))
+        return found
+
+    def _joint_torque(self, hands: Sequence[HandPlan] | None) -> dict[str, Array] | None:
+        """Return the torques of all joints [N·m], as the hands' wrenches make them."""
+        if self.where is None or hands is None:
+            return None
+        wrenches = {hand.limb: hand.wrench for hand in hands}
+        return {
+            limb: joints.torques(wrenches.get(limb, np.zeros(6)))
+            for limb, joints in self.where.joints.items()
+        }
+
     def _explain(
-        self,
-        hands: Sequence[HandPlan],
-        utilisation: float,
-        status: Status,
-        dear: Sequence[Price],
+        self, utilisation: float, idle: Sequence[Used], dear: Sequence[Price]
     ) -> tuple[LimitName | None, str]:
-        """Return the limit with the largest utilisation, and a sentence about it.
-
-        Of limits that tie, the dearest: the others only follow it.
-        """
-        close = utilisation - 2.0 * SLACK * max(1.0, utilisation)
-        rank_of = {price.name: len(dear) - i for i, price in enumerate(dear)}
-        best: tuple[bool, int, float] | None = None
-        limiting: LimitName | None = None
-        sentence = "nothing limits this stance"
-        held = utilisation <= 1.0 + SLACK
-        for hand, space, y in zip(hands, self.spaces, self.loads, strict=True):
-            for row, used in enumerate(space.utilisations(y)):
-                name = limit_name(hand.limb, space.rows[row])
-                rank = (bool(used >= close), rank_of.get(name, 0), float(used))
-                if best is None or rank > best:
-                    best, limiting = rank, name
-                    load, capacity = float(used * space.s[row]), float(space.s[row])
-                    sentence = limit_sentence(name, load, capacity, hand, held=held)
-        if status == "overloaded" and held:
-            cap = self.question.limits.utilisation
+        """Return the limit with the largest utilisation, and a sentence about it."""
+        used = [*used_limits(self._limbs, self.spaces, self.loads), *idle]
+        most = limiting_limit(used, utilisation, dear)
+        if most is None:
+            return None, "nothing limits this stance"
+        cap, held = self.question.limits.utilisation, utilisation <= 1.0 + SLACK
+        hand = next((hand for hand in self.hands if hand.limb == most.name.limb), None)
+        sentence = limit_sentence(most, hand, held=held)
+        if held and utilisation > cap + SLACK:
             sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
-        return limiting, sentence
+        return most.name, sentence
 
-    def _prices(self) -> tuple[Price, ...]:
-        """Return the price of each limit that binds; rows of one name are one limit.
+    def _prices(self, idle: Sequence[Used]) -> tuple[Price, ...]:
+        """Return what more of each limit that binds would take off the utilisation."""
+        most = max(idle, key=lambda used: used.utilisation, default=None)
+        if most is not None and most.utilisation > self.utilisation + SLACK:
+            # a limb without a hand bears the most: nothing else counts
+            price = most.utilisation / most.capacity
+            return (Price(most.name, price, unit_of(most.name.limit)),)
+        duals, value = self.outcome.limit_duals, self.outcome.value
+        return prices(self._limbs, self.spaces, duals, value)
 
-        The dearest first: of which one per cent more would take most off the utilisation, so that
-        newtons compare with amperes.
-        """
-        prices: dict[LimitName, float] = {}
-        worth: dict[LimitName, float] = {}
-        for place, space, duals in zip(
-            self.question.stance.hands, self.spaces, self.outcome.limit_duals, strict=True
-        ):
-            for row, multiplier, capacity in zip(space.rows, duals, space.s, strict=False):
-                if multiplier > BINDING:
-                    name = limit_name(place.limb, row)
-                    price = float(multiplier * self.outcome.value / capacity)
-                    prices[name] = prices.get(name, 0.0) + price
-                    worth[name] = worth.get(name, 0.0) + float(multiplier)
-        return tuple(
-            Price(name, prices[name], UNITS.get(name.limit, "N"))
-            for name in sorted(worth, key=lambda name: -round(worth[name], ALIKE))
-        )
+    def _effort_prices(self) -> tuple[Price, ...] | None:
+        """Return what more of each limit that binds would take off the effort."""
+        if self.least_effort is None:
+            return None
+        return prices(self._limbs, self.spaces, self.least_effort.limit_duals, self.cap)

@@ -1,8 +1,8 @@
-"""Where the hands are, what the body needs, and what is asked about it."""
+"""Where the body, its hands and its joints are."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
@@ -15,12 +15,15 @@ from hand_models.holds import Hold
 from hand_models.spines import Surface
 from planner.robosimian import Robot, robosimian
 
-__all__ = ["EARTH", "HandOnHold", "Limits", "Load", "Question", "Stance", "Wrist"]
+__all__ = ["EARTH", "SOLVE", "HandOnHold", "Stance", "Wrist", "known_limbs", "moderate"]
 
 Wrist = Literal["fixed", "floating"]
 
 WRISTS: Final = get_args(Wrist)
 """How a wrist may be."""
+
+SOLVE: Final = "solve"
+"""Of joints: find them from the hands' poses."""
 
 EARTH: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
@@ -38,7 +41,16 @@ ORTHONORMAL: Final = 1e-6
 """How far the products of a pose's axes may be from those of orthonormal ones."""
 
 
-def _moderate(wrench: Array, field: str | None) -> Array:
+def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
+    """Refuse limbs that the robot does not have."""
+    for limb in named:
+        if limb not in robot.limbs:
+            raise InvalidInputError(
+                f"unknown limb; known are {', '.join(robot.limbs)}", field=f"{field}.{limb}"
+            )
+
+
+def moderate(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     if not np.abs(wrench).max() <= HEAVIEST:
         raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
@@ -84,6 +96,8 @@ class HandOnHold:
     tendon_preload : ndarray, shape (4,), optional
         Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
         default.
+    wrench : tuple of float or None, length 6, optional
+        What the hand must exert on the rock, in H [N, N·m]; components that are None are free.
     """
 
     limb: str
@@ -95,6 +109,7 @@ class HandOnHold:
     grasp: Grasp = field(default_factory=Grasp)
     wrist: Wrist = "fixed"
     tendon_preload: Array | None = None
+    wrench: tuple[float | None, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.wrist not in WRISTS:
@@ -109,6 +124,13 @@ class HandOnHold:
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
             object.__setattr__(self, "tendon_preload", preload)
+        if self.wrench is not None:
+            if len(self.wrench) != 6:
+                raise InvalidInputError(
+                    f"6 components are needed, got {len(self.wrench)}", field="wrench"
+                )
+            given = [0.0 if value is None else value for value in self.wrench]
+            moderate(finite_vector(given, 6, "wrench"), "wrench")
         if self.hold_pose is not None and self.hold_in_hand is not None:
             raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
         _possible(self.pose, "pose")
@@ -137,14 +159,35 @@ class Stance:
     gravity : ndarray, shape (3,)
         In W [m/s²].
     robot : Robot
+    joints : mapping of str to ndarray, 'solve' or None
+        Angles of each limb's joints [rad], of every limb that holds on at least; or that they are
+        to be found. None: nothing is said of them, and torques do not count.
     """
 
     hands: tuple[HandOnHold, ...]
     body: Pose
     gravity: Array = field(default_factory=lambda: np.array(EARTH))
     robot: Robot = field(default_factory=robosimian)
+    joints: Mapping[str, Array] | Literal["solve"] | None = None
 
     def __post_init__(self) -> None:
+        self._check_hands()
+        if isinstance(self.joints, str):
+            if self.joints != SOLVE:
+                raise InvalidInputError(
+                    f"valid are angles of each limb, or {SOLVE!r}; got {self.joints!r}",
+                    field="joints",
+                )
+        elif self.joints is not None:
+            names = self.robot.model.joint_names
+            known_limbs(self.joints, self.robot, "joints")
+            joints = {
+                limb: finite_vector(angles, len(names[limb]), f"joints.{limb}")
+                for limb, angles in self.joints.items()
+            }
+            object.__setattr__(self, "joints", joints)
+
+    def _check_hands(self) -> None:
         if not self.hands:
             raise InvalidInputError("at least one hand is needed", field="hands")
         _possible(self.body, "body")
@@ -168,99 +211,3 @@ class Stance:
                     f"{self.robot.reach:.2g} m (positions are in metres)",
                     field=f"hands[{i}].pose.position",
                 )
-
-
-@dataclass(frozen=True)
-class Load:
-    """What the body weighs and how it is to move.
-
-    Attributes
-    ----------
-    mass : float, optional
-        [kg]; the robot's own with its hands.
-    com : tuple of float, optional
-        Centre of mass in B [m]; the robot's own.
-    acceleration : tuple of float
-        Of the body in W [m/s²].
-    """
-
-    mass: float | None = None
-    com: tuple[float, float, float] | None = None
-    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def body_wrench(self, stance: Stance) -> Array:
-        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
-
-        ``f = m (a − g)`` at the centre of mass; the body does not turn.
-        """
-        mass = stance.robot.mass if self.mass is None else self.mass
-        if not (math.isfinite(mass) and mass > 0.0):
-            raise InvalidInputError(f"must be above 0 kg, got {mass:g}", field="mass")
-        com = finite_vector(stance.robot.com if self.com is None else self.com, 3, "com")
-        acceleration = finite_vector(self.acceleration, 3, "acceleration")
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-            wrench = np.concatenate([force, np.cross(com, force)])
-        return _moderate(wrench, None)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Caps that a caller puts on a plan.
-
-    Attributes
-    ----------
-    utilisation : float
-        Largest utilisation that still counts as ``optimal``, in (0, 1].
-    tendon_tension : float, optional
-        Of every tendon [N]; the hand's own maximum if that is less.
-    """
-
-    utilisation: float = 1.0
-    tendon_tension: float | None = None
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.utilisation <= 1.0:
-            raise InvalidInputError(
-                f"must be in (0, 1], got {self.utilisation:g}", field="utilisation"
-            )
-        tension = self.tendon_tension
-        if tension is not None and not (math.isfinite(tension) and tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tendon_tension")
-
-
-Want = Literal["load_factor", "prices", "model"]
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A stance, and what is asked of it.
-
-    Attributes
-    ----------
-    stance : Stance
-    body_wrench : ndarray, shape (6,), optional
-        In B [N, N·m]; computed from ``load`` if it is not given.
-    load : Load
-    limits : Limits
-    want : frozenset of {'load_factor', 'prices', 'model'}
-        Extras.
-    """
-
-    stance: Stance
-    body_wrench: Array | None = None
-    load: Load = field(default_factory=Load)
-    limits: Limits = field(default_factory=Limits)
-    want: frozenset[Want] = frozenset()
-
-    def __post_init__(self) -> None:
-        if self.body_wrench is not None:
-            wrench = finite_vector(self.body_wrench, 6, "body_wrench")
-            _moderate(wrench, "body_wrench")
-            object.__setattr__(self, "body_wrench", wrench)
-
-    def needed_wrench(self) -> Array:
-        """Return the body wrench that is planned for, shape (6,) [N, N·m]."""
-        if self.body_wrench is not None:
-            return self.body_wrench
-        return self.load.body_wrench(self.stance)

@@ -4,7 +4,8 @@ Nothing here is shared with the way the plan was found. Tile loads are recompute
 by solving the full equilibrium of Eq. 6 (joint rows and tile rows, forces in the finger's frame),
 not by the affine maps of Eq. 14, motors and winches from those; wrenches are summed force by force;
 limits are Eq. 21 itself, the plan's half-planes and the structure's published figures; balance is
-added up in the body frame. What is different where a wrist floats is in `verify_floating`.
+added up in the body frame. What is different where a wrist floats is in `verify_floating`, what
+joints and callers ask in `verify_limbs`.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.structure import HELD
 from planner.plan import FingerPlan, HandPlan, TileLoad
-from planner.stance import HandOnHold, Question
+from planner.posture import Posture
+from planner.question import Question
+from planner.stance import HandOnHold
 from planner.verify_floating import check_finger, check_palm
+from planner.verify_limbs import check_asked, check_limbs, force_use
 
 __all__ = ["BALANCE", "LOAD", "UTILISATION", "equilibrium", "problems"]
 
@@ -39,6 +43,9 @@ STOP: Final = 1e-6
 
 UTILISATION: Final = 1e-6
 """How far a utilisation may be from what the plan says."""
+
+EFFORT: Final = 1e-6
+"""How far the effort may be from what the plan says, relative."""
 
 DRIVE: Final = 1e-9
 """How far a motor's torque, current or winch angle may be from what the plan says, relative."""
@@ -116,6 +123,8 @@ def problems(
     hands: Sequence[HandPlan],
     utilisation: float,
     body_wrench: Array,
+    where: Posture | None = None,
+    effort: float | None = None,
 ) -> list[str]:
     """Return what is wrong with a plan, each in a sentence; nothing if it may leave.
 
@@ -130,13 +139,22 @@ def problems(
         The plan's.
     body_wrench : ndarray, shape (6,)
         The one planned for, in B.
+    where : Posture, optional
+        The joints; None if the question says nothing of them.
+    effort : float, optional
+        The plan's.
     """
     found: list[str] = []
     total = np.zeros(6)
-    worst = 0.0
+    limbs = check_limbs(found, question, hands, body_wrench, where)
+    worst = max(limbs.utilisation.values(), default=0.0)
+    relative = 0.0
     into_body = question.stance.body.rotation.T
     for place, hand, plan in zip(question.stance.hands, settled, hands, strict=True):
-        worst = max(worst, _check_hand(found, question, place, hand, plan))
+        bears = limbs.utilisation.get(place.limb, 0.0)
+        worst = max(worst, _check_hand(found, question, place, hand, plan, bears))
+        relative += limbs.effort.get(place.limb, 0.0)
+        relative += sum((f.tendon_tension / _strength(question, hand)) ** 2 for f in plan.fingers)
         # carried to B by hand: the rock's reaction at the hand's place
         force = into_body @ place.pose.rotation @ -plan.wrench[:3]
         moment = into_body @ place.pose.rotation @ -plan.wrench[3:]
@@ -147,20 +165,26 @@ def problems(
     if not error <= allowed:
         found.append(f"balance is off by {error:.3g} of {np.linalg.norm(body_wrench):.3g}")
     _compare(found, "plan", worst, utilisation)
+    if effort is not None and not abs(relative - effort) <= EFFORT * max(1.0, relative):
+        found.append(f"plan: effort is {relative:.8g}, not {effort:.8g}")
     return found
 
 
 def _check_hand(
-    found: list[str], question: Question, place: HandOnHold, hand: SettledHand, plan: HandPlan
+    found: list[str],
+    question: Question,
+    place: HandOnHold,
+    hand: SettledHand,
+    plan: HandPlan,
+    bears: float,
 ) -> float:
-    """Check one hand; return its utilisation as recomputed."""
+    """Check one hand, whose joints use so much; return its utilisation as recomputed."""
     limb = plan.limb
     loads = [abs(v) for f in plan.fingers for t in f.tiles for v in (t.shear, t.normal, t.lateral)]
     allowed = LOAD * max(1.0, *loads, *np.abs(plan.palm.force).tolist())
-    maximum = hand.hand.maximum_tension
-    if question.limits.tendon_tension is not None:
-        maximum = min(maximum, question.limits.tendon_tension)
-    worst = 0.0
+    maximum = _strength(question, hand)
+    worst = max(bears, force_use(found, question, place, plan, allowed))
+    check_asked(found, question, place, plan, allowed)
     wrench = np.zeros(6)
     if (place.wrist == "floating") != (plan.wrist is not None):
         found.append(f"{limb}: the wrist is not {place.wrist}")
@@ -234,6 +258,12 @@ def _check_hand(
     worst = max(worst, _check_held(found, hand, plan, allowed))
     _compare(found, limb, worst, plan.utilisation)
     return worst
+
+
+def _strength(question: Question, hand: SettledHand) -> float:
+    """Return the largest tension that a hand's tendons may hold [N]."""
+    cap, most = question.limits.tendon_tension, hand.hand.maximum_tension
+    return most if cap is None else min(most, cap)
 
 
 def _at_tension(

@@ -8,6 +8,6 @@ and ``command`` are ways to reach it.
 """
 
 from service.client import CruxClient
-from service.requests import PlanRequest, WrenchSpaceRequest
+from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
 
-__all__ = ["CruxClient", "PlanRequest", "WrenchSpaceRequest"]
+__all__ = ["BodySpaceRequest", "CruxClient", "PlanRequest", "WrenchSpaceRequest"]

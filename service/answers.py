@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,15 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS, Seating, SettledHand, Tile
 from hand_models.spines import HalfPlane
 from hand_models.wrench_space import WrenchSpace
-from planner.plan import Certificate, HandPlan, LimitName, Plan, Price, TileLoad, WristPlan
+from planner.plan import (
+    HandPlan,
+    LimitName,
+    Plan,
+    Price,
+    TensionPath,
+    TileLoad,
+    WristPlan,
+)
 from service import replies
 from service.replies import AXES
 
@@ -42,13 +50,19 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         warnings=list(answer.warnings),
         body_wrench=_vector(answer.body_wrench),
         utilisation=_number(answer.utilisation),
+        effort=_number(answer.effort),
         load_factor=_number(answer.load_factor),
         load_factor_unbounded=answer.load_factor_unbounded,
         limiting=None if answer.limiting is None else _limit(answer.limiting),
         hands=None if answer.hands is None else [_hand(h, model) for h in answer.hands],
-        prices=None if answer.prices is None else [_price(price) for price in answer.prices],
-        certificate=None if answer.certificate is None else _certificate(answer.certificate),
+        joints=_by_limb(answer.joints),
+        joint_torque=_by_limb(answer.joint_torque),
+        joint_torque_limit=_by_limb(answer.joint_torque_limit),
+        prices=_prices(answer.prices),
+        effort_prices=_prices(answer.effort_prices),
+        certificate=_certificate(answer, model),
         residual=None if answer.residual is None else _vector(answer.residual),
+        path=None if answer.path is None else _path(answer.path),
         verified=answer.verified,
         solver=replies.Solver(
             answer.solver.name, answer.solver.status, int(answer.solver.iterations)
@@ -164,24 +178,65 @@ def _number(value: float | None) -> float | None:
 
 
 def _limit(name: LimitName) -> replies.LimitName:
-    return replies.LimitName(name.limb, name.finger, name.phalanx, name.limit)
+    return replies.LimitName(
+        limb=name.limb,
+        finger=name.finger,
+        phalanx=name.phalanx,
+        limit=name.limit,
+        joint=name.joint,
+    )
 
 
 def _price(price: Price) -> replies.Price:
     name = price.name
     return replies.Price(
-        name.limb, name.finger, name.phalanx, name.limit, float(price.price), price.unit
+        limb=name.limb,
+        finger=name.finger,
+        phalanx=name.phalanx,
+        limit=name.limit,
+        joint=name.joint,
+        price=float(price.price),
+        unit=price.unit,
     )
 
 
-def _certificate(certificate: Certificate) -> replies.Certificate:
+def _prices(prices: Iterable[Price] | None) -> list[replies.Price] | None:
+    return None if prices is None else [_price(price) for price in prices]
+
+
+def _by_limb(values: Mapping[str, Array] | None) -> dict[str, list[float]] | None:
+    return None if values is None else {limb: _vector(value) for limb, value in values.items()}
+
+
+def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
+    """Return the proof; with the hands' sets where no plan's hands carry them."""
+    proof = answer.certificate
+    if proof is None:
+        return None
     return replies.Certificate(
-        direction=_vector(certificate.direction),
-        supremum=float(certificate.supremum),
-        needed=float(certificate.needed),
-        shortfall=_vector(certificate.shortfall),
-        nearest=_vector(certificate.nearest),
-        blocking=[_limit(name) for name in certificate.blocking],
+        utilisation=_number(proof.utilisation),
+        direction=_vector(proof.direction),
+        held={limb: _vector(part) for limb, part in proof.held.items()},
+        supremum=float(proof.supremum),
+        needed=float(proof.needed),
+        shortfall=None if proof.shortfall is None else _vector(proof.shortfall),
+        nearest=None if proof.nearest is None else _vector(proof.nearest),
+        blocking=[_limit(name) for name in proof.blocking],
+        irreducible=None
+        if proof.irreducible is None
+        else [_limit(name) for name in proof.irreducible],
+        wrench_spaces={limb: _wrench_set(space) for limb, space in proof.spaces.items()}
+        if model and answer.hands is None
+        else UNSET,
+    )
+
+
+def _path(path: TensionPath) -> replies.TensionPath:
+    return replies.TensionPath(
+        safe=path.safe,
+        safe_part=float(path.safe_part),
+        utilisation_at_present=_number(path.utilisation_at_present),
+        largest_change=float(path.largest_change),
     )
 
 
@@ -284,6 +339,7 @@ def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
                 finger=row.finger,
                 phalanx=row.phalanx,
                 limit=row.limit,
+                joint=row.joint,
                 coefficients=_vector(a),
                 constant=float(constant),
                 capacity=float(capacity),

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from typing import Final
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import Any, Final
 
 import msgspec
 from msgspec import inspect
 
-__all__ = ["blame"]
+__all__ = ["blame", "leaves_open"]
 
 WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
+ANY_KEY: Final = "[...]"
+"""What stands in msgspec's paths for a key that the caller chose."""
+
 STEP: Final = re.compile(r"\.([^.\[\]]+)|\[([^\]]*)\]")
 WORDS: Final = {
     "float": "a number",
@@ -21,12 +25,17 @@ WORDS: Final = {
     "array": "a list",
     "object": "an object",
     "null": "null",
+    "None": "null",
 }
+Decoder = Callable[[Any], object]
+
 LONGEST: Final = 400
 """Characters of a message: it may quote the request."""
 
 
-def blame(error: msgspec.ValidationError, kind: type) -> tuple[str | None, str]:
+def blame(
+    error: msgspec.ValidationError, kind: type, document: Any, decode: Decoder
+) -> tuple[str | None, str]:
     """Return the field's dotted path, or None for the whole message, and one line about it.
 
     Parameters
@@ -35,13 +44,18 @@ def blame(error: msgspec.ValidationError, kind: type) -> tuple[str | None, str]:
         From decoding a ``kind``.
     kind : type
         Message that was expected.
+    document : object
+        What was decoded, as plain lists and dicts, to look up keys that the caller chose; None
+        where those are not known.
+    decode : callable
+        Decodes such a document, or a part of it, as the first one was; raises what that raised.
     """
     text = str(error)
     found = WHERE.search(text)
     path = found.group(1) if found else ""
     complaint = text[: found.start()] if found else text
     types = list(_types_at(inspect.type_info(kind), path))
-    field = path.removeprefix(".")
+    field = _with_keys(path, document, decode).removeprefix(".")
 
     name = re.search(r"`(.*)`$", complaint, re.DOTALL)
     if complaint.startswith("Object missing required field") and name:
@@ -59,8 +73,77 @@ def blame(error: msgspec.ValidationError, kind: type) -> tuple[str | None, str]:
     return _clip(field) or None, _clip(message)
 
 
+def leaves_open(error: msgspec.ValidationError) -> bool:
+    """Say whether an error names its field but for a key that the caller chose."""
+    return ANY_KEY in str(error)
+
+
 def _clip(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def _with_keys(path: str, document: Any, decode: Decoder) -> str:
+    """Return a path with the keys that msgspec leaves open."""
+    first, *others = path.split(ANY_KEY)
+    text, steps = first, _steps(first)
+    for part in others:
+        key = _key_to_blame(steps, path, document, decode)
+        if key is None:
+            return path
+        text += f".{key}{part}"
+        steps += [key, *_steps(part)]
+    return text
+
+
+def _steps(path: str) -> list[str | int]:
+    return [name or int(index) for name, index in STEP.findall(path)]
+
+
+def _key_to_blame(place: list[str | int], path: str, document: Any, decode: Decoder) -> str | None:
+    """Return the key whose value is wrong in an object of a document; None if none can be told.
+
+    Values are read in order up to the first that is wrong, so it is the last of the shortest
+    beginning of the object that is refused for the same field.
+    """
+    try:
+        keys = list(_at(document, place))
+        few, many = 0, len(keys)
+        if not _refused(document, path, decode):
+            return None
+        while many - few > 1:
+            middle = (few + many) // 2
+            if _refused(_beginning(document, place, middle), path, decode):
+                many = middle
+            else:
+                few = middle
+        return str(keys[few])
+    except (LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _at(document: Any, steps: list[str | int]) -> Any:
+    for step in steps:
+        document = document[step]
+    return document
+
+
+def _beginning(document: Any, steps: list[str | int], count: int) -> Any:
+    """Return a document with only the first few entries of the object at a place."""
+    if not steps:
+        return dict(islice(document.items(), count))
+    copy = document.copy()
+    copy[steps[0]] = _beginning(document[steps[0]], steps[1:], count)
+    return copy
+
+
+def _refused(document: Any, path: str, decode: Decoder) -> bool:
+    """Say whether a document is refused for the field of that path."""
+    try:
+        decode(document)
+    except msgspec.ValidationError as error:
+        found = WHERE.search(str(error))
+        return found is not None and found.group(1) == path
+    return False
 
 
 def _plain(match: re.Match[str]) -> str:
@@ -91,6 +174,8 @@ def _types_at(kind: inspect.Type, path: str) -> Iterable[inspect.Type]:
                 found += fields
             elif isinstance(parent, inspect.ListType):
                 found.append(parent.item_type)
+            elif isinstance(parent, inspect.DictType) and f"[{index}]" == ANY_KEY:
+                found.append(parent.value_type)
             elif isinstance(parent, inspect.TupleType) and index.isdigit():
                 found += parent.item_types[int(index) : int(index) + 1]
         types = [bare for one in found for bare in _bare(one)]

@@ -18,27 +18,23 @@ __all__ = ["check"]
 
 
 class _Later(NamedTuple):
-    """The only value of a field that this version supports, and what to tell who gives another."""
+    """Values of a field that this version supports, and what to tell who gives another."""
 
-    supported: object
+    supported: tuple[object, ...]
     advice: str
 
 
 _OMIT = "leave it out"
 
+_OBJECTIVE = _Later(("max_margin", "min_effort"), "valid are max_margin and min_effort")
+
 LATER: Final[dict[type, dict[str, _Later]]] = {
     requests.PlanRequest: {
-        "objective": _Later("max_margin", "valid is max_margin"),
-        "confidence": _Later(None, f"{_OMIT}: tile limits are nominal"),
-        "deadline": _Later(None, f"{_OMIT}: a plan takes as long as it takes"),
+        "objective": _OBJECTIVE,
+        "confidence": _Later((None,), f"{_OMIT}: tile limits are nominal"),
+        "deadline": _Later((None,), f"{_OMIT}: a plan takes as long as it takes"),
     },
-    requests.Stance: {
-        "joints": _Later(None, f"{_OMIT}: joint torques are not planned"),
-    },
-    requests.Limits: {
-        "joint_torque": _Later(None, f"{_OMIT}; valid limits are utilisation and tendon_tension"),
-        "per_hand": _Later(None, f"{_OMIT}; valid limits are utilisation and tendon_tension"),
-    },
+    requests.RouteRequest: {"objective": _OBJECTIVE},
 }
 """By message and field, what this version supports of the fields that later versions will."""
 
@@ -63,7 +59,7 @@ def check(value: object, path: str = "") -> None:
         later = {k: v for kind in type(value).__mro__ for k, v in LATER.get(kind, {}).items()}
         for name in value.__struct_fields__:
             part, field = getattr(value, name), f"{path}.{name}" if path else name
-            if name in later and part != later[name].supported:
+            if name in later and part not in later[name].supported:
                 raise UnsupportedError(
                     f"{_given(part)}not supported in this version; {later[name].advice}",
                     field=field,

@@ -12,9 +12,9 @@ import zenoh
 from service.codec import Format
 from service.config import open_session
 from service.errors import MalformedError, NoServiceError, ServiceError, ServiceTimeout
-from service.keys import PLAN, WRENCH_SPACE, service_key
-from service.replies import ErrorReply, PlanReply, Reply, WrenchSpaceReply
-from service.requests import PlanRequest, Request, WrenchSpaceRequest
+from service.keys import BODY_SPACE, DEFAULT_ROBOT, PLAN, WRENCH_SPACE, service_key
+from service.replies import BodySpaceReply, ErrorReply, PlanReply, Reply, WrenchSpaceReply
+from service.requests import BodySpaceRequest, PlanRequest, Request, WrenchSpaceRequest
 
 __all__ = ["TIMEOUT", "CruxClient"]
 
@@ -49,7 +49,7 @@ class CruxClient:
     def __init__(
         self,
         where: zenoh.Session | zenoh.Config,
-        robot: str = "robosimian",
+        robot: str = DEFAULT_ROBOT,
         *,
         timeout: float = TIMEOUT,
         form: Format = Format.MSGPACK,
@@ -96,6 +96,10 @@ class CruxClient:
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
         return self._ask(WRENCH_SPACE, request, WrenchSpaceReply)
+
+    def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
+        """Return what a stance can hold; raises what `plan` raises."""
+        return self._ask(BODY_SPACE, request, BodySpaceReply)
 
     def _ask(self, name: str, request: Request, kind: type[R]) -> R:
         key = service_key(self.robot, name)

@@ -21,10 +21,15 @@ def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) ->
     table = table_of("", "move", "phase", "limb", "status")
     table.add_column("util", justify="right")
     table.add_column("load factor", justify="right")
+    joints = any(plan.joint_utilisation is not None for plan in result.plans)
+    if joints:
+        table.add_column("joints", justify="right")
     for stage, plan in zip(result.stages, result.plans, strict=True):
-        used = "-" if plan.utilisation is None else f"{plan.utilisation:.2f}"
-        factor = "-" if plan.load_factor is None else f"{plan.load_factor:.2f}"
-        cells = (str(stage.move), stage.phase, stage.limb or "-", plan.status, used, factor)
+        numbers = [plan.utilisation, plan.load_factor]
+        if joints:
+            numbers.append(plan.joint_utilisation)
+        shown = ("-" if number is None else f"{number:.2f}" for number in numbers)
+        cells = (str(stage.move), stage.phase, stage.limb or "-", plan.status, *shown)
         hard = stage.index == result.crux
         table.add_row("crux" if hard else "", *cells, style="bold" if hard else "")
     out.print(table)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 
 from hand_models.errors import CruxError, InvalidInputError
-from service.blame import blame
+from service.blame import blame, leaves_open
 from service.checks import check
 from service.errors import MalformedError
 from service.replies import ErrorDetail, ErrorReply
@@ -56,7 +56,7 @@ class Format(Enum):
         """Return the encoding of a message with its schema, as in ``…/json;crux.PlanReply@1``."""
         return f"{self.value};crux.{type(message).__name__}@1"
 
-    def encode(self, message: msgspec.Struct) -> bytes:
+    def encode(self, message: object) -> bytes:
         """Return a message as bytes."""
         if self is Format.JSON:
             return msgspec.json.encode(message)
@@ -97,13 +97,24 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
     try:
         request = form.decode(payload, kind)
     except msgspec.ValidationError as error:
-        field, message = blame(error, kind)
+        document = _plain(payload, form) if leaves_open(error) else None
+        field, message = blame(
+            error, kind, document, lambda part: form.decode(form.encode(part), kind)
+        )
         raise InvalidInputError(message, field=field) from None
     try:
         check(request)
     except RecursionError:
         raise MalformedError("nested too deeply") from None
     return request
+
+
+def _plain(payload: bytes, form: Format) -> Any:
+    """Return bytes as plain lists and dicts, or None where they go on as no message."""
+    try:
+        return form.decode(payload, Any)
+    except (MalformedError, msgspec.ValidationError):
+        return None
 
 
 def encode_error(kind: str, error: CruxError, form: Format) -> tuple[bytes, str]:

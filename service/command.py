@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args
 
 import click
 import msgspec
@@ -32,15 +32,29 @@ from service.config import (
     zenoh_options,
 )
 from service.errors import REQUEST_KINDS
+from service.keys import DEFAULT_ROBOT
 from service.own_hand import read_hand, with_hand
 from service.replies import PlanReply
-from service.requests import PlanRequest, Want, WrenchSpaceRequest
+from service.requests import (
+    Axis,
+    BodySpaceRequest,
+    PlanRequest,
+    RouteRequest,
+    Want,
+    WrenchSpaceRequest,
+)
 from service.schema import schema as message_schema
 from service.stances import read_request, read_route
 from service.studies import chosen_study, print_study, sweep_options
 from service.tables import console, print_plan, print_wrench_space
 
+if TYPE_CHECKING:
+    from planner.robot_file import RobotFile
+    from service.dispatch import Planned
+
 __all__ = ["crux", "main", "run"]
+
+R = TypeVar("R", PlanRequest, RouteRequest)
 
 DONE: Final = 0
 FAILED: Final = 1
@@ -52,7 +66,7 @@ EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": O
 
 PICTURES: Final = (".png", ".pdf", ".svg")
 HAND_FILE: Final = ".toml"
-DEMO_STANCE: Final = "wall-300"
+DEMO_STANCE: Final = "wall-300-joints"
 EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
 
@@ -115,6 +129,24 @@ def _read_hand(
     return read_hand(paths[0])
 
 
+def _read_robot(_: click.Context, __: click.Parameter, path: Path | None) -> RobotFile | None:
+    if path is None:
+        return None
+    from service.own_robot import read_robot
+
+    return read_robot(path)
+
+
+def _asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
+    """Return a request for a hand and a robot of the caller's own."""
+    request = with_hand(request, hand)
+    if robot is None:
+        return request
+    from service.own_robot import with_robot
+
+    return with_robot(request, robot)
+
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
     "--hand",
@@ -124,6 +156,13 @@ hand_option = click.option(
     metavar="FILE",
     help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
 )
+robot_option = click.option(
+    "--robot",
+    type=click.Path(path_type=Path),
+    callback=_read_robot,
+    metavar="FILE",
+    help="TOML that describes a robot of your own, and names its URDF.",
+)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
@@ -131,9 +170,11 @@ def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
     STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating, wall-700.
+    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating,
+    wall-300-joints, wall-700.
     ROUTE is the same of a climb; bundled is six-moves. LIMB is front_right, rear_right, rear_left
-    or front_left. --hand FILE puts numbers of your own in place of the bundled hand's.
+    or front_left. --hand FILE puts numbers of your own in place of the bundled hand's, --robot FILE
+    a robot of your own in place of RoboSimian.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.
@@ -146,31 +187,39 @@ def crux() -> None:
     "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
 )
 @hand_option
+@robot_option
 @json_option
-def plan(stance: str, picture: Path | None, hand: ParameterTable | None, as_json: bool) -> int:
+def plan(
+    stance: str,
+    picture: Path | None,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
     """Make one plan, without the network."""
     from service import dispatch
+    from service.own_robot import robots_of
 
-    request = _with_extras(with_hand(read_request(stance), hand))
+    request = _with_extras(_asked(read_request(stance), hand, robot))
+    robots = robots_of(robot)
     with _waiting(f"planning {stance}", request):
-        reply = dispatch.plan(request)
+        answer = dispatch.planned(request, robots)
         if picture is not None:
-            _draw_plan(request, picture)
-        bare = dispatch.plan(_without_palms(request))
+            _draw_plan(answer, picture)
+        bare = dispatch.plan(_without_palms(request), robots)
     if as_json:
-        _say(msgspec.to_builtins(reply) | {"load_factor_without_palm": bare.load_factor})
+        without = {"load_factor_without_palm": bare.load_factor}
+        _say(msgspec.to_builtins(answer.reply) | without)
     else:
-        print_plan(reply, console(), without_palm=bare)
-    return EXIT_STATUS.get(reply.status, FAILED)
+        print_plan(answer.reply, console(), without_palm=bare)
+    return EXIT_STATUS.get(answer.reply.status, FAILED)
 
 
-def _draw_plan(request: PlanRequest, picture: Path) -> None:
-    from planner import plots, solve
-    from service import questions
+def _draw_plan(answer: Planned, picture: Path) -> None:
+    from planner import plan_plots
 
-    question = questions.question(request)
     with _writing(picture):
-        plots.plot_plan(solve.plan(question), question.stance, picture)
+        plan_plots.plot_plan(answer.plan, answer.question, picture)
 
 
 @contextmanager
@@ -233,38 +282,42 @@ def _limb_and_hand(
     metavar="N",
     help="Of a floating hand: search N^6 poses of its wrist, too.",
 )
+@robot_option
 @json_option
 def wrench_space(
     stance: str,
     limb_and_hand: tuple[str, ParameterTable | None],
     picture: Path | None,
     per_axis: int | None,
+    robot: RobotFile | None,
     as_json: bool,
 ) -> int:
     """Show what one hand can carry."""
-    from planner import solve
+    from planner import settling
     from planner.wrist_survey import survey
     from service import dispatch, questions
+    from service.own_robot import robots_of
     from service.surveys import print_survey, survey_json
 
     limb, hand = limb_and_hand
+    robots = robots_of(robot)
     request = WrenchSpaceRequest(
-        v=1, stance=with_hand(read_request(stance), hand).stance, limb=limb
+        v=1, stance=_asked(read_request(stance), hand, robot).stance, limb=limb
     )
-    reply = dispatch.wrench_space(request)
+    reply = dispatch.wrench_space(request, robots)
     found = None
     if per_axis is not None:
-        wrist = solve.floating_wrist(questions.stance(request.stance), limb)
+        wrist = settling.floating_wrist(questions.stance(request.stance, robots), limb)
         with _progress(f"{per_axis}^6 poses of {limb}") as tell:
             found = survey(wrist, per_axis, tell)
     if picture is not None:
         from planner import hand_plots
 
-        drawn = questions.stance(request.stance)
-        settled, space = solve.hand_space(drawn, limb)
+        drawn = questions.stance(request.stance, robots)
+        settled, space = settling.hand_space(drawn, limb)
         shown, preload = space if reply.vertices else None, None
         if reply.wrist.mode == "floating":
-            preload = solve.floating_wrist(drawn, limb).hand.preload
+            preload = settling.floating_wrist(drawn, limb).hand.preload
         with _writing(picture):
             hand_plots.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}", preload)
     if as_json:
@@ -277,14 +330,95 @@ def wrench_space(
     return DONE if reply.vertices else OVERLOADED
 
 
+def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]:
+    names = [name.strip() for name in given.split(",")]
+    axes = [axis for name in names for axis in get_args(Axis) if axis == name]
+    if len(names) != 2 or len(axes) != 2 or axes[0] == axes[1]:
+        raise click.BadParameter(
+            f"two different ones of {', '.join(get_args(Axis))} are wanted, as fx,fz; got {given}"
+        )
+    return axes
+
+
+@crux.command("body-space")
+@click.argument("stance")
+@click.option(
+    "--axes",
+    default="fx,fz",
+    show_default=True,
+    callback=_check_axes,
+    metavar="AXIS,AXIS",
+    help="Of the plane of body wrenches that is shown: fx, fy, fz, mx, my or mz, in B.",
+)
+@click.option(
+    "--projection",
+    "others",
+    flag_value="free",
+    help="Whatever the other components; as asked for by default.",
+)
+@click.option("--pure", "others", flag_value="zero", help="With the other components zero.")
+@click.option(
+    "--plot",
+    "picture",
+    type=click.Path(path_type=Path),
+    callback=_check_picture,
+    metavar="FILE",
+    help="Draw it there, and the largest accelerations in two planes.",
+)
+@hand_option
+@robot_option
+@json_option
+def body_space(
+    stance: str,
+    axes: list[Axis],
+    others: Literal["free", "zero"] | None,
+    picture: Path | None,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Show what the body can bear: which wrenches, and which accelerations."""
+    from service.body_space import explore, print_body_space
+    from service.own_robot import robots_of
+
+    asked = _asked(read_request(stance), hand, robot)
+    request = BodySpaceRequest(
+        v=1,
+        id=asked.id,
+        stance=asked.stance,
+        body_wrench=asked.body_wrench,
+        load=asked.load,
+        limits=asked.limits,
+        present=asked.present,
+        axes=axes,
+        others=others or "needed",
+    )
+    with _waiting(f"exploring {stance}", asked):
+        found = explore(request, robots_of(robot))
+        if picture is not None:
+            from planner import body_plots
+
+            with _writing(picture):
+                body_plots.plot_body_space(found.space, found.section, picture, stance)
+    if as_json:
+        _say(found.reply)
+    else:
+        print_body_space(found.reply, console())
+    return EXIT_STATUS.get(found.reply.status, FAILED)
+
+
 @crux.command()
 @zenoh_options
 @hand_option
+@robot_option
 @json_option
-def serve(config: zenoh.Config, hand: ParameterTable | None, as_json: bool) -> None:
+def serve(
+    config: zenoh.Config, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool
+) -> None:
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
-    The hand of --hand is that of every question; a question's own numbers go on top.
+    The hand of --hand is that of every question; a question's own numbers go on top. The robot of
+    --robot is the only one that is planned for, and gives the keys its name.
     """
     stop = _StopSignal()
     from service.server import PlanService, prepare_zenoh
@@ -293,7 +427,7 @@ def serve(config: zenoh.Config, hand: ParameterTable | None, as_json: bool) -> N
     prepare_zenoh()
     start_zenoh_log()
     endpoints = listening(config)
-    with open_session(config) as session, PlanService(session, hand=hand) as service:
+    with open_session(config) as session, PlanService(session, robot, hand) as service:
         if as_json:
             _say({"v": 1, "keys": service.keys, "listen": endpoints})
         where = ", ".join(endpoints) or "no address"
@@ -335,14 +469,23 @@ def _timeout_option(command: Callable[..., Any]) -> Callable[..., Any]:
 @zenoh_options
 @_timeout_option
 @hand_option
+@robot_option
 @json_option
 def query(
-    stance: str, config: zenoh.Config, timeout: float, hand: ParameterTable | None, as_json: bool
+    stance: str,
+    config: zenoh.Config,
+    timeout: float,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
 ) -> int:
-    """Ask a running service for a plan."""
-    request = _with_extras(with_hand(read_request(stance), hand))
+    """Ask a running service for a plan.
+
+    It has to serve the robot that the stance or --robot names.
+    """
+    request = _with_extras(_asked(read_request(stance), hand, robot))
     start_zenoh_log()
-    with CruxClient(config, request.stance.robot, timeout=timeout) as client:
+    with CruxClient(config, request.stance.robot or DEFAULT_ROBOT, timeout=timeout) as client:
         reply = client.plan(request)
     return _show(reply, as_json)
 
@@ -368,17 +511,20 @@ def _show(reply: PlanReply, as_json: bool) -> int:
     help="Where the picture goes.",
 )
 @hand_option
+@robot_option
 @json_option
-def demo(picture: Path, hand: ParameterTable | None, as_json: bool) -> int:
+def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer."""
+    from service import dispatch
+    from service.own_robot import robots_of
     from service.server import PlanService
 
-    request = _with_extras(with_hand(read_request(DEMO_STANCE), hand))
+    request = _with_extras(_asked(read_request(DEMO_STANCE), hand, robot))
     start_zenoh_log()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with open_session(config) as session, PlanService(session):
-        reply = CruxClient(session).plan(request)
-    _draw_plan(request, picture)
+    with open_session(config) as session, PlanService(session, robot) as service:
+        reply = CruxClient(session, service.robot).plan(request)
+    _draw_plan(dispatch.planned(request, robots_of(robot)), picture)
     status = _show(reply, as_json)
     if not as_json:
         console().print(f"picture: {picture}", markup=False)
@@ -446,9 +592,15 @@ def _filling_folder() -> Iterator[None]:
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
 @hand_option
+@robot_option
 @json_option
 def route(
-    route: str, folder: Path, workers: int | None, hand: ParameterTable | None, as_json: bool
+    route: str,
+    folder: Path,
+    workers: int | None,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
 ) -> int:
     """Evaluate a climb: every stance, and every one with a limb in the air.
 
@@ -458,8 +610,9 @@ def route(
     from planner.route import evaluate
     from service import questions
     from service.climb import print_route
+    from service.own_robot import robots_of
 
-    climb = questions.route(with_hand(read_route(route), hand))
+    climb = questions.route(_asked(read_route(route), hand, robot), robots_of(robot))
     with _progress(f"planning {climb.name}") as tell:
         result = evaluate(climb, workers, tell)
     with _filling_folder():

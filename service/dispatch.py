@@ -12,18 +12,30 @@ import numpy as np
 from hand_models.errors import CruxError, InvalidInputError
 from hand_models.fixed_wrist import tension_limits
 from hand_models.parameters import ParameterTable
-from planner import solve
-from planner.plan import WristPlan
+from planner import settling, solve
+from planner.plan import Plan, WristPlan
+from planner.question import Question
 from service.answers import plan_reply, wrench_space_reply
+from service.body_space import explore
 from service.codec import Format, decode_request, encode_error
 from service.errors import REQUEST_KINDS
-from service.keys import PLAN, WRENCH_SPACE
+from service.keys import BODY_SPACE, PLAN, WRENCH_SPACE
 from service.own_hand import over_default
+from service.own_robot import ROBOTS, Robots
 from service.questions import question, stance
-from service.replies import PlanReply, WrenchSpaceReply
-from service.requests import PlanRequest, WrenchSpaceRequest
+from service.replies import BodySpaceReply, PlanReply, WrenchSpaceReply
+from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
 
-__all__ = ["SERVICES", "Answer", "handle", "plan", "wrench_space"]
+__all__ = [
+    "SERVICES",
+    "Answer",
+    "Planned",
+    "body_space",
+    "handle",
+    "plan",
+    "planned",
+    "wrench_space",
+]
 
 log = logging.getLogger(__name__)
 
@@ -45,30 +57,52 @@ class Answer(NamedTuple):
     good: bool
 
 
-def plan(request: PlanRequest) -> PlanReply:
+def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply:
     """Answer a plan request.
+
+    Parameters
+    ----------
+    request : PlanRequest
+    robots : Robots, optional
+        Those that may be asked about.
 
     Raises
     ------
     InvalidInputError
         If the request is impossible; the field is relative to it.
     """
-    answer = solve.plan(question(request))
-    return plan_reply(answer, request.id, model="model" in request.want)
+    return planned(request, robots).reply
 
 
-def wrench_space(request: WrenchSpaceRequest) -> WrenchSpaceReply:
-    """Answer a wrench-space request.
+class Planned(NamedTuple):
+    """A plan request as the planner understands it, its plan, and what goes back."""
+
+    question: Question
+    plan: Plan
+    reply: PlanReply
+
+
+def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
+    """Answer a plan request, and keep what the reply leaves out; as `plan`."""
+    asked = question(request, robots)
+    answer = solve.plan(asked)
+    reply = plan_reply(answer, request.id, model="model" in request.want)
+    return Planned(asked, answer, reply)
+
+
+def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
+    """Answer a wrench-space request; parameters as for `plan`.
 
     Raises
     ------
     InvalidInputError
         If the request is impossible.
     """
-    hand = solve.resting_hand(stance(request.stance), request.limb)
+    asked = stance(request.stance, robots)
+    hand = settling.resting_hand(asked, request.limb)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     return wrench_space_reply(
-        request.stance.robot,
+        asked.robot.name,
         request.limb,
         hand.settled,
         hand.space,
@@ -77,20 +111,36 @@ def wrench_space(request: WrenchSpaceRequest) -> WrenchSpaceReply:
     )
 
 
+def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceReply:
+    """Answer a body-space request; parameters as for `plan`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    return explore(request, robots).reply
+
+
 class _Service(NamedTuple):
-    request: type[PlanRequest] | type[WrenchSpaceRequest]
+    request: type[PlanRequest] | type[WrenchSpaceRequest] | type[BodySpaceRequest]
     answer: Callable[..., msgspec.Struct]
 
 
 SERVICES: Final[dict[str, _Service]] = {
     PLAN: _Service(PlanRequest, plan),
     WRENCH_SPACE: _Service(WrenchSpaceRequest, wrench_space),
+    BODY_SPACE: _Service(BodySpaceRequest, body_space),
 }
 """By the last part of the key: what is asked, and who answers."""
 
 
 def handle(
-    key: str, payload: bytes, encoding: str = "", hand: ParameterTable | None = None
+    key: str,
+    payload: bytes,
+    encoding: str = "",
+    hand: ParameterTable | None = None,
+    robots: Robots = ROBOTS,
 ) -> Answer:
     """Answer a query.
 
@@ -104,6 +154,8 @@ def handle(
     hand : ParameterTable, optional
         Entries of the hand in which the service's is not the bundled one; a request's own entries
         go on top.
+    robots : Robots, optional
+        Those that may be asked about.
 
     Returns
     -------
@@ -115,7 +167,7 @@ def handle(
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
         request = over_default(decode_request(payload, service.request, form), hand)
-        reply = service.answer(request)
+        reply = service.answer(request, robots)
         return Answer(form.encode(reply), form.label(reply), True)
     except InvalidInputError as error:
         kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind

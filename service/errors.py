@@ -6,7 +6,7 @@ from hand_models.errors import CruxError, InvalidInputError
 
 __all__ = ["REQUEST_KINDS", "MalformedError", "NoServiceError", "ServiceError", "ServiceTimeout"]
 
-REQUEST_KINDS = frozenset({"malformed", "invalid", "unsupported"})
+REQUEST_KINDS = frozenset({"malformed", "invalid", "unsupported", "unreachable"})
 """Kinds of error that are the request's fault, so that asking again is of no use."""
 
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["ALIVE", "PLAN", "WRENCH_SPACE", "service_key"]
+__all__ = ["ALIVE", "BODY_SPACE", "DEFAULT_ROBOT", "PLAN", "WRENCH_SPACE", "service_key"]
 
 PLAN: Final = "plan"
 WRENCH_SPACE: Final = "wrench_space"
+BODY_SPACE: Final = "body_space"
 ALIVE: Final = "alive"
 """The liveliness token, which is there while the service is."""
+
+
+DEFAULT_ROBOT: Final = "robosimian"
+"""Whose stance is meant where nothing names a robot."""
 
 
 def service_key(robot: str, name: str) -> str:

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final, overload
+from typing import Literal, cast, get_args, overload
 
 import msgspec
 import numpy as np
 
 from hand_models import holds
 from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
+from hand_models.frames import Array, Pose
 from hand_models.hand import Grasp
 from hand_models.mesh import Mesh
 from hand_models.parameters import ParameterTable
 from hand_models.parameters.own import own_hand
 from hand_models.profile import Profile
 from hand_models.spines import Surface
-from planner.robosimian import Robot, robosimian
+from planner.question import ForceCap, Limits, Load, Objective, Question
 from planner.route import Move, Route
-from planner.stance import EARTH, HandOnHold, Limits, Load, Question, Stance
+from planner.stance import EARTH, HandOnHold, Stance
 from service import requests
+from service.own_robot import ROBOTS, Robots, builder_of
 
-__all__ = ["ROBOTS", "question", "route", "stance"]
-
-ROBOTS: Final[dict[str, Callable[[ParameterTable | None], Robot]]] = {"robosimian": robosimian}
-"""By name, what builds a robot from all numbers of its hands."""
+__all__ = ["question", "route", "stance"]
 
 
 @contextmanager
@@ -38,8 +37,14 @@ def _within(path: str) -> Iterator[None]:
         raise error.within(path) from None
 
 
-def question(request: requests.PlanRequest) -> Question:
+def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
     """Return what a plan request asks.
+
+    Parameters
+    ----------
+    request : PlanRequest
+    robots : Robots, optional
+        Those that may be asked about.
 
     Raises
     ------
@@ -49,23 +54,25 @@ def question(request: requests.PlanRequest) -> Question:
     if request.body_wrench is not None and request.load is not None:
         raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
     return Question(
-        stance=stance(request.stance),
+        stance=stance(request.stance, robots),
         body_wrench=None if request.body_wrench is None else np.array(request.body_wrench),
         load=_load(request.load),
         limits=_limits(request.limits),
         want=frozenset(request.want),
+        objective=_objective(request.objective),
+        present={limb: np.array(tensions) for limb, tensions in request.present.items()},
     )
 
 
-def route(request: requests.RouteRequest) -> Route:
-    """Return the climb of a route file.
+def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
+    """Return the climb of a route file; parameters as for `question`.
 
     Raises
     ------
     InvalidInputError
         If a part of it is impossible; the field is relative to the file.
     """
-    start = stance(request.stance)
+    start = stance(request.stance, robots)
     numbers = start.robot.hand.table
     return Route(
         name=request.name,
@@ -76,11 +83,12 @@ def route(request: requests.RouteRequest) -> Route:
         ),
         load=_load(request.load),
         limits=_limits(request.limits),
+        objective=_objective(request.objective),
     )
 
 
-def stance(message: requests.Stance) -> Stance:
-    """Return the stance of a request.
+def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
+    """Return the stance of a request; parameters as for `question`.
 
     Raises
     ------
@@ -88,13 +96,10 @@ def stance(message: requests.Stance) -> Stance:
         If a part of it is impossible; the field begins with ``stance``.
     """
     with _within("stance"):
-        if message.robot not in ROBOTS:
-            raise InvalidInputError(
-                f"unknown robot {message.robot!r}; known are {', '.join(ROBOTS)}", field="robot"
-            )
+        build = builder_of(message.robot, robots)
         with _within("hand"):
             own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
-            robot = ROBOTS[message.robot](own)
+            robot = build(own)
         numbers = robot.hand.table
         return Stance(
             hands=tuple(
@@ -103,17 +108,61 @@ def stance(message: requests.Stance) -> Stance:
             body=_pose(message.body, "body"),
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
             robot=robot,
+            joints=_joints(message.joints),
         )
+
+
+def _joints(
+    message: dict[str, list[float]] | Literal["solve"] | None,
+) -> dict[str, Array] | Literal["solve"] | None:
+    if not isinstance(message, dict):
+        return message
+    return {limb: np.array(angles) for limb, angles in message.items()}
+
+
+def _objective(name: str) -> Objective:
+    for known in get_args(Objective):
+        if name == known:
+            return cast(Objective, known)
+    raise InvalidInputError(f"{name} is not supported", field="objective")
 
 
 def _load(message: requests.Load | None) -> Load:
     message = message or requests.Load()
-    return Load(message.mass, message.com, message.acceleration)
+    return Load(message.mass, message.com, message.acceleration, message.angular_acceleration)
 
 
 def _limits(message: requests.Limits) -> Limits:
+    torque: float | dict[str, float | tuple[float, ...]] | None
+    if isinstance(message.joint_torque, dict):
+        torque = {
+            limb: tuple(most) if isinstance(most, list) else most
+            for limb, most in message.joint_torque.items()
+        }
+    else:
+        torque = message.joint_torque
     with _within("limits"):
-        return Limits(message.utilisation, message.tendon_tension)
+        return Limits(
+            utilisation=message.utilisation,
+            tendon_tension=message.tendon_tension,
+            joint_torque=torque,
+            per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
+            tension_change=message.tension_change,
+        )
+
+
+def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:
+    given = message.largest_force
+    most = tuple(_range(axis) for axis in given) if isinstance(given, list) else given
+    with _within(f"per_hand.{limb}"):
+        return ForceCap(most, message.frame)
+
+
+def _range(axis: requests.AxisForce) -> tuple[float, float]:
+    """Return the least and the largest force along an axis."""
+    if axis is None:
+        return -math.inf, math.inf
+    return (axis[0], axis[1]) if isinstance(axis, list) else (-axis, axis)
 
 
 def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnHold:
@@ -138,6 +187,7 @@ def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnH
             tendon_preload=None
             if message.tendon_preload is None
             else np.array(message.tendon_preload),
+            wrench=message.wrench,
         )
 
 

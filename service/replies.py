@@ -12,7 +12,11 @@ from msgspec import UNSET, Struct, UnsetType
 
 __all__ = [
     "AXES",
+    "Acceleration",
     "AxisCapability",
+    "BodyCapability",
+    "BodySection",
+    "BodySpaceReply",
     "Certificate",
     "Closing",
     "Contact",
@@ -32,6 +36,7 @@ __all__ = [
     "Solver",
     "Stage",
     "TensionLimit",
+    "TensionPath",
     "Tile",
     "Time",
     "WrenchSet",
@@ -65,16 +70,17 @@ class ErrorReply(Reply, kw_only=True):
     error: ErrorDetail
 
 
-class LimitName(Struct):
-    """A limit of one hand, by name."""
+class LimitName(Struct, kw_only=True):
+    """A limit of one hand or its limb, by name."""
 
     limb: str
     finger: str | None
     phalanx: str | None
     limit: str
+    joint: str | None = None
 
 
-class Price(LimitName):
+class Price(LimitName, kw_only=True):
     """What one more unit of a limit that binds would take off the utilisation.
 
     The unit is that of the limit's capacity: ``N``, ``N·m`` or ``A``.
@@ -158,7 +164,7 @@ class Row(Struct, kw_only=True):
     """An inequality of a hand's wrench space.
 
     ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
-    for ``motor_torque`` in newton-metres, for ``motor_current`` in amperes.
+    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
     ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
     """
 
@@ -167,6 +173,7 @@ class Row(Struct, kw_only=True):
     finger: str | None
     phalanx: str | None
     limit: str
+    joint: str | None = None
     coefficients: Vector
     constant: float
     capacity: float
@@ -211,19 +218,28 @@ class Hand(Struct, kw_only=True):
 
 
 class Certificate(Struct, kw_only=True):
-    """Why nothing balances the body.
+    """Why nothing balances the body: at any ``utilisation`` (null), or up to that cap on it.
 
-    Every body wrench w that the hands can supply has direction · w ≤ supremum, and the one asked
-    for has ``needed``, which is more. ``nearest`` can be supplied, ``shortfall`` is what
-    is missing.
+    Every body wrench w that the hands can supply, and their wrenches v on the rock with which they
+    do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for hands that are given a
+    wrench); what is asked for has ``needed``, which is more. ``nearest`` can be supplied,
+    ``shortfall`` is what is missing; both are null where hands have no loads, whatever the body
+    needs. ``irreducible``: limits, hard rows and given wrenches (``held_wrench``) that leave no
+    balance, but would without any one of them; empty where loads of any sign do not balance, null
+    where rounding leaves it undecided. ``wrench_spaces``, by limb, come with ``"want": ["model"]``
+    where there is no plan.
     """
 
+    utilisation: float | None = None
     direction: Vector
+    held: dict[str, Vector] = {}
     supremum: float
     needed: float
-    shortfall: Vector
-    nearest: Vector
+    shortfall: Vector | None
+    nearest: Vector | None
     blocking: list[LimitName]
+    irreducible: list[LimitName] | None = None
+    wrench_spaces: dict[str, WrenchSet] | UnsetType = UNSET
 
 
 class Solver(Struct):
@@ -242,23 +258,48 @@ class Time(Struct):
     total: float
 
 
+class TensionPath(Struct, kw_only=True):
+    """The straight way from the present tensions to the planned ones.
+
+    ``safe_part``: how much of it balances the body within the cap on the utilisation, from the plan
+    backward. ``utilisation_at_present``: the least at the present tensions, null if these balance
+    the body at no utilisation. ``largest_change``: of a tension [N].
+    """
+
+    safe: bool
+    safe_part: float
+    utilisation_at_present: float | None
+    largest_change: float
+
+
 class PlanReply(Reply, kw_only=True):
-    """Who carries what, and what margin is left."""
+    """Who carries what, and what margin is left.
+
+    ``effort``: the sum of squared relative tendon tensions and joint torques. ``joints``: the
+    angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
+    joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
+    would take off the effort, where the objective is ``min_effort``.
+    """
 
     id: str | None = None
     status: str
     reason: str
     body_wrench: Vector
     utilisation: float | None = None
+    effort: float | None = None
     load_factor: float | None = None
     load_factor_unbounded: bool = False
     survival_probability: float | None = None
     limiting: LimitName | None = None
     hands: list[Hand] | None = None
+    joints: dict[str, Vector] | None = None
     joint_torque: dict[str, Vector] | None = None
+    joint_torque_limit: dict[str, Vector] | None = None
     prices: list[Price] | None = None
+    effort_prices: list[Price] | None = None
     certificate: Certificate | None = None
     residual: Vector | None = None
+    path: TensionPath | None = None
     verified: bool
     solver: Solver
     time: Time
@@ -352,3 +393,70 @@ class WrenchSpaceReply(Reply, kw_only=True):
     half_spaces: HalfSpaces | None
     dimension: int | None
     capability: dict[str, AxisCapability] | None
+
+
+class BodyCapability(Struct, kw_only=True):
+    """How far body wrenches that are held go along an axis of B; null where there are none.
+
+    ``more``: beyond the body wrench asked for, which has to be held. ``pure``: with every other
+    component zero. ``extent``: with whatever else. ``limiting``: the limit that ends ``more``, or
+    else ``extent``.
+    """
+
+    more: float | None
+    pure: float | None
+    extent: float | None
+    limiting: LimitName | None
+
+
+class BodySection(Struct, kw_only=True):
+    """The body wrenches that are held in the plane of two axes, between two polygons [N, N·m].
+
+    Every point of the inner polygon is held, and none outside the outer one. Corners go
+    counterclockwise: two of a segment, one of a point, none where the plane holds nothing. ``gap``:
+    how far the two are apart at most [N, moments over 0.1 m]. ``limiting``: what ends the way at
+    each corner of the inner one.
+    """
+
+    axes: list[str]
+    others: str
+    inner: list[Vector]
+    outer: list[Vector]
+    gap: float | None
+    limiting: list[LimitName | None]
+
+
+class Acceleration(Struct, kw_only=True):
+    """The largest acceleration from rest that is held along a direction in W [m/s², rad/s²]."""
+
+    direction: Vector
+    acceleration: float
+    limiting: LimitName | None
+
+
+class BodySpaceReply(Reply, kw_only=True):
+    """What a stance can hold within the utilisation asked for.
+
+    ``status``, ``reason``, ``utilisation``: of the plan for the body wrench asked for.
+    ``acceleration``: by axis of W; null where the body cannot be held at rest or its wrench was
+    given instead of a load. ``angular_acceleration``: about B's origin, for the robot's own load at
+    known joints. ``along``: in the directions asked for. ``exact``: false where a wrist floats; its
+    hand's set is then linearised, and at the extents it is off by up to ``error``, in newtons with
+    moments over 0.1 m.
+    """
+
+    id: str | None = None
+    robot: str
+    status: str
+    reason: str
+    body_wrench: Vector
+    utilisation: float | None
+    exact: bool
+    error: float
+    capability: dict[str, BodyCapability]
+    section: BodySection
+    acceleration: dict[str, Acceleration] | None
+    angular_acceleration: dict[str, Acceleration] | None
+    along: list[Acceleration] | None
+    time: Time
+    warnings: list[str] = []

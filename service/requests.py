@@ -10,12 +10,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 __all__ = [
+    "Axis",
+    "BodySpaceRequest",
     "Cylinder",
     "Edge",
     "Ellipsoid",
+    "ForceCap",
     "Grasp",
     "Hand",
     "Hold",
@@ -99,7 +102,32 @@ Preload = Annotated[
         "closing tension"
     ),
 ]
+Tensions = Annotated[
+    tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry],
+    Meta(description="of a hand's tendons [N]"),
+]
+Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Angles = Annotated[
+    list[Angle],
+    Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [rad]"),
+]
+Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
+Torques = Annotated[
+    list[Torque],
+    Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [N·m]"),
+]
+Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
+ForceBound = Annotated[float, Meta(ge=-1e6, le=1e6)]
+ForceRange = Annotated[
+    list[ForceBound],
+    Meta(min_length=2, max_length=2, description="least and largest, with zero in between [N]"),
+]
+AxisForce = Force | ForceRange | None
+# a tuple with lists in it crashes msgspec's garbage collection
+AxisForces = Annotated[list[AxisForce], Meta(min_length=3, max_length=3)]
 Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
+Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
+Direction = tuple[Coordinate, Coordinate, Coordinate]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
 HandEntries = Annotated[
@@ -113,6 +141,13 @@ HandEntries = Annotated[
                 "additionalProperties": {"$ref": "#/$defs/Quantity"},
             }
         },
+    ),
+]
+ObjectiveName = Annotated[
+    Literal["max_margin", "min_effort", "max_reliability"],
+    Meta(
+        description="least utilisation, or least effort within limits.utilisation; "
+        "max_reliability is not supported in this version"
     ),
 ]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
@@ -232,16 +267,40 @@ class Hand(Strict, frozen=True, kw_only=True):
         Meta(description="floating: the motors stand still, and the wrist gives way"),
     ] = "fixed"
     tendon_preload: Preload | None = None
+    wrench: Annotated[
+        tuple[
+            WrenchEntry | None,
+            WrenchEntry | None,
+            WrenchEntry | None,
+            WrenchEntry | None,
+            WrenchEntry | None,
+            WrenchEntry | None,
+        ]
+        | None,
+        Meta(
+            description="what the hand must exert on the rock, in H [N, N·m]; null components are "
+            "the plan's"
+        ),
+    ] = None
 
 
 class Stance(Strict, frozen=True, kw_only=True):
     """Where the body and the hands are."""
 
-    robot: Name = "robosimian"
+    robot: Annotated[
+        Name | None,
+        Meta(description="by default that which is served or given by --robot, or robosimian"),
+    ] = None
     hand: HandEntries | None = None
     gravity: Acceleration | None = None
     body: Annotated[Pose, Meta(description="of B in W")]
-    joints: Later = None
+    joints: Annotated[
+        dict[Name, Angles] | Literal["solve"] | None,
+        Meta(
+            description="angles of every limb with a hand, or that inverse kinematics finds them; "
+            "with joints their torques count"
+        ),
+    ] = None
     hands: Annotated[list[Hand], Meta(max_length=16)]
 
 
@@ -251,6 +310,23 @@ class Load(Strict, frozen=True, kw_only=True):
     mass: Mass | None = None
     com: Annotated[Position | None, Meta(description="centre of mass in B")] = None
     acceleration: Acceleration = (0.0, 0.0, 0.0)
+    angular_acceleration: Annotated[
+        tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+        Meta(description="in W [rad/s²]; needs the stance's joints"),
+    ] = (0.0, 0.0, 0.0)
+
+
+class ForceCap(Strict, frozen=True, kw_only=True):
+    """The most that a hand may do to its rock."""
+
+    largest_force: Annotated[
+        Force | AxisForces,
+        Meta(
+            description="whatever its direction; or along each axis of the frame: the largest "
+            "either way, a range, or null for none"
+        ),
+    ]
+    frame: Literal["hand", "body", "world"] = "hand"
 
 
 class Limits(Strict, frozen=True, kw_only=True):
@@ -258,8 +334,14 @@ class Limits(Strict, frozen=True, kw_only=True):
 
     utilisation: Utilisation = 1.0
     tendon_tension: Tension | None = None
-    joint_torque: Later = None
-    per_hand: Later = None
+    joint_torque: Annotated[
+        Torque | dict[Name, Torque | Torques] | None,
+        Meta(description="of all joints, or by limb, in place of the robot's own figures [N·m]"),
+    ] = None
+    per_hand: Annotated[dict[Name, ForceCap], Meta(description="by limb")] = {}
+    tension_change: Annotated[
+        Tension | None, Meta(description="largest change from the present tensions [N]")
+    ] = None
 
 
 Want = Literal["load_factor", "prices", "model"]
@@ -280,11 +362,12 @@ class PlanRequest(Request, frozen=True, kw_only=True):
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
     ] = None
     load: Load | None = None
-    objective: Annotated[
-        Literal["max_margin", "min_effort", "max_reliability"],
-        Meta(description="only max_margin in this version"),
-    ] = "max_margin"
+    objective: ObjectiveName = "max_margin"
     limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions],
+        Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
+    ] = {}
     confidence: Later = None
     deadline: Later = None
     want: list[Want] = []
@@ -295,6 +378,34 @@ class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
 
     stance: Stance
     limb: Name
+
+
+class BodySpaceRequest(Request, frozen=True, kw_only=True):
+    """Asks what a stance can hold: body wrenches, a plane of them, and accelerations."""
+
+    id: Identifier | None = None
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions], Meta(description="tensions of the tendons now, by limb [N]")
+    ] = {}
+    axes: Annotated[
+        list[Axis], Meta(min_length=2, max_length=2, description="of the plane; fx and fz")
+    ] = field(default_factory=lambda: ["fx", "fz"])
+    others: Annotated[
+        Literal["needed", "zero", "free"],
+        Meta(
+            description="the plane's other components: as asked for, zero, or whatever they may be"
+        ),
+    ] = "needed"
+    directions: Annotated[
+        list[Direction],
+        Meta(max_length=100, description="along which the largest acceleration is wanted, in W"),
+    ] = []
 
 
 class Move(Hand, frozen=True, kw_only=True):
@@ -311,5 +422,6 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     name: Identifier = "route"
     stance: Stance
     load: Load | None = None
+    objective: ObjectiveName = "max_margin"
     limits: Limits = Limits()
     moves: Annotated[list[Move], Meta(max_length=10_000)]

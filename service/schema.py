@@ -7,8 +7,8 @@ from typing import Any, Final
 import msgspec
 
 from hand_models.parameters import Quantity
-from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
-from service.requests import PlanRequest, RouteRequest, WrenchSpaceRequest
+from service.replies import BodySpaceReply, ErrorReply, PlanReply, WrenchSpaceReply
+from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
 
 __all__ = ["MESSAGES", "schema"]
 
@@ -17,6 +17,8 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanReply,
     WrenchSpaceRequest,
     WrenchSpaceReply,
+    BodySpaceRequest,
+    BodySpaceReply,
     RouteRequest,
     ErrorReply,
 )

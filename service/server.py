@@ -20,8 +20,10 @@ import zenoh
 from zenoh.handlers import FifoChannel, Handler
 
 from hand_models.parameters import ParameterTable
+from planner.robot_file import RobotFile
 from service.dispatch import SERVICES, handle
 from service.keys import ALIVE, service_key
+from service.own_robot import robots_of
 
 __all__ = ["PlanService", "prepare_zenoh"]
 
@@ -49,7 +51,8 @@ class PlanService:
     ----------
     session : zenoh.Session
         Not closed by the service.
-    robot : str, optional
+    robot : RobotFile, optional
+        The robot that is planned for; RoboSimian by default.
     hand : ParameterTable, optional
         Entries in which its hands are not the bundled one; a request's own go on top.
     """
@@ -57,12 +60,14 @@ class PlanService:
     def __init__(
         self,
         session: zenoh.Session,
-        robot: str = "robosimian",
+        robot: RobotFile | None = None,
         hand: ParameterTable | None = None,
     ) -> None:
         self._hand = hand
-        self.keys = tuple(service_key(robot, name) for name in SERVICES)
-        self._alive = service_key(robot, ALIVE)
+        self._robots = robots_of(robot)
+        (self.robot,) = self._robots
+        self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
+        self._alive = service_key(self.robot, ALIVE)
         self._session = session
         self._answering = threading.Lock()
         self._threads: list[threading.Thread] = []
@@ -112,7 +117,7 @@ class PlanService:
         payload = b"" if query.payload is None else query.payload.to_bytes()
         encoding = "" if query.encoding is None else str(query.encoding)
         with self._answering:
-            answer = handle(key, payload, encoding, self._hand)
+            answer = handle(key, payload, encoding, self._hand, self._robots)
         if answer.good:
             query.reply(key, answer.payload, encoding=answer.encoding)
         else:

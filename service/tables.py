@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from rich import box
@@ -13,10 +14,13 @@ from rich.table import Table
 from service.replies import (
     AXES,
     AxisCapability,
+    Certificate,
     Finger,
     Hand,
+    LimitName,
     PlanReply,
     Price,
+    TensionPath,
     Tile,
     WrenchSpaceReply,
 )
@@ -25,6 +29,9 @@ __all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
+
+JOINTS_A_LINE: Final = 7
+"""Joint torques of a limb in one line of a table."""
 
 CARRIES: Final[Mapping[str, str]] = {
     "off": "carries nothing",
@@ -54,11 +61,15 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     if reply.utilisation is not None:
         parts.append(f"utilisation {reply.utilisation:.3f}")
     parts.append(f"load factor {_load_factor(reply)}")
+    if reply.effort is not None:
+        parts.append(f"effort {reply.effort:.3g}")
     parts.append(f"{1e3 * reply.time.total:.0f} ms")
     out.print("   ".join(parts))
     out.print(reply.reason, markup=False)
     for warning in reply.warnings:
         out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    if reply.path is not None:
+        out.print(_path_sentence(reply.path), markup=False)
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if reply.hands is not None:
@@ -71,17 +82,17 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
             _show(title, _wrist_table(floating), out)
         title = "tendons and their motors, and each finger's most loaded tile"
         _show(title, _tendon_table(reply.hands), out)
-    if reply.prices:
-        title = "what one unit more of a limit would take off the utilisation"
-        if len(reply.prices) > MOST_PRICES:
-            title += f" ({MOST_PRICES} of {len(reply.prices)})"
-        _show(title, _price_table(reply.prices[:MOST_PRICES]), out)
+    if reply.joint_torque is not None and reply.joint_torque_limit is not None:
+        title = "joint torques [N·m], from the body outward; * most of its limit"
+        _show(title, _joint_table(reply.joint_torque, reply.joint_torque_limit), out)
+    for prices, what in ((reply.prices, "utilisation"), (reply.effort_prices, "effort")):
+        if prices:
+            title = f"what one unit more of a limit would take off the {what}"
+            if len(prices) > MOST_PRICES:
+                title += f" ({MOST_PRICES} of {len(prices)})"
+            _show(title, _price_table(prices[:MOST_PRICES]), out)
     if reply.certificate is not None:
-        lacking = ", ".join(
-            f"{axis} {_fixed(value, 1)}"
-            for axis, value in zip(AXES, reply.certificate.shortfall, strict=True)
-        )
-        out.print(f"missing body wrench (in B): {lacking} [N, N·m]", markup=False)
+        _print_certificate(reply.certificate, reply.body_wrench, out)
 
 
 def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
@@ -143,6 +154,38 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 
+def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console) -> None:
+    """Print what is missing, what could be held instead, and what is in the way."""
+    if proof.shortfall is not None and proof.nearest is not None:
+        where = "at any utilisation"
+        if proof.utilisation is not None:
+            where = f"up to a utilisation of {proof.utilisation:g}"
+        table = table_of("")
+        for axis in AXES:
+            table.add_column(axis, justify="right")
+        parts = {"needed": needed, "nearest held": proof.nearest, "missing": proof.shortfall}
+        for name, wrench in parts.items():
+            table.add_row(name, *(_fixed(value, 1) for value in wrench))
+        _show(f"body wrenches {where}, in B [N, N·m]", table, out)
+    if proof.irreducible:
+        title = "what leaves no balance; without any one of them there would be one"
+        _show(title, _barrier_table(proof.irreducible), out)
+
+
+def _barrier_table(names: Iterable[LimitName]) -> Table:
+    """Return limits by hand and kind."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        parts = (name.phalanx, name.finger, name.joint)
+        whose = " of ".join(part for part in parts if part is not None)
+        alike.setdefault((name.limb, name.limit), []).append(whose)
+    table = table_of("hand", "limit")
+    table.add_column("of")
+    for (limb, limit), owners in sorted(alike.items(), key=lambda pair: pair[0][0]):
+        table.add_row(limb, limit, ", ".join(owner for owner in owners if owner) or "-")
+    return table
+
+
 def _closing_table(reply: WrenchSpaceReply) -> Table:
     """Return what of each finger touches, and when it stopped moving."""
     table = table_of("finger", "base")
@@ -156,6 +199,19 @@ def _closing_table(reply: WrenchSpaceReply) -> Table:
         ]
         table.add_row(closing.finger, kinds.get((closing.finger, "base"), ""), *cells)
     return table
+
+
+def _path_sentence(path: TensionPath) -> str:
+    """Say what the way from the present tensions is like."""
+    used = path.utilisation_at_present
+    there = "no balance" if used is None else f"utilisation {used:.3f}"
+    way = "safe" if path.safe else f"safe for its last {_percent(path.safe_part)}"
+    return f"from the present tensions ({there}): changes up to {path.largest_change:.1f} N, {way}"
+
+
+def _percent(part: float) -> str:
+    """Return a part in full per cent, not more than it is."""
+    return f"{math.floor(100.0 * part)} %"
 
 
 def _load_factor(reply: PlanReply) -> str:
@@ -222,6 +278,37 @@ def _tendon_table(hands: Iterable[Hand]) -> Table:
     return table
 
 
+def _joint_table(
+    torques: Mapping[str, Sequence[float]], limits: Mapping[str, Sequence[float]]
+) -> Table:
+    """Return each limb's torques, in lines of so many as fit, with how much of its joints is used.
+
+    The joint that uses most of its limit is marked.
+    """
+    most = max((len(row) for row in torques.values()), default=0)
+    columns = min(most, JOINTS_A_LINE)
+    table = table_of("limb")
+    table.padding = 0  # otherwise seven torques do not fit
+    for i in range(columns):
+        table.add_column(str(i + 1) if most <= columns else f"+{i + 1}", justify="right")
+    for name in ("of", "util"):
+        table.add_column(name, justify="right")
+    for limb, row in torques.items():
+        used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
+        worst = used.index(max(used))
+        cells = [
+            _fixed(torque, 0 if abs(torque) >= 1e3 else 1) + ("*" if i == worst else " ")
+            for i, torque in enumerate(row)
+        ]
+        ends = (f"{limits[limb][worst]:.4g}", f"{used[worst]:.2f}")
+        for start in range(0, len(cells), columns):
+            line = cells[start : start + columns]
+            line += [""] * (columns - len(line))
+            named, last = (limb, ends) if start == 0 else (f"  from {start + 1}", ("", ""))
+            table.add_row(named, *line, *last)
+    return table
+
+
 def _worst(finger: Finger) -> Tile | None:
     """Return the most loaded tile of those that touch rock."""
     touching = [tile for tile in finger.tiles if tile.contact != "none"]
@@ -229,9 +316,10 @@ def _worst(finger: Finger) -> Tile | None:
 
 
 def _price_table(prices: Iterable[Price]) -> Table:
-    table = table_of("hand", "finger", "tile", "limit")
+    table = table_of("hand", "finger, joint", "tile", "limit")
     table.add_column("price", justify="right")
     for price in prices:
-        names = (price.limb, price.finger or "-", price.phalanx or "-", price.limit)
+        part = price.finger or price.joint or "-"
+        names = (price.limb, part, price.phalanx or "-", price.limit)
         table.add_row(*names, f"{price.price:.2g} /{price.unit}")
     return table

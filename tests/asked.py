@@ -62,7 +62,7 @@ def flat_request() -> dict:
 
 
 def full_request() -> dict:
-    """Every field that this version understands, in one request."""
+    """Every field that a stance without joints understands, in one request."""
     request = wall_request()
     first, second, third, fourth = request["stance"]["hands"]
     home = {"position": [0.0, 0.0, 0.003], "orientation": [0.0, 0.0, 0.0, 1.0]}
@@ -97,6 +97,42 @@ def full_request() -> dict:
         "want": ["load_factor", "prices", "model"],
     }
     return request
+
+
+JOINTS = {
+    "front_right": [0.3164, 0.086, -1.7675, -2.7432, 2.878, -3.0676, 1.5215],
+    "rear_right": [-0.0277, 0.5392, -0.2148, -1.0866, 2.8888, 2.5642, -0.3988],
+    "rear_left": [-1.8231, -2.4716, 1.5967, 1.4921, -0.8306, 2.9648, -1.734],
+    "front_left": [-0.2017, 0.1978, -0.2439, 2.8993, -1.9501, 2.8792, -1.7158],
+}
+"""Angles that put the hands of the wall's stance where they are [rad]."""
+
+
+def jointed_request() -> dict:
+    """Every field that goes with joints, in one request."""
+    request = wall_request(mass=None)
+    stance = request["stance"]
+    stance["joints"] = copy.deepcopy(JOINTS)
+    stance["gravity"] = [0.0, 0.0, -4.5]
+    stance["hands"][1]["wrench"] = [None, None, 20.0, None, None, None]
+    return request | {
+        "load": {"acceleration": [0.0, 0.0, 0.1], "angular_acceleration": [0.0, 0.1, 0.0]},
+        "objective": "min_effort",
+        "limits": {
+            "utilisation": 0.95,
+            "joint_torque": {"front_left": 150.0, "rear_left": [180.0] * 7},
+            "per_hand": {
+                "rear_left": {"largest_force": 400.0},
+                "front_left": {
+                    "largest_force": [300.0, None, [-250.0, 300.0]],
+                    "frame": "body",
+                },
+            },
+            "tension_change": 60.0,
+        },
+        "present": {"rear_left": [40.0, 40.0, 40.0, 40.0], "front_left": [45.0, 50.0, 50.0, 45.0]},
+        "want": ["load_factor", "prices", "model"],
+    }
 
 
 def paths(value: Any, path: tuple = ()) -> list[tuple]:
@@ -140,12 +176,7 @@ def dotted(path: tuple) -> str:
 
 HAND = "stance.hands[0]"
 LATER = (
-    (("stance", "joints"), "solve", "stance.joints"),
-    (("stance", "joints"), {"front_left": [0.0] * 7}, "stance.joints"),
-    (("objective",), "min_effort", "objective"),
     (("objective",), "max_reliability", "objective"),
-    (("limits",), {"joint_torque": 100.0}, "limits.joint_torque"),
-    (("limits",), {"per_hand": {"front_left": {"utilisation": 0.5}}}, "limits.per_hand"),
     (("confidence",), 0.99, "confidence"),
     (("deadline",), 0.1, "deadline"),
 )
@@ -153,8 +184,9 @@ LATER = (
 
 JUNK = (
     None, True, -1, 0, 3, 1e-300, 1e300, -1e300, 2**63, 10**30, 0.5, math.nan, math.inf, "", "x",
-    "plane", "floating", "ü\u0000\U0001f9d7", [], [1], [[[]]], {}, {"v": 1}, {"shape": "mesh"},
-    {"shape": "plane"}, {"shear_limit": 20.0}, "a" * 5000,
+    "plane", "floating", "solve", "ü\u0000\U0001f9d7", [], [1], [[[]]], {}, {"v": 1},
+    {"shape": "mesh"}, {"shape": "plane"}, {"shear_limit": 20.0}, {"front_left": None},
+    {"front_left": [1.0] * 7}, {"nose": {"largest_force": 1.0}}, "a" * 5000,
 )  # fmt: skip
 
 
@@ -179,7 +211,11 @@ def spoil(request: dict, chance: random.Random) -> tuple[bytes, str]:
             if path[:-1] in places and isinstance(at(request, path[:-1]), dict):
                 request = put(request, path, value)
         elif isinstance(at(request, path), dict):
-            names = ("colour", "joints", "deadline", "limits", "want", "gravity", "pose", "load")
+            names = (
+                "colour", "joints", "deadline", "limits", "want", "gravity", "pose", "load",
+                "present", "wrench", "per_hand", "joint_torque", "largest_force", "front_left",
+                "tension_change", "angular_acceleration", "objective", "robot",
+            )  # fmt: skip
             request = put(request, (*path, chance.choice(names)), chance.choice(JUNK))
         elif isinstance(at(request, path), list):
             request = put(request, path, at(request, path) * chance.randint(0, 3))

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import OptimizeResult, linprog
 
 from hand_models.wrench_space import WrenchSpace
-from planner.solve import hand_space
-from planner.stance import Question
+from planner.question import Question
+from planner.settling import hand_space
 
 INFEASIBLE = 2
 """HiGHS's status in scipy."""

@@ -20,9 +20,11 @@ from hand_models.hand import Grasp, spiny_hand
 from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
 from hand_models.spines import Surface
 from planner.plan import Plan
-from planner.program import WRENCH_UNIT, HandData, StanceData
-from planner.solve import hand_space, plan
-from planner.stance import HandOnHold, Load, Question, Stance
+from planner.question import Load, Question
+from planner.settling import hand_space
+from planner.solve import plan
+from planner.stance import HandOnHold, Stance
+from planner.stance_data import WRENCH_UNIT, HandData, StanceData
 
 PLACES = {
     "front_right": (0.5, -0.4),

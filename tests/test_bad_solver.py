@@ -10,8 +10,9 @@ from stances import CALIBRATION_LOAD, ask, on_wall
 from hand_models.holds import Cylinder, Plane
 from planner import program
 from planner.program import Outcome
-from planner.solve import hand_space, plan
-from planner.stance import Question
+from planner.question import Question
+from planner.settling import hand_space
+from planner.solve import plan
 
 QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 

@@ -11,8 +11,8 @@ from stances import ask, on_wall, random_answer
 
 from hand_models.frames import Pose
 from hand_models.holds import Plane
-from planner.program import WRENCH_UNIT
 from planner.solve import plan
+from planner.stance_data import WRENCH_UNIT
 
 SEEDS = range(200)
 

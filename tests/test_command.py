@@ -12,14 +12,17 @@ from types import SimpleNamespace
 
 import pytest
 import trimesh
-from asked import HEAVY, flat_request, put, wall_request
+from asked import HEAVY, LIGHT, flat_request, jointed_request, put, wall_request
+from rich.console import Console
 from rocks import cylinder_mesh
 from test_service import ROOT, Served, free_endpoint
 
 from service import command, dispatch
+from service.codec import decode_request
 from service.command import run
-from service.replies import PlanReply
+from service.requests import PlanRequest
 from service.stances import bundled
+from service.tables import print_plan
 
 DONE, FAILED, BAD_INPUT, OVERLOADED = 0, 1, 2, 3
 
@@ -96,13 +99,13 @@ def test_the_exit_status_of_a_plan(
 def test_a_failed_plan_is_a_failure(
     stance, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(request: object) -> PlanReply:
-        reply = good(request)
-        reply.status = "failed"
-        return reply
+    def fail(*asked: object) -> dispatch.Planned:
+        answer = good(*asked)
+        answer.reply.status = "failed"
+        return answer
 
-    good = dispatch.plan
-    monkeypatch.setattr(dispatch, "plan", fail)
+    good = dispatch.planned
+    monkeypatch.setattr(dispatch, "planned", fail)
     assert run(["plan", stance(wall_request()), "--json"]) == FAILED
     assert result(capfd)["status"] == "failed"
 
@@ -140,7 +143,10 @@ def test_a_stance_from_standard_input(
     assert result(capfd)["id"] == "wall"
 
 
-@pytest.mark.parametrize("name", ["wall-300", "wall-700", "overhang", "slab", "boulders", "ledge"])
+@pytest.mark.parametrize(
+    "name",
+    ["wall-300", "wall-300-joints", "wall-700", "overhang", "slab", "boulders", "ledge"],
+)
 def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert name in bundled()
     assert run(["plan", name, "--json"]) in (DONE, OVERLOADED)
@@ -173,6 +179,57 @@ def test_a_stance_that_is_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
     line = complaint(capfd)
     assert line.startswith("crux: STANCE: no such file, and no bundled stance 'no/such.json'")
     assert "wall-300" in line
+
+
+def test_a_person_reads_torques_effort_and_whose_joint_it_is(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance(jointed_request() | {"limits": {"joint_torque": 10.0}, "present": {}})
+    assert run(["plan", path, "--json"]) == DONE
+    reply = result(capfd)
+    assert run(["plan", path]) == DONE
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert f"effort {reply['effort']:.3g}" in out
+    table = out.partition("joint torques [N·m]")[2]
+    for limb, torques in reply["joint_torque"].items():
+        used = max(torques, key=abs)
+        (row,) = [row for row in table.splitlines() if row.split()[:1] == [limb] and "*" in row]
+        assert f"{used:.1f}*" in row
+        assert row.split()[-2:] == ["10", f"{abs(used) / 10.0:.2f}"]
+    assert reply["effort_prices"]
+    prices, _, effort_prices = table.partition("would take off the effort")
+    assert reply["effort_prices"][0]["limb"] in effort_prices
+    joints = [price["joint"] for price in reply["prices"][:8] if price["joint"]]
+    assert joints
+    assert all(joint in prices for joint in joints)
+
+
+def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFixture[str]) -> None:
+    request = wall_request(LIGHT) | {"want": []}
+    reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
+    reply.joint_torque = {"arm": [-1234.5, *range(1, 15), -7.0], "tail": [0.25]}
+    reply.joint_torque_limit = {"arm": [2469.0, *[300.0] * 15], "tail": [1.0]}
+    print_plan(reply, Console(width=80))
+    table = capsys.readouterr().out.partition("joint torques")[2].splitlines()
+    rows = [row.split() for row in table]
+    assert ["arm", "-1234*", "1.0", "2.0", "3.0", "4.0", "5.0", "6.0", "2469", "0.50"] in rows
+    assert ["from", "8", "7.0", "8.0", "9.0", "10.0", "11.0", "12.0", "13.0"] in rows
+    assert ["from", "15", "14.0", "-7.0"] in rows
+    assert ["tail", "0.2*", "1", "0.25"] in rows
+    assert max(len(row) for row in table) <= 80
+
+
+def test_hands_out_of_reach_are_bad_input_in_one_line(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = put(wall_request(), ("stance", "joints"), "solve")
+    for i in (0, 2):
+        request["stance"]["hands"][i]["pose"]["position"][2] *= 3.0
+    assert run(["plan", stance(request)]) == BAD_INPUT
+    line = complaint(capfd)
+    assert line.startswith("crux: stance.hands[0].pose: front_right is out of reach by ")
+    assert "; rear_left is out of reach by " in line
 
 
 # wrench-space -------------------------------------------------------------------------------------

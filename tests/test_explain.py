@@ -11,8 +11,10 @@ from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models.frames import Pose
 from hand_models.holds import Plane
-from planner.solve import plan, settle
-from planner.stance import Limits, Question
+from planner.question import Limits, Question
+from planner.settling import settle
+from planner.solve import plan
+from planner.stance_data import WRENCH_UNIT
 from service import questions
 from service.stances import read_request
 
@@ -66,6 +68,24 @@ def test_what_is_missing_begins_with_the_largest_part():
     size = np.abs(answer.certificate.shortfall) / np.array([300.0] * 3 + [30.0] * 3)
     assert f"missing {axes[int(size.argmax())]} " in answer.reason
     assert "palm cannot pull" in answer.reason or "cannot be dragged" in answer.reason
+
+
+def test_what_is_in_the_way_is_told_of_the_irreducible_set_the_foremost_first():
+    answer = plan(ask(on_wall(palm=False)))
+    first, second, *others = answer.certificate.irreducible
+    assert first.limb == second.limb
+    told = [f"{name.phalanx} tile of {name.finger} cannot be dragged" for name in (first, second)]
+    assert f"; {first.limb}: {told[0]} away from the finger's base, {told[1]}" in answer.reason
+    assert answer.reason.endswith(f", and {len(others)} more")
+
+
+def test_an_overloaded_stance_says_what_would_be_missing_within_its_limits():
+    answer = plan(bundled("wall-700"))
+    limit, missing = answer.reason.split("; within the limits ")
+    assert "would carry" in limit
+    worst = int(np.argmax(np.abs(answer.certificate.shortfall / WRENCH_UNIT)))
+    assert missing.startswith(("fx", "fy", "fz", "mx", "my", "mz")[worst])
+    assert missing.endswith(" (in B) would be missing")
 
 
 def test_a_stance_in_the_air_says_so():

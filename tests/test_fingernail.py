@@ -34,9 +34,11 @@ from hand_models.holds import Hold
 from planner.explain import warnings
 from planner.hand_plots import plot_wrench_space
 from planner.plan import Plan
-from planner.plots import plot_plan
-from planner.solve import plan, settle
-from planner.stance import HandOnHold, Question, Stance
+from planner.plan_plots import plot_plan
+from planner.question import Question
+from planner.settling import settle
+from planner.solve import plan
+from planner.stance import HandOnHold, Stance
 from planner.verify import problems
 from service import dispatch, questions
 from service.codec import Format
@@ -579,5 +581,5 @@ def test_a_plan_of_a_clinging_hand_is_drawn_too(hooked, tmp_path):
     answer = plan(question)
     assert (answer.status, answer.verified) == ("optimal", True)
     path = tmp_path / "plan.png"
-    plot_plan(answer, question.stance, path)
+    plot_plan(answer, question, path)
     assert path.stat().st_size > 10_000

@@ -16,9 +16,11 @@ from hand_models.floating_wrist import FloatingWrist
 from hand_models.frames import wrench_transport
 from hand_models.settling import settle as settle_finger
 from planner.plan import Plan
-from planner.program import TWIST_UNIT
-from planner.solve import plan, settle
-from planner.stance import HandOnHold, Question, Stance
+from planner.question import Question
+from planner.settling import settle
+from planner.solve import plan
+from planner.stance import HandOnHold, Stance
+from planner.stance_data import TWIST_UNIT
 from planner.verify import problems
 from service.client import CruxClient
 from service.codec import decode_request

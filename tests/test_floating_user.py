@@ -18,8 +18,9 @@ from planner import continuation, program
 from planner.budget import Budget
 from planner.floating_warnings import far_wrists
 from planner.plan import Plan
-from planner.solve import plan, settle
-from planner.stance import Question
+from planner.question import Question
+from planner.settling import settle
+from planner.solve import plan
 from service import command
 from service.questions import question
 from service.requests import PlanRequest

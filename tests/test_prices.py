@@ -13,8 +13,8 @@ from stances import SANDPAPER, ask, on_wall, random_question
 from hand_models.holds import Cylinder, Plane
 from hand_models.wrench_space import WrenchSpace
 from planner.plan import LimitName
+from planner.question import Limits, Load
 from planner.solve import plan
-from planner.stance import Limits, Load
 
 QUESTIONS = {
     "pinches": ask(on_wall(), "prices"),

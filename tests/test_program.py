@@ -11,16 +11,23 @@ from stances import CALIBRATION_LOAD, ask, on_wall, program_data, random_answer,
 
 from hand_models.hand import FINGERS
 from hand_models.holds import Cylinder, Plane, Sphere
-from planner import program
+from planner import program, stance_data
 from planner.plan import Plan
+from planner.question import Load
 from planner.solve import plan
-from planner.stance import Load
 
 SEEDS = range(200)
 AGREE = 1e-5
 
-KINDS = (program.Margin, program.Effort, program.LoadFactor, program.Nearest)
-SHAPE = ((10, 126, 21), (6, 40, 9))
+KINDS = (
+    program.Margin,
+    program.TieBreak,
+    program.Effort,
+    program.LoadFactor,
+    program.Nearest,
+    lambda shape: program.Reach(shape, 2),
+)
+SHAPE = stance_data.Shape(7, ((10, 126, 21, 11), (6, 40, 9, 4)))
 
 
 def tensions(answer: Plan) -> np.ndarray:

@@ -13,10 +13,11 @@ import pytest
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Pose
+from planner.inverse_kinematics import UnreachableError
+from planner.question import ForceCap, Limits, Load
 from planner.report import COLUMNS, summary, write_report
 from planner.route import Route, evaluate, stages
 from planner.solve import plan
-from planner.stance import Limits, Load
 from service import questions
 from service.command import run
 from service.stances import bundled, read_request, read_route
@@ -189,6 +190,7 @@ def test_every_hand_of_the_route_is_within_its_limbs_reach(route):
     ("name", "status"),
     [
         ("wall-300", "optimal"),
+        ("wall-300-joints", "optimal"),
         ("wall-700", "overloaded"),
         ("wall", "optimal"),
         ("overhang", "optimal"),
@@ -258,3 +260,97 @@ def test_a_move_that_ends_in_the_air_is_refused(route):
     with pytest.raises(InvalidInputError, match="touches nothing") as caught:
         evaluate(replace(route, moves=(replace(move, hand=away),)))
     assert caught.value.field == "moves[0] (place).hold"
+
+
+# Joints -----------------------------------------------------------------------------------------
+
+
+def test_a_stage_that_no_joints_reach_is_marked_and_the_climb_goes_on(route, tmp_path: Path):
+    there = replace(route, start=replace(route.start, joints="solve"), moves=route.moves[:2])
+    climbed = evaluate(there)
+    statuses = [answer.status for answer in climbed.plans]
+    assert statuses == 3 * ["optimal"] + 3 * ["unreachable"]
+    assert not climbed.feasible
+    assert climbed.crux == 3
+    # the distance that is missing is that of the stance alone
+    with pytest.raises(UnreachableError) as caught:
+        plan(climbed.stages[3].question)
+    assert climbed.plans[3].reason == caught.value.message
+    for answer in climbed.plans[:3]:
+        used = [
+            np.abs(torque / answer.joint_torque_limit[limb]).max()
+            for limb, torque in answer.joint_torque.items()
+        ]
+        assert answer.joint_utilisation == pytest.approx(max(used))
+        assert 0.0 < answer.joint_utilisation <= answer.utilisation + 1e-9
+    files = write_report(climbed, tmp_path)
+    with files["table"].open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    for row, answer in zip(rows, climbed.plans, strict=True):
+        if answer.status == "optimal":
+            assert float(row["joint_utilisation"]) == pytest.approx(answer.joint_utilisation)
+        else:
+            assert row["joint_utilisation"] == row["utilisation"] == row["load_factor"] == ""
+            assert "rear_left is out of reach by " in row["reason"]
+    told = summary(climbed)
+    assert told["statuses"] == {"optimal": 3, "unreachable": 3}
+    assert told["crux"]["sentence"].startswith(
+        "The crux is move 2, shifting the body before rear right lifts: no plan; rear_right is out"
+    )
+    assert files["picture"].read_bytes().startswith(PNG)
+
+
+def test_the_joints_of_a_route_are_not_given_for_one_stance(route):
+    angles = {limb: np.zeros(7) for limb in route.start.robot.limbs}
+    with pytest.raises(InvalidInputError, match="change with every move") as caught:
+        evaluate(replace(route, start=replace(route.start, joints=angles)))
+    assert caught.value.field == "stance.joints"
+
+
+def test_a_hands_cap_counts_in_every_stage_where_it_holds_on(route):
+    lifted = route.moves[0].hand.limb
+    cap = {lifted: ForceCap(200.0)}
+    capped = evaluate(replace(route, moves=route.moves[:1], limits=Limits(per_hand=cap)))
+    for stage, answer in zip(capped.stages, capped.plans, strict=True):
+        forces = {hand.limb: np.linalg.norm(hand.wrench[:3]) for hand in answer.hands}
+        if stage.phase == "lift":
+            assert lifted not in forces
+        else:
+            assert forces[lifted] <= 200.0 * max(answer.utilisation, 1.0)
+    nose = replace(route, limits=Limits(per_hand={"nose": ForceCap(200.0)}))
+    with pytest.raises(InvalidInputError, match="no hand of the start stance") as caught:
+        evaluate(nose)
+    assert caught.value.field == "limits.per_hand.nose"
+
+
+def test_the_objective_of_a_route_is_that_of_its_stages(route):
+    short = replace(route, moves=route.moves[:1])
+    for stage, best, least in zip(
+        stages(short),
+        evaluate(short).plans,
+        evaluate(replace(short, objective="min_effort")).plans,
+        strict=True,
+    ):
+        assert stage.question.objective == "max_margin"
+        assert least.utilisation <= 1.0
+        assert least.effort < best.effort
+
+
+def test_a_route_file_takes_joints_and_an_objective(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    text = json.loads(read_text("six-moves"))
+    text["stance"]["joints"] = "solve"
+    text["objective"] = "min_effort"
+    text["moves"] = text["moves"][:2]
+    path = tmp_path / "short.json"
+    path.write_text(json.dumps(text), encoding="utf-8")
+    assert run(["route", str(path), "-o", str(tmp_path / "out")]) == 3
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
+    assert "unreachable" in out
+    assert "joints" in out
+    text["objective"] = "max_reliability"
+    path.write_text(json.dumps(text), encoding="utf-8")
+    assert run(["route", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert capfd.readouterr().err.startswith("crux: objective: max_reliability is not supported")

@@ -18,13 +18,22 @@ from pathlib import Path
 import msgspec
 import pytest
 import zenoh
-from asked import HEAVY, JSON, MSGPACK, flat_request, full_request, spoil, wall_request
+from asked import (
+    HEAVY,
+    JSON,
+    MSGPACK,
+    flat_request,
+    full_request,
+    jointed_request,
+    spoil,
+    wall_request,
+)
 from test_messages import check_answer
 from zenoh.handlers import FifoChannel
 
 from hand_models.errors import InvalidInputError
-from planner import solve
-from service import CruxClient, PlanRequest, WrenchSpaceRequest
+from planner import settling, solve
+from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest, dispatch
 from service.codec import Format, decode_request
 from service.config import listening, open_session, zenoh_config
 from service.dispatch import Answer
@@ -36,6 +45,8 @@ from service.server import PlanService
 ROOT = Path(__file__).parents[1]
 PLAN = service_key("robosimian", "plan")
 WRENCH_SPACE = service_key("robosimian", "wrench_space")
+BODY_SPACE = service_key("robosimian", "body_space")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE]
 
 
 def free_endpoint() -> str:
@@ -100,7 +111,7 @@ def ask(
         part = reply.ok or reply.err
         answers.append(Answer(part.payload.to_bytes(), str(part.encoding), reply.ok is not None))
         if reply.ok is not None:
-            assert str(reply.ok.key_expr) in {PLAN, WRENCH_SPACE}
+            assert str(reply.ok.key_expr) in KEYS
     return answers
 
 
@@ -155,7 +166,8 @@ def test_the_service_is_alive_while_it_serves(session: zenoh.Session) -> None:
 def test_fuzz_over_the_network(session: zenoh.Session) -> None:
     chance = random.Random(7)
     for i in range(200):
-        payload, encoding = spoil(flat_request() if i % 4 else full_request(), chance)
+        asked = (full_request, flat_request, jointed_request, flat_request)[i % 4]
+        payload, encoding = spoil(asked(), chance)
         (answer,) = ask(session, payload, encoding)
         check_answer(answer, payload[:500])
     (answer,) = ask(session, msgspec.json.encode(wall_request()), JSON)
@@ -175,12 +187,15 @@ def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
         space = client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="front_left"))
         assert space.limb == "front_left"
         assert space.vertices
+        body = client.body_space(BodySpaceRequest(v=1, stance=stance, axes=["fx", "my"]))
+        assert body.section.axes == ["fx", "my"]
+        assert body.section.inner
 
 
 def test_the_client_raises_what_the_service_says(session: zenoh.Session) -> None:
     client = CruxClient(session)
-    request = msgspec.structs.replace(plan_request(), objective="min_effort")
-    with pytest.raises(ServiceError, match="objective: min_effort is not supported") as caught:
+    request = msgspec.structs.replace(plan_request(), objective="max_reliability")
+    with pytest.raises(ServiceError, match="objective: max_reliability is not supported") as caught:
         client.plan(request)
     assert (caught.value.kind, caught.value.field) == ("unsupported", "objective")
     stance = plan_request(flat_request()).stance
@@ -241,8 +256,6 @@ def test_an_empty_answer_is_asked_for_once_more(alone: zenoh.Session) -> None:
 
 
 def wire_reply() -> bytes:
-    from service import dispatch
-
     return dispatch.handle(PLAN, msgspec.json.encode(wall_request())).payload
 
 
@@ -287,20 +300,23 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         raise InvalidInputError("done", field="stance")
 
     monkeypatch.setattr(solve, "plan", exclusive)
-    monkeypatch.setattr(solve, "resting_hand", exclusive)
-    plan, space = (
-        msgspec.json.encode(wall_request()),
-        msgspec.json.encode({"v": 1, "stance": wall_request()["stance"], "limb": "front_left"}),
-    )
+    monkeypatch.setattr(settling, "resting_hand", exclusive)
+    monkeypatch.setattr(dispatch, "explore", exclusive)
+    stance = wall_request()["stance"]
+    questions = {
+        PLAN: wall_request(),
+        WRENCH_SPACE: {"v": 1, "stance": stance, "limb": "front_left"},
+        BODY_SPACE: {"v": 1, "stance": stance, "axes": ["fx", "fz"]},
+    }
     with PlanService(alone):
         channels = [
-            alone.get(key, payload=payload, encoding=JSON, timeout=10.0)
-            for key, payload in 3 * [(PLAN, plan), (WRENCH_SPACE, space)]
+            alone.get(key, payload=msgspec.json.encode(asked), encoding=JSON, timeout=10.0)
+            for key, asked in 3 * list(questions.items())
         ]
         for channel in channels:
             (reply,) = channel
             error = Format.JSON.decode(reply.err.payload.to_bytes(), ErrorReply).error
-            assert error.kind == "invalid"
+            assert (error.kind, error.message) == ("invalid", "done")
 
 
 def test_a_stop_does_not_wait_for_a_long_question(
@@ -359,7 +375,7 @@ def test_a_flood_from_some_leaves_the_others_their_turn(served: Served) -> None:
 
 
 def test_a_server_says_what_it_serves(served: Served) -> None:
-    assert served.ready == {"v": 1, "keys": [PLAN, WRENCH_SPACE], "listen": [served.endpoint]}
+    assert served.ready == {"v": 1, "keys": KEYS, "listen": [served.endpoint]}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -380,9 +396,7 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     assert server.process.returncode == 0
     assert took < 3.0
     assert out == ""
-    assert err.splitlines() == [
-        f"crux: serving {PLAN}, {WRENCH_SPACE}; listening on {server.endpoint}"
-    ]
+    assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
 
 
 def test_a_killed_server_is_noticed_and_its_successor_found() -> None:

@@ -11,7 +11,8 @@ from stances import CALIBRATION_LOAD, ask, on_wall, random_question
 from hand_models.holds import Cylinder, Plane
 from planner import verify
 from planner.plan import Plan
-from planner.solve import plan, settle
+from planner.settling import settle
+from planner.solve import plan
 from planner.verify import equilibrium, problems
 
 QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))

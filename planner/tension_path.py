@@ -1,0 +1,182 @@
+"""Whether the straight way from the present tensions to the planned ones is safe.
+
+Along it every tendon that has a present tension goes linearly from that to the planned one, while
+palms, lateral reactions and the tendons without a present tension take whatever balances the body.
+A point of the way is safe if some such loads keep to all hard rows, and to the limits at the cap
+on the utilisation. Safe points are convex: where the plan is safe they are an interval that ends
+there, and its length is one linear program,
+
+    max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`).
+
+Hands with floating wrists stay as planned: their sets hold about that only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.frames import Array
+from hand_models.hand import FINGERS
+from hand_models.wrench_space import WrenchSpace
+from planner import program, stance_data
+from planner.plan import TensionPath
+from planner.program import SLACK
+from planner.stance_data import LOAD_UNIT, StanceData
+
+__all__ = ["UNKNOWN", "tension_path", "unsafe_sentence"]
+
+TENSIONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
+"""Columns of a hand with a fixed wrist."""
+
+UNKNOWN: Final = "whether the straight way from the present tensions is safe was not found out"
+"""Of a way about which the solver gave no answer that passes the check."""
+
+GIVE: Final = 1e-3
+"""How much hard rows give on the way, and how small a change of tension is none [N]: no present
+tension is known better, and a tendon at rest where it would stick is not slack by a rounding."""
+
+
+def tension_path(
+    data: StanceData,
+    limbs: Sequence[str],
+    spaces: Sequence[WrenchSpace],
+    loads: Sequence[Array],
+    present: Mapping[str, Array],
+    cap: float,
+    idle: float = 0.0,
+) -> TensionPath | None:
+    """Return how safe the way to a plan is.
+
+    Parameters
+    ----------
+    data : StanceData
+        The hands' rows, and the balance.
+    limbs : sequence of str
+        Of the hands.
+    spaces : sequence of WrenchSpace
+        Their sets.
+    loads : sequence of ndarray
+        The plan's y of each hand.
+    present : mapping of str to ndarray, shape (4,)
+        Tensions now, by limb [N]; of hands with fixed wrists.
+    cap : float
+        On the utilisation.
+    idle : float, optional
+        What limbs without a hand use of their joints.
+
+    Returns
+    -------
+    TensionPath or None
+        None if the solver's answer does not pass the check.
+    """
+    z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
+    used = [
+        float((hand.L @ part + hand.l0).max(initial=0.0))
+        for hand, part in zip(data.hands, z, strict=True)
+    ]
+    fixed = [i for i, space in enumerate(spaces) if TENSIONS[0] in space.columns]
+    changes = {
+        i: present[limbs[i]] / LOAD_UNIT - z[i][_columns(spaces[i])]
+        for i in fixed
+        if limbs[i] in present
+    }
+    start, way = _pinned(data, spaces, z, fixed, changes)
+    still = max([idle, *(used[i] for i in range(len(z)) if i not in fixed)])
+    size = float(np.abs(way).max(initial=0.0))
+    change = LOAD_UNIT * size
+    here = max(still, *used)
+    at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
+    if here > cap + SLACK:
+        return TensionPath(False, 0.0, at_present, change)
+    if change <= GIVE:
+        return TensionPath(True, 1.0, at_present, change)
+    # rounding must not leave the plan itself outside
+    most = max(cap, *used)
+    reached = program.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
+    if not reached.outcome.solved:
+        return None
+    part = float(reached.t[0]) / size
+    if not _holds(start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK):
+        return None
+    part = min(max(part, 0.0), 1.0)
+    return TensionPath(part >= 1.0 - SLACK, part, at_present, change)
+
+
+def unsafe_sentence(path: TensionPath) -> str:
+    """Say how much of a way that is not safe is."""
+    if path.safe_part <= 0.0:
+        return "the straight way from the present tensions is not safe: no part of it is"
+    part = math.floor(100.0 * path.safe_part)
+    return (
+        "the present tensions do not balance the body within its limits: the last "
+        f"{part} % of the straight way from there are safe"
+    )
+
+
+def _columns(space: WrenchSpace) -> list[int]:
+    return [space.columns.index(name) for name in TENSIONS]
+
+
+def _pinned(
+    data: StanceData,
+    spaces: Sequence[WrenchSpace],
+    z: Sequence[Array],
+    fixed: Sequence[int],
+    changes: Mapping[int, Array],
+) -> tuple[StanceData, Array]:
+    """Return the fixed hands, tensions further rows of their balance, at the plan; and the way.
+
+    Parameters
+    ----------
+    data, spaces
+        Of all hands.
+    z : sequence of ndarray
+        The plan's loads, scaled.
+    fixed : sequence of int
+        Hands whose wrists are.
+    changes : mapping of int to ndarray, shape (4,)
+        From planned tensions to present ones, scaled, by hand.
+    """
+    goal = np.array(sum(data.hands[i].G @ z[i] + data.hands[i].g for i in fixed))
+    count = len(FINGERS) * len(changes)
+    hands, planned = [], [goal]
+    for i in fixed:
+        hand = data.hands[i]
+        picked = np.zeros((count, len(z[i])))
+        if i in changes:
+            columns = _columns(spaces[i])
+            first = len(FINGERS) * list(changes).index(i)
+            picked[range(first, first + len(FINGERS)), columns] = 1.0
+            planned.append(z[i][columns])
+        hands.append(
+            hand._replace(
+                G=np.vstack([hand.G, picked]),
+                g=np.concatenate([hand.g, np.zeros(count)]),
+                h=hand.h + GIVE / LOAD_UNIT,
+            )
+        )
+    way = np.concatenate([np.zeros(len(goal)), *changes.values()])
+    return StanceData(tuple(hands), np.concatenate(planned)), way
+
+
+def _least(data: StanceData, still: float) -> float | None:
+    """Return the least utilisation; ``still`` is what hands use that are left out."""
+    outcome = program.margin(data)
+    if not (outcome.solved and _holds(data, outcome.loads, outcome.value + SLACK)):
+        return None
+    return max(outcome.value, still)
+
+
+def _holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+    """Whether loads balance, and keep to hard rows and to limits at the cap."""
+    error = np.abs(stance_data.body_wrench(data, loads) - data.wrench).max()
+    beyond = 0.0
+    for hand, y in zip(data.hands, loads, strict=True):
+        z = y / hand.unit
+        beyond = max(beyond, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
+        beyond = max(beyond, float((hand.H @ z - hand.h).max(initial=0.0)))
+    return bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max()))) and beyond <= SLACK

@@ -1,0 +1,142 @@
+"""Irreducible sets of barriers: all of them together leave no loads, any fewer do."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from barred import barred, explained, have_loads
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from planner.barriers import HELD_WRENCH, System
+from planner.irreducible import irreducible_set
+from planner.plan import LimitName
+from planner.program import UNLIMITED
+
+LIMB = "front_left"
+
+
+def named(*names: str) -> tuple[LimitName, ...]:
+    return tuple(LimitName(LIMB, None, None, name) for name in names)
+
+
+def system(rows, bounds, names, *, goal=0.0, given=(), values=()) -> System:
+    """Loads z whose sum is the body's fx, with rows · z ≤ bounds, and given · z = values."""
+    rows = np.array(rows, dtype=float)
+    size = rows.shape[1]
+    G = np.zeros((6 + len(given), size))
+    G[0] = 1.0
+    G[6:] = np.array(given, dtype=float).reshape(len(given), size)
+    return System(
+        G=G,
+        g=np.zeros(len(G)),
+        wrench=np.array([goal, *np.zeros(5), *values], dtype=float),
+        H=rows,
+        h=np.array(bounds, dtype=float),
+        names=named(*names),
+        given=(LimitName(LIMB, None, None, HELD_WRENCH),) * len(given),
+    )
+
+
+def test_of_four_rows_the_two_that_keep_a_sum_small_are_found():
+    """z1 ≤ 1 and z2 ≤ 1 keep z1 + z2 from 3; z1 ≤ 5 and z1 ≥ 0 do not."""
+    found = irreducible_set(
+        parts := system(
+            [[1, 0], [0, 1], [1, 0], [-1, 0]], [1, 1, 5, 0], ("a", "b", "far", "other"), goal=3.0
+        ),
+        parts.barriers,
+    )
+    assert set(found) == set(named("a", "b"))
+
+
+def test_rows_of_one_name_are_one_barrier():
+    """The two rows named a contradict each other; b, which the first contradicts, is not needed."""
+    parts = system([[1], [-1], [-1]], [-1, -1, 0], ("a", "a", "b"))
+    assert irreducible_set(parts, parts.barriers) == named("a")
+
+
+def test_a_given_load_is_a_barrier():
+    """z1 = 2 is given, z2 ≤ 0, and z1 + z2 is to be 3."""
+    parts = system([[0, 1], [1, 0]], [0, 9], ("low", "far"), goal=3.0, given=[[1, 0]], values=[2.0])
+    assert set(irreducible_set(parts, parts.barriers)) == set(named("low", HELD_WRENCH))
+
+
+def test_a_balance_that_no_loads_give_needs_no_barrier():
+    parts = system([[1]], [1], ("a",))
+    parts.wrench[3] = 1.0
+    assert irreducible_set(parts, parts.barriers) == ()
+
+
+def test_where_there_are_loads_there_is_no_set():
+    parts = system([[1, 0], [0, 1]], [2, 2], ("a", "b"), goal=3.0)
+    assert irreducible_set(parts, parts.barriers) is None
+
+
+def test_what_is_weightier_comes_first():
+    """10 z1 ≤ 1 weighs a tenth of z2 ≤ 1 in the proof that z1 + z2 < 3."""
+    parts = system([[10, 0], [0, 1]], [1, 1], ("slight", "weighty"), goal=3.0)
+    assert irreducible_set(parts, parts.barriers) == named("weighty", "slight")
+
+
+def has_loads(parts: System, names) -> bool:
+    kept = np.array([name in names for name in parts.names], dtype=bool)
+    tied = np.array([True] * 6 + [name in names for name in parts.given])
+    result = linprog(
+        np.zeros(parts.H.shape[1]),
+        A_ub=parts.H[kept],
+        b_ub=parts.h[kept],
+        A_eq=parts.G[tied],
+        b_eq=parts.wrench[tied],
+        bounds=(-UNLIMITED, UNLIMITED),
+    )
+    return result.status == 0
+
+
+whole = st.integers(-3, 3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_every_smaller_set_of_small_systems_has_loads(data):
+    """Against a look at every subset."""
+    size = data.draw(st.integers(1, 3))
+    count = data.draw(st.integers(1, 6))
+    row = st.lists(whole, min_size=size, max_size=size)
+    rows = data.draw(st.lists(row, min_size=count, max_size=count))
+    bounds = data.draw(st.lists(whole, min_size=count, max_size=count))
+    names = data.draw(st.lists(st.sampled_from("abcd"), min_size=count, max_size=count))
+    tied = data.draw(st.booleans())
+    parts = system(
+        rows,
+        bounds,
+        names,
+        goal=float(data.draw(whole)),
+        given=[rows[0]] if tied else (),
+        values=[float(data.draw(whole))] if tied else (),
+    )
+    found = irreducible_set(parts, parts.barriers)
+    if has_loads(parts, parts.barriers):
+        assert found is None
+        return
+    assert found is not None
+    assert not has_loads(parts, found)
+    for fewer in range(len(found)):
+        assert all(has_loads(parts, subset) for subset in combinations(found, fewer))
+
+
+@pytest.mark.parametrize("status", ["infeasible", "overloaded"])
+def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_of_it(status):
+    for label, question, answer in explained(status):
+        proof = answer.certificate
+        assert proof is not None, label
+        assert proof.irreducible is not None, label
+        parts = barred(question, proof.utilisation)
+        assert set(proof.irreducible) <= parts.barriers, label
+        assert not have_loads(parts, proof.irreducible), label
+        for name in proof.irreducible:
+            others = [other for other in proof.irreducible if other != name]
+            assert have_loads(parts, others), f"{label}: {name} is not needed"
+    assert any(len(answer.certificate.irreducible) > 3 for _, _, answer in explained(status))
