@@ -19,12 +19,13 @@ from hand_models.wrench_space import SCALE
 from planner import program, stance_data
 from planner.binding import ALIKE, BINDING, limit_name
 from planner.body_motion import Motion, joint_name, motion_of
+from planner.gathering import gather
 from planner.hand_sets import Hands, Point, widest_at_rest
 from planner.plan import LimitName, Plan
 from planner.posture import Posture, posture_at
 from planner.program import SLACK, Outcome, Reached
 from planner.question import Question
-from planner.solve import gather, plan
+from planner.solve import plan
 from planner.stance_data import JOINT_TORQUE, WRENCH_UNIT, StanceData
 
 __all__ = ["BodyPrograms", "size_of"]

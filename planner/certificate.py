@@ -7,20 +7,23 @@ body: whatever the body needs, there are no loads.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.frames import Array
+from hand_models.row_layout import TENDON_TENSION
 from hand_models.wrench_space import WrenchSpace
 from planner import program, stance_data
 from planner.barriers import HELD_WRENCH, System, ranked, vertex
 from planner.binding import Used
-from planner.irreducible import irreducible_set
-from planner.plan import Certificate
+from planner.hand_rows import FORCE_CAP, TENSION_CHANGE
+from planner.irreducible import irreducible_set, sufficient_alone
+from planner.plan import Certificate, LimitName
 from planner.program import UNLIMITED, Outcome
-from planner.stance_data import WRENCH_UNIT, StanceData
+from planner.question import Limits
+from planner.stance_data import JOINT_TORQUE, WRENCH_UNIT, StanceData
 
 __all__ = ["Hindered", "certify", "certify_idle"]
 
@@ -51,6 +54,8 @@ class Hindered(NamedTuple):
         What the further rows of the balance take of each hand's wrench.
     utilisation : float or None
         The cap within which they do not; None: at any utilisation.
+    limits : Limits
+        The caller's.
     """
 
     data: StanceData
@@ -58,6 +63,7 @@ class Hindered(NamedTuple):
     spaces: Sequence[WrenchSpace]
     held: Sequence[Array]
     utilisation: float | None = None
+    limits: Limits = Limits()
 
 
 def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | None:
@@ -78,7 +84,7 @@ def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | N
     Certificate or None
         None if the bound proves nothing.
     """
-    data, limbs, spaces, held, cap = stance
+    data, limbs, spaces, held, cap, limits = stance
     system = System.of(data, limbs, spaces, held, cap)
     if nearest is None:
         nearest = program.nearest_body(data if cap is None else data.capped(cap))
@@ -95,6 +101,9 @@ def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | N
     if not system.proves(direction, multipliers):
         return None
     weights = system.weights(direction, multipliers)
+    irreducible = irreducible_set(system, weights)
+    if irreducible is not None:
+        irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,
         direction=direction[:6] / WRENCH_UNIT,
@@ -107,14 +116,27 @@ def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | N
         needed=float(direction @ data.wrench),
         shortfall=None if missing is None else missing[:6] * WRENCH_UNIT,
         nearest=None if missing is None else (data.wrench - missing)[:6] * WRENCH_UNIT,
-        blocking=tuple(name for name in ranked(weights) if name.limit != HELD_WRENCH),
-        irreducible=irreducible_set(system, weights),
+        blocking=_in_order(
+            (name for name in ranked(weights) if name.limit != HELD_WRENCH), limits, spaces
+        ),
+        irreducible=irreducible,
+        sufficient=sufficient_alone(system, irreducible),
         spaces=dict(zip(limbs, spaces, strict=True)),
     )
 
 
-def certify_idle(used: Used, cap: float) -> Certificate:
-    """Return the proof that a joint of a limb without a hand bears more than a cap allows."""
+def certify_idle(used: Used, cap: float, alone: bool | None) -> Certificate:
+    """Return the proof that a joint of a limb without a hand bears more than a cap allows.
+
+    Parameters
+    ----------
+    used : Used
+        How much.
+    cap : float
+        On the utilisation.
+    alone : bool or None
+        Whether everything else is within the cap; None where that is not known.
+    """
     return Certificate(
         utilisation=cap,
         direction=np.zeros(6),
@@ -125,8 +147,36 @@ def certify_idle(used: Used, cap: float) -> Certificate:
         nearest=None,
         blocking=(used.name,),
         irreducible=(used.name,),
+        sufficient=None if alone is None else (used.name,) * alone,
         spaces={},
     )
+
+
+def _in_order(
+    names: Iterable[LimitName], limits: Limits, spaces: Sequence[WrenchSpace]
+) -> tuple[LimitName, ...]:
+    """Return what a caller can change first: own caps, then other limits, then hard rows.
+
+    Within each of these the order stays.
+    """
+    capacities = {row.limit for space in spaces for row in space.rows if row.kind == "limit"}
+
+    def rank(name: LimitName) -> int:
+        if _is_own(name, limits):
+            return 0
+        return 1 if name.limit in capacities else 2
+
+    return tuple(sorted(names, key=rank))
+
+
+def _is_own(name: LimitName, limits: Limits) -> bool:
+    """Whether the caller has set a limit."""
+    if name.limit == TENDON_TENSION:
+        return limits.tendon_tension is not None
+    if name.limit == JOINT_TORQUE:
+        own = limits.joint_torque
+        return name.limb in own if isinstance(own, Mapping) else own is not None
+    return name.limit in (FORCE_CAP, HELD_WRENCH, TENSION_CHANGE)
 
 
 def _contradiction(system: System, limbs: Sequence[str]) -> tuple[Array, Array] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,8 @@ __all__ = [
     "LEAST_FACTOR",
     "NO_FACTOR",
     "UNPROVEN",
+    "barrier_words",
+    "barriers_sentence",
     "limit_sentence",
     "overload_sentence",
     "shortfall_sentence",
@@ -58,6 +60,7 @@ WHOLES: Final = {
     FORCE_CAP: "the hand",
     HELD_WRENCH: "the hand",
     JOINT_TORQUE: "its joints",
+    "wrist_range": "the wrist",
 }
 """What of a hand or its limb a limit is about; its palm by default."""
 
@@ -110,18 +113,27 @@ NO_FACTOR: Final = "no load factor was found; with floating wrists that is no pr
 """Of a question for it that ends without one."""
 
 
+def _bearer(name: LimitName) -> str:
+    """Say what a limit is about: ``tile``."""
+    if name.limit == "fingertip_force":
+        return "fingertip"
+    if name.phalanx is not None:
+        return name.phalanx if name.phalanx == NAIL else "tile"
+    if name.joint is not None:
+        return "joint"
+    if name.finger is not None:
+        return BEARERS.get(name.limit, "tendon")
+    return WHOLES.get(name.limit, "palm")
+
+
 def _spoken(name: LimitName) -> str:
     """Say whose limit it is: ``front_left: proximal tile of inner_right``."""
-    if name.limit == "fingertip_force":
-        return f"{name.limb}: fingertip of {name.finger}"
-    if name.phalanx is not None:
-        tile = "" if name.phalanx == NAIL else " tile"
-        return f"{name.limb}: {name.phalanx}{tile} of {name.finger}"
-    if name.joint is not None:
-        return f"{name.limb}: joint {name.joint}"
-    if name.finger is not None:
-        return f"{name.limb}: {BEARERS.get(name.limit, 'tendon')} of {name.finger}"
-    return f"{name.limb}: {WHOLES.get(name.limit, 'palm')}"
+    bearer = _bearer(name)
+    if bearer == "tile":
+        bearer = f"{name.phalanx} tile"
+    if bearer == "joint":
+        bearer = f"joint {name.joint}"
+    return f"{name.limb}: {bearer}" + ("" if name.finger is None else f" of {name.finger}")
 
 
 def _verb(limit: str, held: bool) -> str:
@@ -179,7 +191,14 @@ def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
 
 
-def shortfall_sentence(certificate: Certificate, touching: bool) -> str:
+def barrier_words(name: LimitName) -> str:
+    """Say what a barrier is about and what it forbids: ``palm cannot pull``."""
+    return f"{_bearer(name)} {_barrier(name.limit)}"
+
+
+def shortfall_sentence(
+    certificate: Certificate, touching: bool, *, floating: Collection[str] = ()
+) -> str:
     """Say what no plan can supply, and what is in the way.
 
     Parameters
@@ -188,42 +207,61 @@ def shortfall_sentence(certificate: Certificate, touching: bool) -> str:
         Of a body wrench that cannot be had at any utilisation.
     touching : bool
         Whether any hand touches rock at all.
+    floating : collection of str, optional
+        Limbs whose hands float.
     """
     names = certificate.irreducible
-    barriers = _barriers(certificate.blocking if names is None else names)
+    barriers = barriers_sentence(_blamed(certificate))
+    note = ""
+    if _floats(certificate, floating):
+        note = "; floating hands as they give way where the search for a plan ended"
     if certificate.shortfall is None:
-        return f"no loads at any utilisation, whatever the body needs: {barriers}"
+        return f"no loads at any utilisation, whatever the body needs: {barriers}{note}"
     missing = _missing(certificate.shortfall)
     sentence = f"no loads balance the body at any utilisation: missing {missing} (in B)"
     if not touching:
         return f"{sentence}; no hand touches rock"
     if names == ():
-        return f"{sentence}; these hands have no loads at all, of any sign, that give it"
-    return f"{sentence}; {barriers}" if barriers else sentence
+        return f"{sentence}; these hands have no loads at all, of any sign, that give it{note}"
+    return (f"{sentence}; {barriers}" if barriers else sentence) + note
 
 
-def overload_sentence(certificate: Certificate | None, *, floats: bool) -> str:
+def overload_sentence(certificate: Certificate | None, *, floating: Collection[str] = ()) -> str:
     """Say what would be missing within the limits; nothing without a proof of it.
 
     Parameters
     ----------
     certificate : Certificate or None
         Of a body wrench that cannot be had within a cap on the utilisation.
-    floats : bool
-        Whether some hand floats.
+    floating : collection of str, optional
+        Limbs whose hands float.
     """
     if certificate is None:
         return ""
     if not certificate.spaces:
         return "; it holds nothing on, so no plan changes that"
     if certificate.shortfall is None:
-        barriers = _barriers(certificate.irreducible or certificate.blocking)
+        barriers = barriers_sentence(_blamed(certificate))
         sentence = f"; whatever the body needs, no loads keep within all limits: {barriers}"
     else:
         cap = certificate.utilisation
         within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
         sentence = f"; {within} {_missing(certificate.shortfall)} (in B) would be missing"
-    return sentence + (", with floating hands as they give way at this plan" if floats else "")
+    if _floats(certificate, floating):
+        sentence += ", with floating hands as they give way at this plan"
+    return sentence
+
+
+def _blamed(certificate: Certificate) -> tuple[LimitName, ...]:
+    """Return what a certificate puts the blame on."""
+    return certificate.irreducible or certificate.blocking
+
+
+def _floats(certificate: Certificate, floating: Collection[str]) -> bool:
+    """Whether a floating hand is to blame: one that is named, or any where nothing is."""
+    if certificate.irreducible == ():
+        return not certificate.spaces.keys().isdisjoint(floating)
+    return any(name.limb in floating for name in _blamed(certificate))
 
 
 def _missing(shortfall: Array) -> str:
@@ -234,7 +272,7 @@ def _missing(shortfall: Array) -> str:
     return ", ".join(f"{AXES[i]} {shortfall[i]:+.3g} {units[i]}" for i in order)
 
 
-def _barriers(names: Sequence[LimitName]) -> str:
+def barriers_sentence(names: Sequence[LimitName]) -> str:
     """Say what is in the way, the foremost first; a limb's name once in a row."""
     told: list[str] = []
     for i, name in enumerate(names[:FOREMOST]):
@@ -254,7 +292,10 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
     for place, hand in zip(stance.hands, settled, strict=True):
         stretch = stance.robot.stretch(place.limb, body @ place.pose)
         if stretch > 1.0:
-            found.append(f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes")
+            found.append(
+                f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes; "
+                "positions in metres, quaternions as [x, y, z, w]?"
+            )
         tiles = int(hand.holding.sum())
         if not tiles and not hand.palm.engaged:
             found.append(f"{place.limb}: touches nothing, so it carries nothing")

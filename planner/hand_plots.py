@@ -46,6 +46,7 @@ CONTACTS: Final = {
     "none": ("0.55", "no contact"),
 }
 ROCK: Final = "0.88"
+PALM: Final = "tab:brown"
 MM: Final = 1e3
 ARROW: Final = 32.0
 """Length of the largest tile force in a picture [mm]."""
@@ -94,11 +95,11 @@ def plot_wrench_space(
         set linearised at rest.
     """
     tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
-    figure = Figure(figsize=(15.0, 8.8 if space is None else 13.4), layout="constrained")
-    heights = [1.0] if space is None else [1.0, 0.5]
+    figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
+    heights = [1.0] if space is None else [1.0, 0.6]
     rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
     upper = rows[0, 0]
-    grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.15))
+    grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.4))
     fingers = [upper.add_subplot(grid[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1))]
     _draw_fingers(fingers, settled, tensions)
     _draw_from_above(upper.add_subplot(grid[:, 2]), settled)
@@ -146,6 +147,7 @@ def _draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> 
         Line2D([], [], color=CONTACTS[kind][0], linewidth=4, label=CONTACTS[kind][1])
         for kind in shown
     ]
+    handles.append(Line2D([], [], color=PALM, linewidth=3, label="palm"))
     panels[0].legend(handles=handles, loc="lower left", fontsize=8)
 
 
@@ -248,7 +250,7 @@ def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
     if FINGERS[index].startswith("inner"):
         place = -MM * hand.inner_joint[[0, 2]]
         half = MM * 0.5 * hand.palm_length
-        axes.plot(place[0] + np.array([-half, half]), [place[1]] * 2, color="tab:brown", lw=3)
+        axes.plot(place[0] + np.array([-half, half]), [place[1]] * 2, color=PALM, lw=3)
         return
     tile = next(t for t, row in zip(settled.tiles, settled.finger_of, strict=True) if row == index)
     middle = MM * (hand.base_tile_reach - hand.outer_reach)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,14 +11,18 @@ import numpy as np
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Pose, finite_vector
 from planner.limb_batch import Efforts, LimbBatch
-from planner.pose_search import TOLERANCE, find_angles
+from planner.out_of_reach import PLACED, TURNED, lack
+from planner.pose_search import TOLERANCE, find_angles, starts_near
 from planner.robosimian import Robot
 from planner.torque_lowering import lower_torques
 
 __all__ = ["IkSolution", "UnreachableError", "solve_limbs", "unreachable"]
 
-PLACED: Final = 1e-3
-"""Distance up to which a hand counts as in its place though it is not turned as asked [m]."""
+STARTS: Final = 2
+"""Postures from which a pose out of reach is approached, beside the best found."""
+
+FAR: Final = 1.0
+"""Reaches beyond a stretched limb from which on nothing else need be known of a pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +40,11 @@ class IkSolution:
     solved : bool
         Whether both errors are nil but for rounding.
     missing : float
-        How far the pose is out of reach [m]: how far beyond the stretched limb where it is that far
-        away, which no joint angles can change, otherwise the position error of the best found;
-        zero if the pose is solved.
+        How far the pose is out of reach [m]: how far away the hand stays, turned as asked if it can
+        be, and not less than the pose is beyond the stretched limb; zero if the pose is solved.
+    turned : float or None
+        Where the place is within reach, but not with these axes: the angle that is missing there
+        [rad].
     """
 
     angles: Array
@@ -46,6 +52,7 @@ class IkSolution:
     orientation_error: float
     solved: bool
     missing: float
+    turned: float | None = None
 
 
 class UnreachableError(InvalidInputError):
@@ -56,8 +63,8 @@ class UnreachableError(InvalidInputError):
     missing : mapping of str to float
         By limb: the distance that is missing [m].
     turned : mapping of str to float
-        By limb, of those that are in their place but not turned as asked: the angle that is
-        missing [rad].
+        By limb, of those whose place is within reach, but not with these axes: the angle that is
+        missing there [rad].
     field : str, optional
     """
 
@@ -70,12 +77,13 @@ class UnreachableError(InvalidInputError):
         *,
         field: str | None = None,
     ) -> None:
-        said = [
-            f"{limb} cannot be turned as asked, by {turned[limb]:.2g} rad"
-            if limb in turned
-            else f"{limb} is out of reach by {distance:.2g} m"
-            for limb, distance in missing.items()
-        ]
+        said = []
+        for limb, distance in missing.items():
+            if limb in turned and distance <= PLACED:
+                said.append(f"{limb} cannot be turned as asked, by {turned[limb]:.2g} rad")
+                continue
+            near = f" (turned by {turned[limb]:.2g} rad it is there)" if limb in turned else ""
+            said.append(f"{limb} is out of reach by {distance:.2g} m{near}")
         super().__init__("; ".join(said), field=field)
         self.missing = dict(missing)
         self.turned = dict(turned)
@@ -97,11 +105,7 @@ def unreachable(solutions: Mapping[str, IkSolution]) -> UnreachableError | None:
         return None
     return UnreachableError(
         {limb: solution.missing for limb, solution in wrong.items()},
-        {
-            limb: solution.orientation_error
-            for limb, solution in wrong.items()
-            if solution.missing <= PLACED
-        },
+        {limb: each.turned for limb, each in wrong.items() if each.turned is not None},
     )
 
 
@@ -160,14 +164,38 @@ def solve_limbs(
     solved = np.abs(errors).max(axis=1) <= TOLERANCE
     positions = np.linalg.norm(errors[:, :3], axis=1) * batch.reach
     turns = np.linalg.norm(errors[:, 3:], axis=1)
-    missing = np.where(solved, 0.0, np.where(batch.beyond > 0.0, batch.beyond, positions))
-    return {
-        limb: IkSolution(
-            angles=values.copy(),
+    found = {}
+    for i, (limb, values) in enumerate(_by_limb(batch, angles)):
+        missing, turned = 0.0, None
+        if not solved[i]:
+            missing, turned = _lacking(batch, i, values)
+        found[limb] = IkSolution(
+            angles=values,
             position_error=float(positions[i]),
             orientation_error=float(turns[i]),
             solved=bool(solved[i]),
-            missing=float(missing[i]),
+            missing=missing,
+            turned=turned,
         )
-        for i, (limb, values) in enumerate(batch.by_limb(angles).items())
-    }
+    return found
+
+
+def _by_limb(batch: LimbBatch, angles: Array) -> Iterator[tuple[str, Array]]:
+    """Yield every limb with its own angles, shape (n,)."""
+    for i, limb in enumerate(batch.limbs):
+        yield limb, angles[i, : batch.joints[i]].copy()
+
+
+def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None]:
+    """Return the distance that a limb lacks [m], and the angle at its place if that is in reach."""
+    beyond = float(batch.beyond[i])
+    if beyond > FAR * batch.reach[i]:
+        return beyond, None
+    limb = batch.limbs[i]
+    starts = [best, *starts_near(batch, i, 0)[:STARTS, : batch.joints[i]]]
+    lacks = lack(batch.robot.model, limb, batch.poses[limb], starts)
+    # without a posture that is turned as asked, what is told is how far away the place is
+    missing = lacks.way if lacks.askew <= TURNED else lacks.place
+    if beyond > 0.0 and missing <= beyond + PLACED:
+        missing = beyond
+    return missing, lacks.turn if lacks.place <= PLACED else None

@@ -3,6 +3,9 @@
 A set of barriers is irreducible if they and the balance of the body have no loads, and have some as
 soon as any one of them is left out. It is found by a deletion filter over the barriers that a proof
 weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
+
+Other barriers may leave no loads, too: there may be many such sets. A barrier without which all the
+others have loads is in every one of them.
 """
 
 from __future__ import annotations
@@ -16,13 +19,16 @@ from planner.barriers import BODY, WEIGHS, System, Violation, among, ranked
 from planner.plan import LimitName
 from planner.program import UNLIMITED
 
-__all__ = ["irreducible_set"]
+__all__ = ["irreducible_set", "sufficient_alone"]
 
 BROKEN: Final = 1e-7
 """Rows that must be broken by more than this have no loads, in the program's units."""
 
 KEPT: Final = 2e-9
 """Rows that need not be broken by more than this have loads: what the solver's rounding leaves."""
+
+MOST: Final = 24
+"""Barriers of a set that are left out one by one; larger sets are not tried."""
 
 RANK: Final = 1e-9
 """Relative size below which singular values of rows are none."""
@@ -71,10 +77,57 @@ def _filtered(system: System, proof: Violation) -> tuple[LimitName, ...] | None:
             needed |= _needed(system, proof, list(kept))
         elif trial.size > KEPT:
             return None
+    return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
+
+
+def sufficient_alone(
+    system: System, irreducible: tuple[LimitName, ...] | None
+) -> tuple[LimitName, ...] | None:
+    """Return the barriers without any one of which all the others have loads.
+
+    Parameters
+    ----------
+    system : System
+        All barriers together have none.
+    irreducible : tuple of LimitName or None
+        Some irreducible set: only its members can do. So it is with those of every other set that
+        a trial shows, which soon leaves few to try.
+
+    Returns
+    -------
+    tuple of LimitName or None
+        In the order of the set. None without a set, or if rounding leaves undecided whether some
+        barriers have loads, or if a set of more than `MOST` would have to be tried one by one.
+    """
+    if not irreducible:
+        return irreducible
+    others = system.least_violation([n for n in system.barriers if n not in irreducible])
+    if others is not None and others.size > BROKEN:
+        # what is left is in the way even without all of them
+        return ()
+    if len(irreducible) > MOST:
+        return None
+    found, left = [], list(irreducible)
+    while left:
+        name = left.pop(0)
+        trial = system.least_violation([other for other in system.barriers if other != name])
+        if trial is None or KEPT < trial.size <= BROKEN:
+            return None
+        if trial.size <= KEPT:
+            found.append(name)
+            continue
+        weighed = system.weights(trial.direction, trial.multipliers)
+        if _prove_alone(system, trial, weighed):
+            left = [other for other in left if other in weighed]
+    return tuple(found)
+
+
+def _prove_alone(system: System, proof: Violation, kept: Collection[LimitName]) -> bool:
+    """Whether a proof stands on these barriers alone."""
     multipliers = np.where(among(system.names, kept), proof.multipliers, 0.0)
     direction = proof.direction.copy()
     direction[BODY:] *= among(system.given, kept)
-    return tuple(ranked(kept)) if system.proves(direction, multipliers) else None
+    return system.proves(direction, multipliers)
 
 
 def _needed(system: System, proof: Violation, kept: Sequence[LimitName]) -> set[LimitName]:

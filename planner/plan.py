@@ -239,13 +239,18 @@ class Certificate:
     nearest : ndarray, shape (6,), or None
         That nearest body wrench.
     blocking : tuple of LimitName
-        Rows that keep the hands from giving more in that direction, the weightiest first; empty
-        where no hand has anything at all to give.
+        Rows that keep the hands from giving more in that direction; empty where no hand has
+        anything at all to give. The caller's own limits come first, then other limits, then hard
+        rows; of each of these the weightiest.
     irreducible : tuple of LimitName or None
         Limits and hard rows (all rows of a name together) and given wrenches of hands
-        (``held_wrench``) that leave no balance, but would if any one of them were not there. The
-        weightiest come first. Empty where loads of any sign, up to 10⁶ N, would not balance it.
-        None where rounding leaves the set undecided.
+        (``held_wrench``) that by themselves leave no balance, each of them needed for that. Others
+        may be in the way, too. In the order of ``blocking``. Empty where loads of any sign, up to
+        10⁶ N, would not balance it. None where rounding leaves the set undecided.
+    sufficient : tuple of LimitName or None
+        Those of them without any one of which, all other rows in place, there is a plan: within
+        the cap, or at any utilisation. Empty if no single one does. None where that is undecided,
+        or the set has more than 16 members and others alone are not in the way.
     spaces : mapping of str to WrenchSpace
         The hands' sets that are meant, by limb; none where no hand has a part in it.
     """
@@ -259,6 +264,7 @@ class Certificate:
     nearest: Array | None
     blocking: tuple[LimitName, ...]
     irreducible: tuple[LimitName, ...] | None
+    sufficient: tuple[LimitName, ...] | None
     spaces: Mapping[str, WrenchSpace]
 
 
@@ -294,12 +300,16 @@ class TensionPath:
         The least at the present tensions; None if these balance the body at no utilisation.
     largest_change : float
         Of a tension [N].
+    limiting : tuple of LimitName
+        The limits and hard rows that end the safe part, the weightiest first; of a plan beyond the
+        cap those of which it uses most. Empty where the way is safe.
     """
 
     safe: bool
     safe_part: float
     utilisation_at_present: float | None
     largest_change: float
+    limiting: tuple[LimitName, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
@@ -23,15 +22,13 @@ from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.frames import Array
-from hand_models.hand import NAIL
 from planner.plan import Plan
-from planner.plan_scene import DrawnLimb, Scene, Sights, scene_of, sights
+from planner.plan_scene import Scene, Sights, scene_of, sights
+from planner.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.plan_views import COLOURS, UTILISATION, View, draw_scene
 from planner.question import Question
 
 __all__ = ["draw_plan", "plot_plan"]
-
-PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
 
 SIZE: Final = (14.0, 8.0)
 """Of a picture [inch]."""
@@ -44,6 +41,9 @@ BOTTOM: Final = 0.075
 
 TOP: Final = 0.875
 """Of the panels, over the picture's height."""
+
+WORDS: Final = (0.7, BOTTOM, 0.28, TOP - BOTTOM)
+"""Left, bottom, width and height of what is said where there are no loads, over the picture's."""
 
 REASON: Final = 0.45
 """From the upper edge down to the reason [inch]."""
@@ -59,6 +59,12 @@ TICKS: Final = 5
 
 ASIDE: Final = math.radians(32.0)
 """How far to the side the view from behind is turned."""
+
+ASIDE_STEEP: Final = math.radians(12.0)
+"""The same under a ceiling and on a floor, so that the body is seen between the hands."""
+
+STOOPED: Final = 0.6
+"""How far it is raised over a slab, and lowered under an overhang, over their lean."""
 
 ABOVE: Final = math.radians(20.0)
 """How far from above the view from behind looks at a vertical wall."""
@@ -96,9 +102,12 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     tables = figure.add_gridspec(
         len(parts), 1, left=0.785, right=0.94, height_ratios=parts, hspace=0.22, **places
     )
-    _draw_tiles(figure.add_subplot(tables[0]), plan)
+    if plan.hands:
+        draw_tiles(figure.add_subplot(tables[0]), plan)
+    else:
+        draw_shortfall(figure.add_axes(WORDS), plan)
     if joints:
-        _draw_joints(figure.add_subplot(tables[1]), joints)
+        draw_joints(figure.add_subplot(tables[1]), joints)
     if plan.hands:
         figure.colorbar(
             ScalarMappable(UTILISATION, COLOURS),
@@ -138,8 +147,10 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: Sights) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MultipleLocator(step))
     right = np.cross(seen.ahead, seen.up)
-    camera = -math.cos(ASIDE) * seen.ahead + math.sin(ASIDE) * right
-    elevation = ABOVE - 0.6 * math.asin(np.clip(seen.into[2], -1.0, 1.0))
+    aside = ASIDE_STEEP if seen.steep else ASIDE
+    camera = -math.cos(aside) * seen.ahead + math.sin(aside) * right
+    lean = math.asin(np.clip(seen.into[2], -1.0, 1.0))
+    elevation = ABOVE - STOOPED * lean
     axes.view_init(math.degrees(elevation), math.degrees(math.atan2(camera[1], camera[0])))
     sides = np.maximum(high - low, 1e-3)
     axes.set_box_aspect(sides)
@@ -184,62 +195,3 @@ def _draw_side(axes: Any, scene: Scene, right: Array, up: Array, words: tuple[st
     axes.grid(alpha=0.3)
     axes.set(xlabel=f"{words[0]}, from B [m]", ylabel=f"{words[1]}, from B [m]")
     draw_scene(View(axes, flat, flat, PolyCollection, np.cross(up, right)), scene)
-
-
-# Tables -----------------------------------------------------------------------------------------
-
-
-def _draw_tiles(axes: Any, plan: Plan) -> None:
-    """Draw the utilisation of every tile and palm as a table of colours."""
-    hands = plan.hands or ()
-    clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
-    columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
-    names: list[str] = []
-    rows: list[list[float]] = []
-    for hand in hands:
-        for finger in hand.fingers:
-            used = {tile.phalanx: tile for tile in finger.tiles}
-            row = [
-                used[p].utilisation if p in used and used[p].contact != "none" else np.nan
-                for p in columns
-            ]
-            rows.append([*row, np.nan])
-            names.append(
-                f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
-                f"  {finger.tendon_tension:3.0f} N"
-            )
-        rows[-len(hand.fingers)][-1] = hand.palm.utilisation if hand.palm.engaged else np.nan
-    if not rows:
-        axes.text(0.5, 0.5, "no plan, no loads", ha="center", va="center")
-        axes.set_axis_off()
-        return
-    _draw_table(axes, np.array(rows), [*columns, "palm"], names)
-    done = 0
-    for hand in hands[:-1]:
-        done += len(hand.fingers)
-        axes.axhline(done - 0.5, color="black", linewidth=1.0)
-    axes.set_title("utilisation of each tile; tension of each tendon", fontsize=10, loc="right")
-
-
-def _draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:
-    """Draw the utilisation of every joint as a table of colours."""
-    used = [np.asarray(limb.utilisations) for limb in limbs]
-    values = np.full((len(limbs), max(map(len, used))), np.nan)
-    for row, joints in zip(values, used, strict=True):
-        row[: len(joints)] = joints
-    columns = [str(i + 1) for i in range(values.shape[1])]
-    _draw_table(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
-    axes.set_title("utilisation of each joint, from the body outward", fontsize=10, loc="right")
-
-
-def _draw_table(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
-    """Draw numbers on their colours; none where a number is NaN."""
-    shown = np.ma.masked_invalid(values)
-    axes.imshow(shown, cmap=COLOURS, norm=UTILISATION, aspect="auto", interpolation="none")
-    axes.set_xticks(range(values.shape[1]), list(columns), fontsize=6.5)
-    axes.set_yticks(range(values.shape[0]), list(rows), fontsize=7)
-    axes.tick_params(length=0)
-    for (i, j), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            colour = "white" if value > 1.0 else "black"
-            axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)

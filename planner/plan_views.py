@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -38,13 +39,40 @@ NEAR_TIPS: Final = 0.05
 NEAR_NAMES: Final = 0.25
 """How near to each other hands are whose names become one note there [m]."""
 
-STEP_ASIDE: Final = 0.4
+STEP_ASIDE: Final = 0.5
 """How far a note is moved at a time, over its height."""
 
-STEPS_ASIDE: Final = tuple(sorted(range(-10, 11), key=abs))
-"""Moves that are tried, in this order."""
+STEPS_ASIDE: Final = 10
+"""Of these, at most, to each side."""
+
+STEPS_UP: Final = 8
+"""Of these, at most, up and down."""
+
+COVERED: Final = 0.6
+"""What a covered dot of a line or an arrow weighs, in steps aside."""
+
+PADDING: Final = 1.0
+"""Around a note [printer's points]."""
+
+SPACING: Final = 4.0
+"""Of the dots of what is drawn, for what notes cover [printer's points]."""
 
 POINTS_PER_INCH: Final = 72.0
+
+MOVES: Final = np.array(
+    [
+        (float(i), float(j))
+        for i in range(-STEPS_ASIDE, STEPS_ASIDE + 1)
+        for j in range(-STEPS_UP, STEPS_UP + 1)
+    ]
+)
+"""Moves of a note that are tried, shape (n, 2), in steps."""
+
+FARNESS: Final = np.hypot(*MOVES.T)
+"""Of these moves, shape (n,), in steps."""
+
+FORBIDDEN: Final = 1e3
+"""What it weighs to leave the frame, in steps; twice that to lie on another note."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +90,8 @@ class View:
         Makes the collection of polygons that these axes show.
     look : ndarray, shape (3,), optional
         Direction in W of looking, where the axes know of no depth.
+    seen : list of ndarray, shape (n, 2)
+        Lines and arrows drawn so far, as they are seen.
     """
 
     axes: Any
@@ -69,9 +99,13 @@ class View:
     flat: Callable[[Array], Array]
     polygons: Callable[..., Any]
     look: Array | None = None
+    seen: list[Array] = field(default_factory=list)
 
     def line(self, points: Array, **style: Any) -> None:
         self.axes.plot(*self.place(points).T, clip_on=False, **style)
+        spots = self.flat(points)
+        # marks alone are joined by nothing
+        self.seen.extend(spots[:, None] if style.get("linestyle") == "none" else [spots])
 
     def fill(self, polygons: Array, **style: Any) -> None:
         if len(polygons):
@@ -89,6 +123,7 @@ class View:
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
         """Draw an arrow, and return where it is seen to begin and to end, shape (2,) each."""
         begin, tip = self.flat(np.array([start, start + step]))
+        self.seen.append(np.array([begin, tip]))
         style = {"arrowstyle": "-|>", "color": colour, "lw": 2.0, "shrinkA": 0.0, "shrinkB": 0.0}
         ends = tuple(tip), tuple(begin)
         self.axes.annotate("", *ends, arrowprops=style, annotation_clip=False, zorder=7)
@@ -118,32 +153,51 @@ class View:
 
     def note(self, text: str, spot: Array, shift: tuple[float, float], **style: Any) -> None:
         """Write next to a seen place (2,), shifted by so many printer's points."""
-        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.8}
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": PADDING}
         style = {"fontsize": 8, "ha": "center", "va": "center", "zorder": 8, "bbox": box, **style}
         where = (float(spot[0]), float(spot[1]))
         place = {"xytext": shift, "textcoords": "offset points", "annotation_clip": False}
         self.axes.annotate(text, where, **place, **style)
 
     def untangle(self) -> None:
-        """Move notes up or down that lie on others, once all is drawn."""
+        """Move notes off each other, and off what is drawn where they can, once all is drawn.
+
+        They stay near where they were, and from a side within the frame.
+        """
         self.axes.apply_aspect()
         figure = self.axes.figure
         renderer = figure.canvas.get_renderer()
-        placed: list[Any] = []
+        point = figure.dpi / POINTS_PER_INCH
+        dots = self._dots(SPACING * point)
+        frame = figure.bbox if self.look is None else self.axes.bbox
+        placed = np.zeros((0, 4))
         for note in self.axes.texts:
             if not note.get_text():
                 continue
             box = note.get_window_extent(renderer)
-            for step in STEPS_ASIDE:
-                shift = STEP_ASIDE * step * box.height
-                moved = box.translated(0.0, shift)
-                if not any(moved.overlaps(other) for other in placed):
-                    break
-            else:
-                shift, moved = 0.0, box
-            x, y = note.xyann
-            note.xyann = (x, y + shift * POINTS_PER_INCH / figure.dpi)
-            placed.append(moved)
+            shifts = STEP_ASIDE * box.height / (note.get_text().count("\n") + 1) * MOVES
+            moved = box.padded(PADDING * point).extents + np.tile(shifts, 2)
+            apart = (moved[:, None, :2] >= placed[:, 2:]) | (moved[:, None, 2:] <= placed[:, :2])
+            free = apart.any(axis=2).all(axis=1)
+            inside = (moved[:, :2] >= frame.min).all(axis=1) & (moved[:, 2:] <= frame.max).all(
+                axis=1
+            )
+            under = (dots[None] > moved[:, None, :2]) & (dots[None] < moved[:, None, 2:])
+            costs = FARNESS + COVERED * under.all(axis=2).sum(axis=1)
+            best = int(np.argmin(costs + FORBIDDEN * (2.0 * ~free + ~inside)))
+            note.xyann = tuple(np.add(note.xyann, shifts[best] / point))
+            placed = np.vstack([placed, moved[best]])
+
+    def _dots(self, spacing: float) -> Array:
+        """Return dots on all lines and arrows, so far apart, shape (n, 2) [pixel]."""
+        found = []
+        for line in self.seen:
+            pixels = self.axes.transData.transform(line)
+            found.append(pixels)
+            for begin, end in pairwise(pixels):
+                count = 1 + int(np.linalg.norm(end - begin) / spacing)
+                found.append(begin + np.outer(np.arange(1, count) / count, end - begin))
+        return np.concatenate(found) if found else np.zeros((0, 2))
 
 
 def draw_scene(view: View, scene: Scene) -> None:

@@ -19,7 +19,7 @@ from hand_models.frames import Array, Indices, Pose, finite_vector
 from planner.limb_batch import Efforts, LimbBatch
 from planner.robot_model import RobotModel
 
-__all__ = ["TOLERANCE", "damped_step", "find_angles"]
+__all__ = ["TOLERANCE", "damped_step", "find_angles", "starts_near"]
 
 EYE: Final = np.eye(6)
 
@@ -89,7 +89,7 @@ def find_angles(
         left = np.flatnonzero((least > TOLERANCE) & ((batch.beyond <= 0.0) | np.isinf(least)))
         if not len(left):
             break
-        starts = np.stack([_starts(batch, int(i), k) for i in left], axis=1)
+        starts = np.stack([starts_near(batch, int(i), k) for i in left], axis=1)
         angles, size = _follow(batch, left, starts, efforts)
         better = size < least[left]
         best[left[better]], least[left[better]] = angles[better], size[better]
@@ -162,7 +162,7 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     return np.asarray(np.minimum(np.maximum(moved, batch.lower), batch.upper))
 
 
-def _starts(batch: LimbBatch, i: int, k: int) -> Array:
+def starts_near(batch: LimbBatch, i: int, k: int) -> Array:
     """Return a limb's angles to start from in round k, shape (S, m), the most promising first."""
     limb, model = batch.limbs[i], batch.robot.model
     samples, tree = _postures(model)[limb]

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from planner.route import RouteResult
 
-__all__ = ["plot_route"]
+__all__ = ["draw_route", "plot_route"]
 
 CUT: Final = 2.0
 """Largest utilisation that a route's picture shows in full."""
+
+HEADROOM: Final = 1.2
+"""Height of the utilisations' panel, over the tallest bar or the limit: for the crux's name."""
+
+OVER: Final[dict[str, Any]] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+"""Where the legend is: above what is drawn."""
 
 PHASE_COLOURS: Final = {
     "start": "0.4",
@@ -24,6 +30,11 @@ PHASE_COLOURS: Final = {
 
 
 def plot_route(result: RouteResult, path: Path) -> None:
+    """Write the picture of a climb, as `draw_route` draws it."""
+    draw_route(result).savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
+
+
+def draw_route(result: RouteResult) -> Figure:
     """Draw utilisation and load factor along a climb, with its crux."""
     figure = Figure(figsize=(11.0, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
@@ -56,15 +67,15 @@ def plot_route(result: RouteResult, path: Path) -> None:
     )
     upper.set(
         ylabel="utilisation [1]; below the limit: margin",
-        ylim=(0.0, height * 1.12),
-        title=result.route.name,
+        ylim=(0.0, height * HEADROOM),
     )
-    upper.legend(loc="upper left", ncols=6, fontsize=8)
+    figure.suptitle(result.route.name)
+    upper.legend(**OVER, ncols=6, fontsize=8, frameon=False)
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color="tab:red")
     lower.set(ylabel="load factor [1]", xlabel="stance")
-    lower.set_ylim(bottom=0.0)
+    lower.set_ylim(0.0, 1.1 * float(np.nanmax(np.append(factor, 1.0))))
     labels = [
         "start" if s.move == 0 else f"{s.move} {s.phase}\n{str(s.limb).replace('_', ' ')}"
         for s in result.stages
@@ -72,4 +83,4 @@ def plot_route(result: RouteResult, path: Path) -> None:
     lower.set_xticks(index, labels, rotation=90, fontsize=8)
     for axes in (upper, lower):
         axes.grid(axis="y", alpha=0.3)
-    figure.savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
+    return figure

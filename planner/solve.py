@@ -11,11 +11,8 @@ from typing import Final
 import numpy as np
 
 from hand_models.errors import InvalidInputError
-from hand_models.fixed_wrist import wrench_space
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
-from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR, TENDON_TENSION
-from hand_models.wrench_space import WrenchSpace
 from planner import dual_bounds, program, stance_data
 from planner.binding import Used, limiting_limit, prices, unit_of, used_limits
 from planner.budget import Budget
@@ -33,7 +30,7 @@ from planner.explain import (
 from planner.floating import Settled
 from planner.floating_effort import least_effort, with_room
 from planner.floating_warnings import far_wrists, idle_preloads, strained_preloads
-from planner.hand_rows import AddedRows
+from planner.gathering import gather
 from planner.hand_sets import Hands
 from planner.plan import (
     Certificate,
@@ -51,8 +48,7 @@ from planner.posture import Posture, posture
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
 from planner.reading import read_floating_hand, read_hand
-from planner.settling import settle_at, wrist_at
-from planner.stance_data import JOINT_TORQUE, LOAD_UNIT, WRENCH_UNIT
+from planner.stance_data import JOINT_TORQUE
 from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
 from planner.verify import problems
 
@@ -96,89 +92,6 @@ def plan(question: Question) -> Plan:
     answer.solve()
     solved = time.perf_counter()
     return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
-
-
-def gather(
-    question: Question, where: Posture | None, wrench: Array
-) -> tuple[list[SettledHand], Hands]:
-    """Return the hands of a question on their holds, and what the programs need of them.
-
-    Parameters
-    ----------
-    question : Question
-    where : Posture or None
-    wrench : ndarray, shape (6,)
-        The body wrench that is needed, in B [N, N·m].
-    """
-    stance, cap = question.stance, question.limits.tendon_tension
-    settled = [settle_at(stance, i) for i in range(len(stance.hands))]
-    wrists = [wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)]
-    added = [_added_rows(question, where, i) for i in range(len(stance.hands))]
-    spaces = [
-        rows.on(wrench_space(hand, cap) if wrist is None else wrist.linearised())
-        for hand, wrist, rows in zip(settled, wrists, added, strict=True)
-    ]
-    body = stance.body.inverse()
-    held, aims = _held(question)
-    hands = Hands(
-        spaces=tuple(spaces),
-        wrists=tuple(wrists),
-        transports=tuple(wrench_transport(body @ hand.pose) for hand in stance.hands),
-        reaches=tuple(
-            _reach(space) if wrist is None else None
-            for space, wrist in zip(spaces, wrists, strict=True)
-        ),
-        wrench=np.concatenate([wrench / WRENCH_UNIT, aims]),
-        held=held,
-        added=tuple(added),
-    )
-    return settled, hands
-
-
-def _added_rows(question: Question, where: Posture | None, index: int) -> AddedRows:
-    """Return what joints, caps and present tensions add to the set of the hand of that index."""
-    hand, limits = question.stance.hands[index], question.limits
-    cap = limits.per_hand.get(hand.limb)
-    axes = {
-        "hand": np.eye(3),
-        "body": hand.pose.rotation.T @ question.stance.body.rotation,
-        "world": hand.pose.rotation.T,
-    }
-    change = limits.tension_change
-    return AddedRows(
-        joints=None if where is None else where.joints[hand.limb],
-        cap=None if cap is None else cap.largest_force,
-        frame=None if cap is None else axes[cap.frame],
-        present=question.present.get(hand.limb),
-        change=math.inf if change is None else change,
-    )
-
-
-def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
-    """Return what of each hand's wrench is given, (k, 6) each, and its scaled values (k,)."""
-    hands = question.stance.hands
-    given = [
-        (i, j, value)
-        for i, hand in enumerate(hands)
-        for j, value in enumerate(hand.wrench or ())
-        if value is not None
-    ]
-    held = [np.zeros((len(given), 6)) for _ in hands]
-    for row, (i, j, _) in enumerate(given):
-        held[i][row, j] = 1.0
-    return tuple(held), np.array([value / WRENCH_UNIT[j] for _, j, value in given])
-
-
-def _reach(space: WrenchSpace) -> Array:
-    """Return what each column's load is measured by in the tie-break [N].
-
-    Its own capacity where it has one (tendons, the palm); `LOAD_UNIT` for lateral reactions.
-    """
-    reach = np.full(len(space.columns), LOAD_UNIT)
-    for coefficients, row, capacity in zip(space.L, space.rows, space.s, strict=False):
-        if row.limit in (TENDON_TENSION, PALM_SHEAR, PALM_PRESSING):
-            reach[np.flatnonzero(coefficients)[0]] = capacity
-    return reach
 
 
 class _Answer:
@@ -331,7 +244,8 @@ class _Answer:
 
     def _hindered(self, cap: float | None) -> Hindered:
         """Return what a proof is made of: at any utilisation, or within a cap."""
-        return Hindered(self.data, self._limbs, self.spaces, self.parts.held, cap)
+        limits = self.question.limits
+        return Hindered(self.data, self._limbs, self.spaces, self.parts.held, cap, limits)
 
     def _overload(self, idle: Sequence[Used]) -> Certificate | None:
         """Return the proof that no plan keeps to the cap on the utilisation; None without one.
@@ -339,14 +253,21 @@ class _Answer:
         Of floating hands with their sets linearised at the plan.
         """
         cap = self.question.limits.utilisation
+        unproven = self.search is not None and self.search.found == "unproven"
         most = max(idle, key=lambda used: used.utilisation, default=None)
         if most is not None and most.utilisation > cap + SLACK:
-            return certify_idle(most, cap)
-        if self.search is not None and self.search.found == "unproven":
+            alone: bool | None = sum(used.utilisation > cap + SLACK for used in idle) == 1
+            if self.utilisation > cap + SLACK:
+                alone = None if unproven else False
+            return certify_idle(most, cap, alone)
+        if unproven:
             return None
         return certify(self._hindered(cap))
 
     def _find_load_factor(self) -> None:
+        if any(used.utilisation > 1.0 + SLACK for used in self._idle_joints()):
+            # a limb without a hand cannot bear itself, whatever the body needs
+            return
         if not np.abs(self.data.wrench[:6]).max() > NO_WRENCH:
             # nothing is asked of the hands: any multiple of it can be held, or none
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
@@ -394,14 +315,12 @@ class _Answer:
                 self._find_path(idle)
                 if status == "overloaded":
                     self.certificate = self._overload(idle)
-                    reason += overload_sentence(self.certificate, floats=self.parts.floating)
+                    reason += overload_sentence(self.certificate, floating=self._floating)
         elif self.certificate is not None:
             status = "infeasible"
             verified = True
             touching = any(h.holding.any() or h.palm.engaged for h in self.settled)
-            reason = shortfall_sentence(self.certificate, touching)
-            if self.parts.floating:
-                reason += "; floating hands as they give way where the search for a plan ended"
+            reason = shortfall_sentence(self.certificate, touching, floating=self._floating)
         elif self.search is not None:
             reason = "no pose of the floating wrists was found that balances the body"
             if self.idle_preloads:
@@ -445,7 +364,7 @@ class _Answer:
             self.loads,
             self.question.present,
             self.question.limits.utilisation,
-            max((used.utilisation for used in idle), default=0.0),
+            idle,
         )
         self.path_unknown = self.path is None
 
@@ -503,6 +422,11 @@ class _Answer:
     @property
     def _limbs(self) -> list[str]:
         return [hand.limb for hand in self.question.stance.hands]
+
+    @property
+    def _floating(self) -> list[str]:
+        pairs = zip(self._limbs, self.parts.wrists, strict=True)
+        return [limb for limb, wrist in pairs if wrist is not None]
 
     def _idle_joints(self) -> list[Used]:
         """Return how much of their joints' torque limbs without a hand use."""

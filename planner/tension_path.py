@@ -6,7 +6,9 @@ A point of the way is safe if some such loads keep to all hard rows, and to the 
 on the utilisation. Safe points are convex: where the plan is safe they are an interval that ends
 there, and its length is one linear program,
 
-    max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`).
+    max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`),
+
+whose multipliers tell what ends it.
 
 Hands with floating wrists stay as planned: their sets hold about that only.
 """
@@ -23,8 +25,11 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_space import WrenchSpace
 from planner import program, stance_data
-from planner.plan import TensionPath
-from planner.program import SLACK
+from planner.barriers import ranked
+from planner.binding import Used, limit_name, used_limits
+from planner.explain import barriers_sentence
+from planner.plan import LimitName, TensionPath
+from planner.program import SLACK, Outcome
 from planner.stance_data import LOAD_UNIT, StanceData
 
 __all__ = ["UNKNOWN", "tension_path", "unsafe_sentence"]
@@ -34,6 +39,9 @@ TENSIONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
 
 UNKNOWN: Final = "whether the straight way from the present tensions is safe was not found out"
 """Of a way about which the solver gave no answer that passes the check."""
+
+ENDS: Final = 1e-3
+"""Multipliers below this part of the largest do not count as an end of the way."""
 
 GIVE: Final = 1e-3
 """How much hard rows give on the way, and how small a change of tension is none [N]: no present
@@ -47,7 +55,7 @@ def tension_path(
     loads: Sequence[Array],
     present: Mapping[str, Array],
     cap: float,
-    idle: float = 0.0,
+    idle: Sequence[Used] = (),
 ) -> TensionPath | None:
     """Return how safe the way to a plan is.
 
@@ -65,7 +73,7 @@ def tension_path(
         Tensions now, by limb [N]; of hands with fixed wrists.
     cap : float
         On the utilisation.
-    idle : float, optional
+    idle : sequence of Used, optional
         What limbs without a hand use of their joints.
 
     Returns
@@ -85,15 +93,22 @@ def tension_path(
         if limbs[i] in present
     }
     start, way = _pinned(data, spaces, z, fixed, changes)
-    still = max([idle, *(used[i] for i in range(len(z)) if i not in fixed)])
+    still = max(
+        [
+            0.0,
+            *(each.utilisation for each in idle),
+            *(used[i] for i in range(len(z)) if i not in fixed),
+        ]
+    )
     size = float(np.abs(way).max(initial=0.0))
     change = LOAD_UNIT * size
     here = max(still, *used)
     at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
     if here > cap + SLACK:
-        return TensionPath(False, 0.0, at_present, change)
+        uses = [*used_limits(limbs, spaces, loads), *idle]
+        return TensionPath(False, 0.0, at_present, change, _most_used(uses))
     if change <= GIVE:
-        return TensionPath(True, 1.0, at_present, change)
+        return TensionPath(True, 1.0, at_present, change, ())
     # rounding must not leave the plan itself outside
     most = max(cap, *used)
     reached = program.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
@@ -103,18 +118,40 @@ def tension_path(
     if not _holds(start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK):
         return None
     part = min(max(part, 0.0), 1.0)
-    return TensionPath(part >= 1.0 - SLACK, part, at_present, change)
+    if part >= 1.0 - SLACK:
+        return TensionPath(True, part, at_present, change, ())
+    ends = _ends([limbs[i] for i in fixed], [spaces[i] for i in fixed], reached.outcome)
+    return TensionPath(False, part, at_present, change, ends)
 
 
 def unsafe_sentence(path: TensionPath) -> str:
-    """Say how much of a way that is not safe is."""
-    if path.safe_part <= 0.0:
-        return "the straight way from the present tensions is not safe: no part of it is"
+    """Say how much of a way that is not safe is, in full per cent, and what ends that part."""
     part = math.floor(100.0 * path.safe_part)
-    return (
-        "the present tensions do not balance the body within its limits: the last "
-        f"{part} % of the straight way from there are safe"
-    )
+    much = f"only the last {part} %" if part > 0 else "no part"
+    sentence = f"{much} of the straight way from the present tensions is safe"
+    return f"{sentence}: {barriers_sentence(path.limiting)}" if path.limiting else sentence
+
+
+def _most_used(used: Sequence[Used]) -> tuple[LimitName, ...]:
+    """Return the limit of which a plan uses most, and those that tie with it."""
+    most = max(each.utilisation for each in used)
+    close = most - 2.0 * SLACK * max(1.0, most)
+    return tuple(dict.fromkeys(each.name for each in used if each.utilisation >= close))
+
+
+def _ends(
+    limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome
+) -> tuple[LimitName, ...]:
+    """Return the limits and hard rows that end the safe part, those that weigh most first."""
+    weights: dict[LimitName, float] = {}
+    for limb, space, limit, hard in zip(
+        limbs, spaces, outcome.limit_duals, outcome.hard_duals, strict=True
+    ):
+        for row, weight in zip(space.rows, (*limit, *hard), strict=True):
+            name = limit_name(limb, row)
+            weights[name] = weights.get(name, 0.0) + float(weight)
+    least = ENDS * max(weights.values(), default=0.0)
+    return tuple(name for name in ranked(weights) if weights[name] > least)
 
 
 def _columns(space: WrenchSpace) -> list[int]:

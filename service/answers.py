@@ -225,6 +225,9 @@ def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
         irreducible=None
         if proof.irreducible is None
         else [_limit(name) for name in proof.irreducible],
+        sufficient=None
+        if proof.sufficient is None
+        else [_limit(name) for name in proof.sufficient],
         wrench_spaces={limb: _wrench_set(space) for limb, space in proof.spaces.items()}
         if model and answer.hands is None
         else UNSET,
@@ -237,6 +240,7 @@ def _path(path: TensionPath) -> replies.TensionPath:
         safe_part=float(path.safe_part),
         utilisation_at_present=_number(path.utilisation_at_present),
         largest_change=float(path.largest_change),
+        limiting=[_limit(name) for name in path.limiting],
     )
 
 

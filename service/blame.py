@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 from msgspec import inspect
@@ -27,6 +27,11 @@ WORDS: Final = {
     "null": "null",
     "None": "null",
 }
+OUT_OF_RANGE: Final = re.compile(r"^Expected `(?:float|int)[^`]*` [<>]")
+SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
+UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
+"""Where a description says its units: one, or two of a wrench, forces first."""
+
 Decoder = Callable[[Any], object]
 
 LONGEST: Final = 400
@@ -54,7 +59,8 @@ def blame(
     found = WHERE.search(text)
     path = found.group(1) if found else ""
     complaint = text[: found.start()] if found else text
-    types = list(_types_at(inspect.type_info(kind), path))
+    places = list(_places_at(inspect.type_info(kind), path))
+    types = [place.kind for place in places]
     field = _with_keys(path, document, decode).removeprefix(".")
 
     name = re.search(r"`(.*)`$", complaint, re.DOTALL)
@@ -70,6 +76,8 @@ def blame(
     else:
         message = re.sub(r"`([^`]*)`", _plain, complaint)
         message = message[:1].lower() + message[1:]
+        if OUT_OF_RANGE.search(complaint):
+            message += _in_units(places)
     return _clip(field) or None, _clip(message)
 
 
@@ -150,36 +158,61 @@ def _plain(match: re.Match[str]) -> str:
     return " or ".join(WORDS.get(word, word) for word in match[1].split(" | "))
 
 
-def _bare(kind: inspect.Type) -> Iterator[inspect.Type]:
+class _Place(NamedTuple):
+    """What may stand at a place: a type without its metadata, and the units of its numbers."""
+
+    kind: inspect.Type
+    units: tuple[str, ...]
+
+
+def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[_Place]:
     """Yield a type without its metadata, and each member of a union."""
     if isinstance(kind, inspect.Metadata):
-        yield from _bare(kind.type)
+        found = UNITS.findall((kind.extra_json_schema or {}).get("description", ""))
+        yield from _bare(kind.type, tuple(found[-1].split(", ")) if found else units)
     elif isinstance(kind, inspect.UnionType):
         for member in kind.types:
-            yield from _bare(member)
+            yield from _bare(member, units)
     else:
-        yield kind
+        yield _Place(kind, units)
 
 
-def _types_at(kind: inspect.Type, path: str) -> Iterable[inspect.Type]:
-    """Return the types that the end of a path may have."""
-    types = list(_bare(kind))
+def _places_at(kind: inspect.Type, path: str) -> Iterable[_Place]:
+    """Return what may stand at the end of a path."""
+    places = list(_bare(kind))
     for name, index in STEP.findall(path):
-        found: list[inspect.Type] = []
-        for parent in types:
+        found: list[_Place] = []
+        for place in places:
+            parent = place.kind
             if isinstance(parent, inspect.StructType) and name:
                 fields = [f.type for f in parent.fields if f.encode_name == name]
                 if not fields and parent.tag_field == name:
                     fields = [inspect.LiteralType((parent.tag,))]
-                found += fields
+                found += [bare for field in fields for bare in _bare(field)]
             elif isinstance(parent, inspect.ListType):
-                found.append(parent.item_type)
+                found += _bare(parent.item_type, place.units)
             elif isinstance(parent, inspect.DictType) and f"[{index}]" == ANY_KEY:
-                found.append(parent.value_type)
+                found += _bare(parent.value_type, place.units)
             elif isinstance(parent, inspect.TupleType) and index.isdigit():
-                found += parent.item_types[int(index) : int(index) + 1]
-        types = [bare for one in found for bare in _bare(one)]
-    return types
+                entry, items = int(index), parent.item_types
+                for item in items[entry : entry + 1]:
+                    found += _bare(item, _units_of(place.units, entry, len(items)))
+        places = found
+    return places
+
+
+def _units_of(units: tuple[str, ...], entry: int, length: int) -> tuple[str, ...]:
+    """Return the units of one entry of a whole that has one unit, or two of equal halves."""
+    which = entry * len(units) // length
+    return units[which : which + 1]
+
+
+def _in_units(places: Iterable[_Place]) -> str:
+    """Say what unit a number at these places has, if they agree on one."""
+    numbers = (inspect.FloatType, inspect.IntType)
+    units = {place.units for place in places if isinstance(place.kind, numbers)}
+    (first, *others) = units or {()}
+    return f", in {first[0]}" if len(first) == 1 and not others else ""
 
 
 def _field_names(types: Iterable[inspect.Type]) -> list[str]:

@@ -27,6 +27,10 @@ __all__ = [
 
 MODES: Final = ("peer", "client", "router")
 
+STANDARD_OUTPUT: Final = 1
+STANDARD_ERROR: Final = 2
+"""File descriptors."""
+
 
 def zenoh_config(
     *,
@@ -105,8 +109,8 @@ def start_zenoh_log() -> None:
     of standard error, and only Python goes on writing to the real one.
     """
     sys.stdout.flush()
-    results = os.dup(sys.stdout.fileno())
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    results = os.dup(STANDARD_OUTPUT)
+    os.dup2(STANDARD_ERROR, STANDARD_OUTPUT)
     sys.stdout = os.fdopen(results, "w", encoding=sys.stdout.encoding)
     zenoh.init_log_from_env_or("error")
 

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from hand_models.errors import CruxError, InvalidInputError
 
-__all__ = ["REQUEST_KINDS", "MalformedError", "NoServiceError", "ServiceError", "ServiceTimeout"]
+__all__ = [
+    "REQUEST_KINDS",
+    "UNREACHABLE",
+    "MalformedError",
+    "NoServiceError",
+    "ServiceError",
+    "ServiceTimeout",
+]
 
-REQUEST_KINDS = frozenset({"malformed", "invalid", "unsupported", "unreachable"})
+UNREACHABLE: Final = "unreachable"
+"""Kind of error where limbs do not reach their holds."""
+
+REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", UNREACHABLE})
 """Kinds of error that are the request's fault, so that asking again is of no use."""
 
 

@@ -224,10 +224,13 @@ class Certificate(Struct, kw_only=True):
     do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for hands that are given a
     wrench); what is asked for has ``needed``, which is more. ``nearest`` can be supplied,
     ``shortfall`` is what is missing; both are null where hands have no loads, whatever the body
-    needs. ``irreducible``: limits, hard rows and given wrenches (``held_wrench``) that leave no
-    balance, but would without any one of them; empty where loads of any sign do not balance, null
-    where rounding leaves it undecided. ``wrench_spaces``, by limb, come with ``"want": ["model"]``
-    where there is no plan.
+    needs. ``irreducible``: limits, hard rows and given wrenches (``held_wrench``) that by
+    themselves leave no balance, each of them needed for that; others may be in the way, too. Empty
+    where loads of any sign do not balance, null where rounding leaves it undecided. ``sufficient``:
+    those of them of which any one, taken away alone, would let the stance be held; empty if no
+    single one would, null where that is not known. In all of these the caller's own limits come
+    first, then other limits, then hard rows. ``wrench_spaces``, by limb, come with
+    ``"want": ["model"]`` where there is no plan.
     """
 
     utilisation: float | None = None
@@ -239,6 +242,7 @@ class Certificate(Struct, kw_only=True):
     nearest: Vector | None
     blocking: list[LimitName]
     irreducible: list[LimitName] | None = None
+    sufficient: list[LimitName] | None = None
     wrench_spaces: dict[str, WrenchSet] | UnsetType = UNSET
 
 
@@ -263,13 +267,16 @@ class TensionPath(Struct, kw_only=True):
 
     ``safe_part``: how much of it balances the body within the cap on the utilisation, from the plan
     backward. ``utilisation_at_present``: the least at the present tensions, null if these balance
-    the body at no utilisation. ``largest_change``: of a tension [N].
+    the body at no utilisation. ``largest_change``: of a tension [N]. ``limiting``: the limits and
+    hard rows that end the safe part, the weightiest first; of a plan beyond the cap those of which
+    it uses most.
     """
 
     safe: bool
     safe_part: float
     utilisation_at_present: float | None
     largest_change: float
+    limiting: list[LimitName] = []
 
 
 class PlanReply(Reply, kw_only=True):

@@ -35,6 +35,9 @@ CHANNEL: Final = 2
 RECEIVERS: Final = 32
 """Zenoh's receiving threads; with its own default of two, two floods delay others by seconds."""
 
+SEARCH: Final = 1.0
+"""How long another service of the same robot is looked for at most [s]."""
+
 PATIENCE: Final = 0.5
 """How long a stop waits for a question that is being answered [s]."""
 
@@ -73,6 +76,11 @@ class PlanService:
         self._threads: list[threading.Thread] = []
         self._queryables: list[zenoh.Queryable[Handler[zenoh.Query]]] = []
         self._token: zenoh.LivelinessToken | None = None
+
+    def has_rival(self) -> bool:
+        """Say whether another service answers for the robot; to be asked before entering."""
+        replies = self._session.liveliness().get(self._alive, timeout=SEARCH)
+        return any(reply.ok is not None for reply in replies)
 
     def __enter__(self) -> Self:
         for key in self.keys:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
@@ -11,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from planner.explain import barrier_words
+from planner.plan import LimitName as PlannedLimit
 from service.replies import (
     AXES,
     AxisCapability,
@@ -168,22 +169,50 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
             table.add_row(name, *(_fixed(value, 1) for value in wrench))
         _show(f"body wrenches {where}, in B [N, N·m]", table, out)
     if proof.irreducible:
-        title = "what leaves no balance; without any one of them there would be one"
+        title = "these leave no balance, each needed for that; others may be in the way, too"
         _show(title, _barrier_table(proof.irreducible), out)
+        words = {name.limit: barrier_words(_planned(name)) for name in proof.irreducible}
+        for limit, said in words.items():
+            out.print(f"{limit}: {said}", markup=False)
+        if proof.sufficient is not None:
+            out.print()
+            out.print(_sufficient_sentence(proof.sufficient), markup=False)
 
 
-def _barrier_table(names: Iterable[LimitName]) -> Table:
-    """Return limits by hand and kind."""
+def _sufficient_sentence(names: Sequence[LimitName]) -> str:
+    """Say which limits, taken away alone, would do."""
+    if not names:
+        return "no single one of them, taken away alone, would do"
+    which = "this one" if len(names) == 1 else "any one of these"
+    told = ", ".join(
+        f"{limb} {limit}" + (f" ({', '.join(owners)})" if owners else "")
+        for (limb, limit), owners in _alike(names).items()
+    )
+    return f"{which}, taken away alone, would let it be held: {told}"
+
+
+def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
+    """Return limits by limb and kind, in their order, with what of the limb each is of."""
     alike: dict[tuple[str, str], list[str]] = {}
     for name in names:
         parts = (name.phalanx, name.finger, name.joint)
         whose = " of ".join(part for part in parts if part is not None)
-        alike.setdefault((name.limb, name.limit), []).append(whose)
+        owners = alike.setdefault((name.limb, name.limit), [])
+        owners += [whose] if whose else []
+    return alike
+
+
+def _barrier_table(names: Iterable[LimitName]) -> Table:
+    """Return limits by hand and kind, in their order."""
     table = table_of("hand", "limit")
     table.add_column("of")
-    for (limb, limit), owners in sorted(alike.items(), key=lambda pair: pair[0][0]):
-        table.add_row(limb, limit, ", ".join(owner for owner in owners if owner) or "-")
+    for (limb, limit), owners in _alike(names).items():
+        table.add_row(limb, limit, ", ".join(owners) or "-")
     return table
+
+
+def _planned(name: LimitName) -> PlannedLimit:
+    return PlannedLimit(name.limb, name.finger, name.phalanx, name.limit, name.joint)
 
 
 def _closing_table(reply: WrenchSpaceReply) -> Table:
@@ -205,13 +234,8 @@ def _path_sentence(path: TensionPath) -> str:
     """Say what the way from the present tensions is like."""
     used = path.utilisation_at_present
     there = "no balance" if used is None else f"utilisation {used:.3f}"
-    way = "safe" if path.safe else f"safe for its last {_percent(path.safe_part)}"
+    way = "safe" if path.safe else "not safe"
     return f"from the present tensions ({there}): changes up to {path.largest_change:.1f} N, {way}"
-
-
-def _percent(part: float) -> str:
-    """Return a part in full per cent, not more than it is."""
-    return f"{math.floor(100.0 * part)} %"
 
 
 def _load_factor(reply: PlanReply) -> str:

@@ -6,7 +6,7 @@ import pytest
 from hand_models.gripper import gripper_table
 from hand_models.parameters import experiment_table, hand_table
 from hand_models.studies import calibrate
-from hand_models.studies.calibrate import Fit, pulled_pose
+from hand_models.studies.calibrate import HELD, Fit, pulled_pose
 from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
 from hand_models.wrist_search import search
 
@@ -65,7 +65,9 @@ def test_the_unloaded_normals_follow_from_joint_balance_by_hand():
     assert loads.normals[0, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_short_run_tells_residuals_numbers_and_what_is_excluded(monkeypatch, tmp_path):
+@pytest.mark.parametrize("excluded", [2, pytest.param(len(HELD), marks=pytest.mark.slow)])
+def test_a_short_run_tells_residuals_numbers_and_what_is_excluded(monkeypatch, tmp_path, excluded):
+    monkeypatch.setattr(calibrate, "HELD", HELD[:excluded])
     monkeypatch.setattr(calibrate, "FITS", 1)
     monkeypatch.setattr(calibrate, "REFITS", 1)
     monkeypatch.setattr(calibrate, "RAYS", 200)
@@ -80,6 +82,7 @@ def test_a_short_run_tells_residuals_numbers_and_what_is_excluded(monkeypatch, t
         assert 0.0 < number["left_unknown"] <= 1.0 + 1e-9
         assert number["fixed_by_data"] == (number["left_unknown"] <= calibrate.FIXED)
     # numbers held at the hand's own cannot do better than all of them free
+    assert len(result.data["held"]) == excluded
     for held in result.data["held"]:
         assert held["worst"] > 0.0
     assert [path.name for path in calibrate.plot(result, tmp_path)] == ["calibrate.png"]

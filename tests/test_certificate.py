@@ -14,7 +14,10 @@ from hand_models.holds import Plane
 from planner.solve import plan
 from planner.stance_data import WRENCH_UNIT
 
-SEEDS = range(200)
+SEEDS = (
+    3, 5, 12, 58, 64, 77, 86, 98, 110, 142, 143, 147, 148, 150, 160, 166, 175, 187, 191, 199,
+)  # fmt: skip
+"""Every seed below 200 whose question has no answer."""
 
 
 def nothing_within_reach():
@@ -37,8 +40,8 @@ def infeasible():
     return [(q, a.certificate) for q, a in answers if a.status == "infeasible"]
 
 
-def test_there_are_enough_infeasible_stances_to_tell():
-    assert len(infeasible()) > 20
+def test_these_stances_are_infeasible():
+    assert len(infeasible()) == 5 + len(SEEDS)
 
 
 def test_no_loads_reach_the_needed_wrench_in_the_certificates_direction():

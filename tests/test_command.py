@@ -327,7 +327,7 @@ def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFix
 # serve and query ----------------------------------------------------------------------------------
 
 
-def test_query_and_serve(stance) -> None:
+def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
     server = Served(free_endpoint())
     flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
     try:
@@ -341,9 +341,8 @@ def test_query_and_serve(stance) -> None:
         assert (asked.returncode, asked.stderr) == (OVERLOADED, b"")
         assert asked.stdout.startswith(b"OVERLOADED")
         twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
-        asked = process("query", stance(twice), *flags, "--json")
-        assert (asked.returncode, asked.stdout) == (BAD_INPUT, b"")
-        assert asked.stderr.startswith(b"crux: stance.hands[1].limb: limb 'front_right' appears")
+        assert run(["query", stance(twice), *flags, "--json"]) == BAD_INPUT
+        assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
         taken = process("serve", "-l", server.endpoint, "--no-multicast-scouting", "--json")
         assert (taken.returncode, taken.stdout) == (FAILED, b"")
         assert taken.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
@@ -409,6 +408,27 @@ def test_schema(capfd: pytest.CaptureFixture[str]) -> None:
 def test_wrong_usage_is_one_line(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> None:
     assert run(arguments) == BAD_INPUT
     complaint(capfd)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told", "asked"),
+    [
+        (["fly"], "No such command 'fly'", "crux"),
+        (["plan"], "Missing argument 'STANCE'", "crux plan"),
+        (["body-space", "wall", "--axes", "fx,up"], "got fx,up", "crux body-space"),
+        (["body-space", "wall", "--pure", "--projection"], "not both", "crux body-space"),
+        (["body-space", "wall", "--projection", "--pure"], "not both", "crux body-space"),
+        (["wrench-space", "wall"], "Missing option '--hand'", "crux wrench-space"),
+        (["query", "wall", "--timeout", "soon"], "'soon' is not a valid float", "crux query"),
+    ],
+)
+def test_wrong_usage_leads_to_the_commands_own_help(
+    arguments: list[str], told: str, asked: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == BAD_INPUT
+    line = complaint(capfd)
+    assert told in line
+    assert line.endswith(f"; see {asked} --help\n")
 
 
 def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:

@@ -13,12 +13,13 @@ from scipy.optimize import minimize
 from stances import ask, on_wall, random_question
 
 from planner import dual_bounds, program, stance_data
+from planner.gathering import gather
 from planner.plan import Price
 from planner.posture import posture
 from planner.question import ForceCap, Limits, Question
 from planner.robosimian import RobotFile, robot_of
 from planner.settling import hand_space
-from planner.solve import gather, plan
+from planner.solve import plan
 from planner.stance_data import HandData, StanceData
 
 TENDON = 700.0

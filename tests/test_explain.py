@@ -10,7 +10,8 @@ from hands import changed_hand
 from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models.frames import Pose
-from hand_models.holds import Plane
+from hand_models.holds import Cylinder, Plane
+from planner.explain import overload_sentence, shortfall_sentence
 from planner.question import Limits, Question
 from planner.settling import settle
 from planner.solve import plan
@@ -88,6 +89,24 @@ def test_an_overloaded_stance_says_what_would_be_missing_within_its_limits():
     assert missing.endswith(" (in B) would be missing")
 
 
+@pytest.mark.parametrize("grasp", [{"palm": False}, {"closing_tension": 400.0}])
+def test_that_floating_hands_give_way_is_said_where_one_of_them_is_to_blame(grasp):
+    proof = plan(ask(on_wall(Cylinder(0.7), **grasp))).certificate
+    limbs = {name.limb for name in proof.irreducible}
+    others = {hand.limb for hand in on_wall().hands} - limbs
+
+    def said(floating) -> str:
+        if proof.utilisation is None:
+            return shortfall_sentence(proof, True, floating=floating)
+        return overload_sentence(proof, floating=floating)
+
+    assert others
+    assert said(others) == said(())
+    for limb in limbs:
+        assert said({limb}).startswith(said(()))
+        assert "floating hands as they give way" in said({limb})
+
+
 def test_a_stance_in_the_air_says_so():
     away = Pose(np.array([0.0, 0.0, 0.5]), np.eye(3))
     stance = on_wall()
@@ -108,6 +127,7 @@ def test_a_hand_out_of_reach_is_warned_of_and_one_within_is_not():
     answer = plan(ask(replace(stance, hands=(far, *stance.hands[1:]))))
     assert len(answer.warnings) == 1
     assert answer.warnings[0].startswith(f"{hand.limb}: out of reach")
+    assert answer.warnings[0].endswith("; positions in metres, quaternions as [x, y, z, w]?")
 
 
 def test_no_tile_of_a_bundled_hand_is_inside_its_rock():

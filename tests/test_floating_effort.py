@@ -13,11 +13,12 @@ from stances import on_wall
 from test_floating_plan import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 
 from hand_models.frames import wrench_transport
+from planner.gathering import gather
 from planner.plan import HandPlan, Plan
 from planner.posture import posture
 from planner.program import SLACK
 from planner.question import ForceCap, Limits, Question
-from planner.solve import gather, plan
+from planner.solve import plan
 from planner.stance_data import TWIST_UNIT, WRENCH_UNIT
 
 chance = np.random.default_rng(1)

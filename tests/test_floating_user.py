@@ -22,6 +22,7 @@ from planner.question import Question
 from planner.settling import settle
 from planner.solve import plan
 from service import command
+from service import terminal as screens
 from service.questions import question
 from service.requests import PlanRequest
 from service.stances import read_request
@@ -166,11 +167,11 @@ def test_far_wrist_is_told(twist, told):
 @pytest.mark.parametrize("terminal", [True, False])
 def test_wait_is_shown_on_terminals_alone(monkeypatch, capsys, terminal):
     monkeypatch.setattr(
-        command,
+        screens,
         "console",
         lambda stderr=False: Console(file=sys.stderr, force_terminal=terminal, width=80),
     )
-    with command._waiting("planning this", request()):
+    with screens.waiting("planning this", request()):
         pass
     captured = capsys.readouterr()
     assert ("planning this" in captured.err) == terminal

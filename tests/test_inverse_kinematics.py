@@ -257,11 +257,33 @@ def test_what_is_missing_beyond_the_stretched_limb(limb, distance):
     found = solve_limbs(robot, {limb: pose})
     solution = found[limb]
     assert not solution.solved
-    assert solution.missing == pytest.approx(distance, abs=1e-9)
+    # nothing can be nearer, and beyond twice the reach nothing else is asked
+    assert solution.missing >= distance - 1e-9
+    if distance > robot.reach:
+        assert solution.missing == pytest.approx(distance, abs=1e-9)
     assert solution.position_error >= distance - 1e-9
     error = unreachable(found)
     assert error.missing == {limb: solution.missing}
-    assert str(error) == f"{limb} is out of reach by {distance:.2g} m"
+    assert limb in str(error)
+
+
+def test_a_hold_that_moves_away_is_missed_by_more_and_more():
+    """The hand keeps its axes; each step of 0.1 m away costs between nothing and 0.1 m more."""
+    robot = robosimian()
+    start = robot.model.hand_poses({"front_right": np.array([0.3, 1.0, 0.2, -1.2, 0.4, 0.6, 0.1])})
+    pose = start["front_right"]
+    away = pose.position - robot.shoulders["front_right"]
+    away /= np.linalg.norm(away)
+    missing = []
+    for steps in range(8):
+        moved = Pose(pose.position + 0.1 * steps * away, pose.rotation)
+        found = solve_limbs(robot, {"front_right": moved})["front_right"]
+        assert (found.missing == 0.0) == found.solved
+        missing.append(found.missing)
+    assert missing[0] == 0.0
+    assert missing[-1] > 0.1
+    assert (np.diff(missing) >= -2e-3).all()
+    assert (np.diff(missing) <= 0.1 + 2e-3).all()
 
 
 def test_every_limb_that_is_out_of_reach_is_named():

@@ -6,13 +6,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from barred import barred, explained, have_loads
+from barred import barred, explained, few_and_all, have_loads
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from planner.barriers import HELD_WRENCH, System
-from planner.irreducible import irreducible_set
+from planner.irreducible import irreducible_set, sufficient_alone
 from planner.plan import LimitName
 from planner.program import UNLIMITED
 
@@ -81,6 +81,35 @@ def test_what_is_weightier_comes_first():
     assert irreducible_set(parts, parts.barriers) == named("weighty", "slight")
 
 
+def test_without_one_of_two_that_nothing_else_repeats_there_are_loads():
+    """z1 + z2 = 3 with z1 ≤ 1, z2 ≤ 1 and −9 ≤ z1: either upper bound alone is in the way."""
+    parts = system([[1, 0], [0, 1], [-1, 0]], [1, 1, 9], ("a", "b", "far"), goal=3.0)
+    assert set(sufficient_alone(parts, named("a", "b"))) == set(named("a", "b"))
+
+
+def test_one_that_another_repeats_does_not_do():
+    """z1 ≤ 1 is there twice, as a and as again: only leaving out b leaves loads."""
+    parts = system([[1, 0], [0, 1], [1, 0]], [1, 1, 1.5], ("a", "b", "again"), goal=3.0)
+    assert sufficient_alone(parts, named("a", "b")) == named("b")
+
+
+def test_where_two_sets_have_nothing_in_common_no_single_one_does():
+    """z1 = 0 and z2 = 0 are each asked for beyond a bound: z1 ≤ −1, −z1 ≤ −1, the same of z2."""
+    rows = [[1, 0], [-1, 0], [0, 1], [0, -1]]
+    parts = system(rows, [-1, -1, -1, -1], ("a", "b", "c", "d"))
+    assert sufficient_alone(parts, irreducible_set(parts, parts.barriers)) == ()
+
+
+def test_of_no_set_and_of_a_large_one_nothing_is_said():
+    """Eighteen loads up to 1 do not add up to 19."""
+    names = tuple(f"row {i}" for i in range(18))
+    parts = system(np.eye(18), np.ones(18), names, goal=19.0)
+    found = irreducible_set(parts, parts.barriers)
+    assert set(found) == set(parts.barriers)
+    assert sufficient_alone(parts, found) is None
+    assert sufficient_alone(parts, None) is None
+
+
 def has_loads(parts: System, names) -> bool:
     kept = np.array([name in names for name in parts.names], dtype=bool)
     tied = np.array([True] * 6 + [name in names for name in parts.given])
@@ -125,11 +154,20 @@ def test_every_smaller_set_of_small_systems_has_loads(data):
     assert not has_loads(parts, found)
     for fewer in range(len(found)):
         assert all(has_loads(parts, subset) for subset in combinations(found, fewer))
+    alone = {
+        name
+        for name in parts.barriers
+        if has_loads(parts, [other for other in parts.barriers if other != name])
+    }
+    assert set(sufficient_alone(parts, found)) == alone
 
 
 @pytest.mark.parametrize("status", ["infeasible", "overloaded"])
-def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_of_it(status):
-    for label, question, answer in explained(status):
+@few_and_all
+def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_of_it(
+    status, seeds
+):
+    for label, question, answer in explained(status, seeds):
         proof = answer.certificate
         assert proof is not None, label
         assert proof.irreducible is not None, label
@@ -139,4 +177,27 @@ def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_
         for name in proof.irreducible:
             others = [other for other in proof.irreducible if other != name]
             assert have_loads(parts, others), f"{label}: {name} is not needed"
-    assert any(len(answer.certificate.irreducible) > 3 for _, _, answer in explained(status))
+    sizes = [len(answer.certificate.irreducible) for _, _, answer in explained(status, seeds)]
+    assert max(sizes) > 3
+
+
+@pytest.mark.parametrize("status", ["infeasible", "overloaded"])
+@few_and_all
+def test_of_random_stances_those_are_told_that_would_do_alone(status, seeds):
+    """Of the other barriers that the proof weighs none does, either."""
+    told = []
+    for label, question, answer in explained(status, seeds):
+        proof = answer.certificate
+        if proof.sufficient is None:
+            assert len(proof.irreducible) > 16, label
+            continue
+        told.append(proof.sufficient)
+        parts = barred(question, proof.utilisation)
+        alone = {
+            name
+            for name in {*proof.irreducible, *proof.blocking}
+            if have_loads(parts, parts.barriers - {name})
+        }
+        assert set(proof.sufficient) == alone, label
+    assert told
+    assert not all(told)

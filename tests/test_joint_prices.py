@@ -11,11 +11,12 @@ from jointed import at_joints
 from stances import ask, on_wall
 
 from hand_models.frames import Pose
+from planner.gathering import gather
 from planner.plan import Price
 from planner.posture import posture
 from planner.question import ForceCap, Limits, Question
 from planner.robosimian import robosimian
-from planner.solve import gather, plan
+from planner.solve import plan
 
 ROBOT = robosimian()
 ANGLES = {

@@ -139,7 +139,8 @@ def test_some_hands_float(crawler, count, floating, joints):
 @pytest.mark.parametrize("joints", [False, True], ids=["hands alone", "with joints"])
 @pytest.mark.parametrize("count", range(1, 17))
 def test_every_number_of_hands(crawler, count, joints):
-    for floating in (0, min(count, 4)):
+    # joints are there for floating hands of odd stances, and not for those of even ones
+    for floating in (0, min(count, 4)) if joints == (count % 2 == 1) else (0,):
         asked = question(crawler, count, floating, joints=joints, seed=floating)
         margin = plan(asked)
         check(asked, margin, plan(replace(asked, objective="min_effort")), 1e-5)

@@ -148,9 +148,7 @@ def test_no_raw_rock_stands_out_of_a_smoothed_cut(seed):
     assert PolylineSection([curve]).clearances(raw[inner]).max() < 1e-4
 
 
-@settings(max_examples=60, deadline=None)
-@given(seeds)
-def test_entry_is_where_a_line_first_meets_the_rock(seed):
+def check_entry(seed):
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng)
     direction = random_axes(rng, 0.5)[:, 2]
@@ -166,6 +164,19 @@ def test_entry_is_where_a_line_first_meets_the_rock(seed):
     if outside:
         assert found > 0.0
         assert along[steps < found].min(initial=1.0) > -1e-9
+
+
+@settings(max_examples=15, deadline=None)
+@given(seeds)
+def test_entry_is_where_a_line_first_meets_the_rock(seed):
+    check_entry(seed)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_every_entry_is_where_a_line_first_meets_the_rock(seed):
+    check_entry(seed)
 
 
 def test_a_palm_inside_the_rock_is_told_how_deep():
@@ -362,7 +373,8 @@ def test_files_are_read(tmp_path, ending):
         ("rock.stl", b"", "rock.stl"),
         ("rock.stl", b"no mesh at all", "rock.stl"),
         ("rock.stl", b"solid x\nendsolid x\n", "rock.stl"),
-        ("rock.stl", b"\0" * 80 + b"\xff" * 500, "broken or cut short"),
+        # what is said depends on whether a guesser of encodings is installed
+        ("rock.stl", b"\0" * 80 + b"\xff" * 500, "broken or cut short|no triangles"),
         ("rock", b"solid x", "ends in .stl, .ply, .obj, .off"),
         (".", None, "ends in .stl, .ply, .obj, .off"),
         ("rock" * 100 + ".stl", None, "File name too long"),
@@ -375,4 +387,4 @@ def test_what_is_no_mesh_is_refused(tmp_path, name, content, words):
     with pytest.raises(InvalidInputError) as caught:
         read_mesh(path)
     assert caught.value.field == "file"
-    assert words in caught.value.message
+    assert any(each in caught.value.message for each in words.split("|"))

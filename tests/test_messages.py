@@ -342,6 +342,31 @@ def test_a_bad_value_is_named_with_what_would_be_valid(
     assert hint in message
 
 
+OUT_OF_RANGE = [
+    ((*FRONT, "hold", "diameter"), 300.0, "a number <= 100.0, in m"),
+    ((*FRONT, "grasp", "outer_rotation"), 180.0, f"a number <= {math.pi + 1e-6}, in rad"),
+    ((*FRONT, "grasp", "closing_tension"), 0.0, "a number >= 0.001, in N"),
+    ((*FRONT, "surface"), {"shear_limit": 9.0, "half_planes": 0}, "a whole number >= 1"),
+    ((*FRONT, "wrench"), [None, None, 2e6, None, None, None], "a number <= 1000000.0, in N"),
+    ((*FRONT, "wrench"), [2e6, None, None, -2e6, None, None], "a number <= 1000000.0, in N"),
+    ((*FRONT, "wrench"), [0.0, 0.0, 0.0, -2e6, 0.0, 0.0], "a number >= -1000000.0, in N·m"),
+    (("load", "mass"), 110300.0, "a number <= 100000.0, in kg"),
+    (("load", "acceleration"), [0.0, 0.0, 9810.0], "a number <= 1000.0, in m/s²"),
+    (("limits",), {"utilisation": 80.0}, "a number <= 1.0"),
+    (("limits",), {"joint_torque": {"nose": [5.0, 0.0]}}, "a number >= 0.001, in N·m"),
+    (("stance", "body", "orientation"), [0.0, 0.0, 0.0, 2e3], "a number <= 1000.0"),
+    (("present",), {"nose": [1.0, 1.0, 1.0, -1.0]}, "a number >= 0.0, in N"),
+]
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+@pytest.mark.parametrize(("path", "value", "wanted"), OUT_OF_RANGE)
+def test_a_number_out_of_range_is_told_in_its_unit(
+    path: tuple, value: object, wanted: str, form: str
+) -> None:
+    assert refusal(put(wall_request(), path, value), form=form)[2] == f"expected {wanted}"
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 50])
 def test_the_wrong_one_of_many_entries_is_found(count: int) -> None:
     for wrong in range(count):
@@ -363,7 +388,10 @@ def test_hands_out_of_reach_are_named_with_what_is_missing(form: str) -> None:
     for i in (1, 3):
         hand = request["stance"]["hands"][i]
         beyond = robot.beyond(hand["limb"], body @ _pose(hand["pose"]))
-        assert f"{hand['limb']} is out of reach by {beyond:.2g} m" in message
+        # the hand keeps its axes, which may cost more than the stretched limb lacks
+        told = re.search(rf"{hand['limb']} is out of reach by ([0-9.]+) m", message)
+        assert told is not None
+        assert float(told[1]) >= beyond - 0.01
 
 
 def test_errors_of_the_models_come_with_the_whole_path() -> None:
@@ -787,18 +815,28 @@ def check_answer(answer: dispatch.Answer, what: object) -> str:
     return error.kind
 
 
-def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
+def check_spoilt(count: int) -> None:
     chance = random.Random(20260)
     seen: dict[str, int] = {}
-    for i in range(2000):
+    for i in range(count):
         request = (full_request, flat_request, jointed_request, flat_request)[i % 4]()
         payload, encoding = spoil(request, chance)
         outcome = check_answer(dispatch.handle(PLAN, payload, encoding), (i, payload[:2000]))
         seen[outcome] = seen.get(outcome, 0) + 1
-    assert seen["invalid"] > 500
-    assert seen["malformed"] > 50
-    assert seen["unsupported"] > 10
-    assert sum(seen.get(status, 0) for status in ("optimal", "overloaded", "infeasible")) > 100
+    assert seen["invalid"] > count / 4
+    assert seen["malformed"] > count / 40
+    assert seen["unsupported"] > count / 200
+    planned = sum(seen.get(status, 0) for status in ("optimal", "overloaded", "infeasible"))
+    assert planned > count / 20
+
+
+def test_spoilt_requests_get_a_plan_or_an_error() -> None:
+    check_spoilt(300)
+
+
+@pytest.mark.slow
+def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
+    check_spoilt(2000)
 
 
 @settings(max_examples=200, deadline=None)

@@ -10,7 +10,7 @@ import numpy as np
 import peer
 import pytest
 from asked import HEAVY, wall_request
-from barred import barred, distance, explained, have_loads, miss, most_given
+from barred import barred, distance, explained, few_and_all, have_loads, miss, most_given
 from jointed import at_joints
 from rich.console import Console
 from stances import CALIBRATION_LOAD, ask, on_wall
@@ -33,8 +33,9 @@ HEAVILY = replace(CALIBRATION_LOAD, mass=150.0)
 
 
 @pytest.mark.parametrize("status", STATUSES)
-def test_no_loads_give_what_is_needed_in_the_certificates_direction(status):
-    for label, question, answer in explained(status):
+@few_and_all
+def test_no_loads_give_what_is_needed_in_the_certificates_direction(status, seeds):
+    for label, question, answer in explained(status, seeds):
         proof = answer.certificate
         assert (proof.utilisation is None) == (status == "infeasible"), label
         length = np.linalg.norm(proof.direction * WRENCH_UNIT)
@@ -55,9 +56,10 @@ def test_no_loads_give_what_is_needed_in_the_certificates_direction(status):
 
 
 @pytest.mark.parametrize("status", STATUSES)
-def test_the_nearest_body_wrench_can_be_held_and_no_nearer_one(status):
+@few_and_all
+def test_the_nearest_body_wrench_can_be_held_and_no_nearer_one(status, seeds):
     seen = 0
-    for label, question, answer in explained(status):
+    for label, question, answer in explained(status, seeds):
         proof = answer.certificate
         parts = barred(question, proof.utilisation)
         if proof.nearest is None:
@@ -122,9 +124,19 @@ def test_a_joint_of_a_limb_without_a_hand_is_to_blame_alone():
     assert answer.status == "overloaded"
     assert answer.limiting.limb == limb
     assert proof.irreducible == proof.blocking == (answer.limiting,)
+    # all seven are that weak
+    assert proof.sufficient == ()
     assert proof.needed - proof.supremum == pytest.approx(answer.utilisation - 1.0)
     assert proof.nearest is None
     assert "it holds nothing on, so no plan changes that" in answer.reason
+
+
+def test_of_the_joints_of_a_limb_without_a_hand_the_only_weak_one_would_do():
+    stance, limb = three_hands_and_a_weak_limb()
+    limits = Limits(joint_torque={limb: (1e3, 1e-3, *[1e3] * 5)})
+    proof = plan(ask(stance, body_wrench=np.zeros(6), limits=limits)).certificate
+    assert proof.sufficient == proof.irreducible
+    assert proof.irreducible[0].joint == stance.robot.model.joint_names[limb][1]
 
 
 def test_closing_too_hard_leaves_no_loads_whatever_the_body_needs():
@@ -173,6 +185,48 @@ def test_a_cap_on_a_force_is_named():
     answer = plan(question)
     assert answer.status == "overloaded"
     assert LimitName(limb, None, None, "force_cap") in answer.certificate.irreducible
+
+
+def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way():
+    stance = on_wall()
+    limb, load = stance.hands[0].limb, replace(CALIBRATION_LOAD, mass=130.0)
+    assert plan(ask(stance, load=load)).status == "optimal"
+    answer = plan(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})))
+    own = LimitName(limb, None, None, "force_cap")
+    proof = answer.certificate
+    assert answer.status == "overloaded"
+    assert proof.irreducible[0] == proof.blocking[0] == own
+    parts = barred(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})), 1.0)
+    alone = {n for n in proof.irreducible if have_loads(parts, parts.barriers - {n})}
+    assert own in alone
+    assert set(proof.sufficient) == alone
+    assert f"would let it be held: {limb} force_cap" in printed(answer)
+
+
+def test_limits_come_before_what_hands_cannot_do():
+    answer = plan(ask(on_wall(Cylinder(0.7)), limits=Limits(tendon_tension=40.0)))
+    names = [name.limit for name in answer.certificate.irreducible]
+    own = [i for i, name in enumerate(names) if name == "tendon_tension"]
+    hard = [i for i, name in enumerate(names) if name.endswith(("_reversed", "_backwards"))]
+    assert own == list(range(len(own)))
+    assert hard == list(range(len(names) - len(hard), len(names)))
+    assert own
+    assert hard
+
+
+def test_what_no_single_limit_is_to_blame_for_is_told_so_in_words():
+    answer = plan(ask(on_wall(palm=False)))
+    assert answer.status == "infeasible"
+    assert answer.certificate.sufficient == ()
+    told = printed(answer)
+    assert "no single one of them, taken away alone, would do" in told
+    assert "dragged_backwards: tile cannot be dragged away from the finger's base" in told
+
+
+def printed(answer) -> str:
+    out = io.StringIO()
+    print_plan(plan_reply(answer, None, model=False), Console(file=out, width=80))
+    return " ".join(out.getvalue().split())
 
 
 def test_weak_joints_are_named():

@@ -404,11 +404,12 @@ def test_a_route_is_climbed_with_the_hand(
     assert "hand_load" in tables["1"]
 
 
-def test_the_demo_asks_for_the_hand(file, tmp_path: Path) -> None:
+def test_the_demo_asks_for_the_hand(
+    file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     path = file(line("tendon", "maximum_tension", 60.0))
-    shown = process("demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path)
-    assert shown.returncode == 3, shown.stderr
-    assert json.loads(shown.stdout)["limiting"]["limit"] == "tendon_tension"
+    assert run(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
+    assert told(capfd)["limiting"]["limit"] == "tendon_tension"
     assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -160,7 +160,8 @@ def test_a_person_reads_the_torques_of_every_joint(
     assert err == ""
     assert max(len(row) for row in out.splitlines()) <= 80
     assert "joint torques [N·m]" in out
-    rows = [row.split() for row in out.partition("joint torques")[2].splitlines()]
+    table = out.partition("joint torques")[2].partition("take off the utilisation")[0]
+    rows = [row.split() for row in table.splitlines()]
     (left,) = [row for row in rows if row[:1] == ["left"] and len(row) == 9]
     assert sum(cell.endswith("*") for cell in left) == 1
     assert left[7] == "8"
@@ -368,12 +369,32 @@ def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path)
     assert served.process.returncode == 0
 
 
-def test_the_demo_is_of_the_robot(lemur: Path, tmp_path: Path) -> None:
+def test_the_demo_is_of_the_robot(
+    lemur: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     picture = tmp_path / "demo.png"
-    shown = process("demo", "-o", str(picture), "--json", "--robot", str(lemur))
-    assert (shown.returncode, shown.stderr) == (0, b"")
-    weight = np.linalg.norm(json.loads(shown.stdout)["body_wrench"][:3])
+    assert run(["demo", "-o", str(picture), "--json", "--robot", str(lemur)]) == 0
+    weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
     assert weight == pytest.approx(9.81 * load_robot(lemur).mass)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_demo_of_a_robot_that_does_not_reach_leaves_joints_out(
+    lemur: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    urdf = (lemur.parent / "lemur.urdf").read_text(encoding="utf-8")
+    limits = 'lower="-3.1415" upper="3.1415"'
+    assert urdf.count(limits) == 28
+    (tmp_path / "lemur.urdf").write_text(urdf.replace(limits, 'lower="-0.1" upper="0.1"'))
+    file = tmp_path / "stiff.toml"
+    file.write_text(lemur.read_text(encoding="utf-8"), encoding="utf-8")
+    picture = tmp_path / "demo.png"
+    assert run(["demo", "-o", str(picture), "--json", "--robot", str(file)]) == 0
+    out, err = capfd.readouterr()
+    assert err.startswith("crux: planned without joints: front_right is ")
+    assert err.count("\n") == 1
+    reply = json.loads(out)
+    assert (reply["joints"], reply["joint_torque"], reply["verified"]) == (None, None, True)
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -12,12 +12,16 @@ from planner.plan import Plan
 from planner.question import Limits, Question
 from planner.solve import SLACK, plan
 
-SEEDS = range(60)
+FEW = range(25)
+
+many = pytest.mark.parametrize(
+    "seeds", [FEW, pytest.param(range(60), marks=pytest.mark.slow)], ids=["few", "many"]
+)
 PHALANGES = ("proximal", "middle", "distal")
 
 
-def feasible() -> list[tuple[Question, Plan]]:
-    pairs = [random_answer(seed) for seed in SEEDS]
+def feasible(seeds: range) -> list[tuple[Question, Plan]]:
+    pairs = [random_answer(seed) for seed in seeds]
     return [(question, answer) for question, answer in pairs if answer.hands is not None]
 
 
@@ -54,8 +58,9 @@ def test_infeasible_has_a_certificate_and_no_plan():
     assert not answer.load_factor_unbounded
 
 
-def test_body_wrench_balances_when_it_is_added_up_from_the_tiles():
-    for question, answer in feasible():
+@many
+def test_body_wrench_balances_when_it_is_added_up_from_the_tiles(seeds):
+    for question, answer in feasible(seeds):
         total = np.zeros(6)
         for i, hand in enumerate(answer.hands):
             on_rock = np.zeros(6)
@@ -81,8 +86,9 @@ def test_body_wrench_balances_when_it_is_added_up_from_the_tiles():
         np.testing.assert_array_equal(answer.body_wrench, wrench)
 
 
-def test_every_hand_finger_and_tile_is_there_in_order():
-    for question, answer in feasible():
+@many
+def test_every_hand_finger_and_tile_is_there_in_order(seeds):
+    for question, answer in feasible(seeds):
         assert [h.limb for h in answer.hands] == [h.limb for h in question.stance.hands]
         for hand in answer.hands:
             assert tuple(finger.name for finger in hand.fingers) == FINGERS
@@ -94,8 +100,9 @@ def test_every_hand_finger_and_tile_is_there_in_order():
                     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
 
 
-def test_hard_limits_hold_at_any_utilisation():
-    for _, answer in feasible():
+@many
+def test_hard_limits_hold_at_any_utilisation(seeds):
+    for _, answer in feasible(seeds):
         tiny = 1e-6 * max(1.0, *(np.abs(hand.wrench).max() for hand in answer.hands))
         for hand in answer.hands:
             assert hand.palm.force[0] <= tiny
@@ -109,8 +116,9 @@ def test_hard_limits_hold_at_any_utilisation():
                         assert not tile.force.any()
 
 
-def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans():
-    for question, answer in feasible():
+@many
+def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
+    for question, answer in feasible(seeds):
         robot_hand = question.stance.robot.hand
         used = []
         for hand, place in zip(answer.hands, question.stance.hands, strict=True):
@@ -148,8 +156,9 @@ def _parts(finger) -> dict[str, float]:
     }
 
 
-def test_limiting_names_a_row_at_the_plans_utilisation():
-    for _, answer in feasible():
+@many
+def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
+    for _, answer in feasible(seeds):
         name = answer.limiting
         hand = next(hand for hand in answer.hands if hand.limb == name.limb)
         if name.limit == "hand_load":

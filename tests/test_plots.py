@@ -6,13 +6,18 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 from hands import HAND, ROCK
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3D
 from robots import TWO_LINK, arm, limbs_toml
 from rocks import cylinder_mesh
@@ -22,15 +27,20 @@ from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.frames import Pose
 from hand_models.mesh import Mesh
 from hand_models.profile import STRIPS, Profile
-from planner import plan_plots, solve
+from planner import hand_plots, plan_plots, solve
+from planner.explain import barrier_words
 from planner.plan_plots import draw_plan, plot_plan
 from planner.plan_scene import scene_of, sights
 from planner.plan_views import COLOURS, LIMB
 from planner.question import Limits, Load, Question
 from planner.robosimian import RobotFile, robot_of
 from planner.rock_patches import AROUND, COARSE, MOST, rock_patch
+from planner.route import Stage
+from planner.route_plots import draw_route
 from planner.stance import HandOnHold, Stance
+from service import questions
 from service.command import run
+from service.stances import read_request
 
 found = solve.plan
 
@@ -59,6 +69,8 @@ def answered(name):
         "floating": lambda: Question(floating),
         "two hands": lambda: Question(two),
         "infeasible": lambda: Question(bare, body_wrench=np.array([0.0, 100, 800, 300, 0, 0])),
+        "flat wall": lambda: Question(on_wall(Plane(), off=OFF, outer_rotation=0.0)),
+        "nails": lambda: requested("ledge"),
         "one limb": lambda: Question(standing("leg")),
         "two limbs": lambda: Question(
             own, body_wrench=attainable_wrench(own, np.random.default_rng(0))
@@ -66,6 +78,11 @@ def answered(name):
     }
     question = questions[name]()
     return question, solve.plan(question)
+
+
+def requested(name):
+    """The question of a bundled example."""
+    return questions.question(read_request(name))
 
 
 def standing(*limbs):
@@ -194,6 +211,103 @@ def test_notes_do_not_lie_on_each_other(name):
         assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
+@pytest.mark.parametrize("name", ["solved", "ceiling", "two limbs"])
+def test_notes_stay_in_the_frame_and_off_the_tips_of_arrows(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    for axes in panels(figure)[1:]:
+        tips = axes.transData.transform(arrows(axes)[0][:, 1])
+        frame = axes.get_window_extent()
+        for note in axes.texts:
+            if note.get_text():
+                box = note.get_window_extent()
+                assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+                assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+                assert not any(box.contains(*tip) for tip in tips)
+
+
+@pytest.mark.parametrize("off", [0.3, OFF, 0.6])
+def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
+    question = Question(on_wall(overhang=math.pi / 2, off=off))
+    plan = replace(answered("ceiling")[1], hands=None, joints=None, certificate=None)
+    axes = draw_plan(plan, question).axes[0]
+    load = scene_of(plan, question).load
+
+    def seen(places):
+        return np.column_stack(proj3d.proj_transform(*np.transpose(places), axes.get_proj())[:2])
+
+    spots = seen([question.stance.body.position, load.place])
+    for hand in scene_of(plan, question).hands:
+        drawn_hand = seen(np.vstack([hand.palm, *hand.fingers]))
+        within = (drawn_hand.min(axis=0) < spots) & (spots < drawn_hand.max(axis=0))
+        assert not within.all(axis=1).any()
+
+
+@pytest.mark.parametrize("name", ["plain", "nails"])
+def test_titles_of_columns_do_not_run_together(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    titles = figure.axes[3].get_xticklabels()
+    assert ("nail" in [title.get_text() for title in titles]) == (name == "nails")
+    if titles[0].get_rotation() == 0.0:
+        boxes = [title.get_window_extent() for title in titles]
+        assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+    else:
+        # parallel lines of words, whose ends are farther apart than they are high
+        ends = [title.get_transform().transform(title.get_position())[0] for title in titles]
+        height = titles[0].get_fontsize() * figure.dpi / 72.0
+        away = np.diff(ends) * math.sin(math.radians(titles[0].get_rotation()))
+        assert (away > height).all()
+
+
+def test_where_nothing_balances_the_picture_says_what_is_missing_and_what_leaves_no_balance():
+    _, plan = answered("flat wall")
+    assert plan.status == "infeasible"
+    proof = plan.certificate
+    panel = drawn("flat wall").axes[3]
+    cells = panel.tables[0].get_celld()
+    parts = {"needed": plan.body_wrench, "nearest": proof.nearest, "missing": proof.shortfall}
+    for j, (name, wrench) in enumerate(parts.items(), start=1):
+        assert cells[0, j].get_text().get_text() == name
+        told = [float(cells[i + 1, j].get_text().get_text()) for i in range(6)]
+        np.testing.assert_allclose(told, wrench, atol=0.051)
+    text = words(panel)[-1]
+    assert proof.irreducible
+    first = proof.irreducible[0]
+    assert f"{first.limb.replace('_', ' ')}:\n    {barrier_words(first)}" in text
+    for name in proof.irreducible:
+        assert f"{name.limb.replace('_', ' ')}:" in text
+
+
+def test_where_loads_of_any_sign_give_nothing_the_picture_says_so():
+    _, plan = answered("infeasible")
+    assert plan.certificate.irreducible == ()
+    panel = drawn("infeasible").axes[3]
+    assert "no loads at all, of any sign" in words(panel)[-1]
+    bare = draw_plan(replace(plan, certificate=None), answered("infeasible")[0])
+    assert words(bare.axes[3]) == ["no plan, no loads"]
+
+
+@pytest.mark.parametrize(
+    ("used", "crux"), [((0.4, 0.9, 0.3), 1), ((0.4, 1.6), 1), ((5.0, 0.3), 0), ((0.5, None), 1)]
+)
+def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, crux):
+    question, plan = answered("plain")
+    stages = [Stage(i, i, "lift", "front_left", question) for i in range(len(used))]
+    plans = [replace(plan, utilisation=u, load_factor=None) for u in used]
+    route = SimpleNamespace(name="up", limits=Limits())
+    result = SimpleNamespace(plans=plans, stages=stages, route=route, crux=crux)
+    figure = draw_route(result)
+    FigureCanvasAgg(figure).draw()
+    upper = figure.axes[0]
+    note = next(text for text in upper.texts if text.get_text() == "crux")
+    box = Text.get_window_extent(note)
+    frame, legend = upper.get_window_extent(), upper.get_legend().get_window_extent()
+    assert frame.y0 < box.y0 < box.y1 < frame.y1
+    assert not box.overlaps(legend)
+    assert legend.y0 >= frame.y1
+
+
 @pytest.mark.parametrize("name", ["solved", "overloaded"])
 def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
     question, plan = answered(name)
@@ -271,7 +385,6 @@ def test_joints_without_a_plan_have_no_colour_and_no_table():
     _, plan = answered("infeasible")
     figure = drawn("infeasible")
     assert len(figure.axes) == 4
-    assert words(figure.axes[3]) == ["no plan, no loads"]
     assert plan.joints is not None
     dots = [line for line in figure.axes[1].lines if line.get_color() == "white"]
     assert len(dots) == 4
@@ -422,3 +535,16 @@ def test_rock_that_is_far_away_is_not_drawn():
     away = Pose(np.array([0.0, 0.0, 0.6]), np.eye(3))
     settled = HAND.settle(Sphere(0.2), ROCK, Grasp(), away)
     assert rock_patch(settled).shape == (0, 3, 3)
+
+
+# One hand ---------------------------------------------------------------------------------------
+
+
+def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
+    settled = HAND.settle(Plane(), ROCK, Grasp())
+    panels = list(Figure().subplots(2, 2).ravel())
+    hand_plots._draw_fingers(panels, settled, np.full(4, settled.closing_tension))
+    named = {line.get_color(): line.get_label() for line in panels[0].get_legend().get_lines()}
+    bars = {line.get_color() for line in panels[0].lines if line.get_linewidth() in (3, 4)}
+    assert named[hand_plots.PALM] == "palm"
+    assert bars <= set(named)

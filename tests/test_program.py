@@ -16,7 +16,11 @@ from planner.plan import Plan
 from planner.question import Load
 from planner.solve import plan
 
-SEEDS = range(200)
+SEEDS = range(40)
+
+many = pytest.mark.parametrize(
+    "seeds", [SEEDS, pytest.param(range(200), marks=pytest.mark.slow)], ids=["few", "many"]
+)
 AGREE = 1e-5
 
 KINDS = (
@@ -41,9 +45,10 @@ def test_random_stances_reach_every_kind_of_answer():
     assert {len(random_answer(seed)[0].stance.hands) for seed in SEEDS} == {1, 2, 3, 4}
 
 
-def test_least_utilisation_is_that_of_highs_and_infeasible_exactly_where_highs_says():
+@many
+def test_least_utilisation_is_that_of_highs_and_infeasible_exactly_where_highs_says(seeds):
     wrong = []
-    for seed in SEEDS:
+    for seed in seeds:
         question, answer = random_answer(seed)
         other = peer.least_utilisation(question)
         if other.status == peer.INFEASIBLE:
@@ -58,9 +63,10 @@ def test_least_utilisation_is_that_of_highs_and_infeasible_exactly_where_highs_s
     assert not wrong
 
 
-def test_load_factor_is_that_of_highs():
+@many
+def test_load_factor_is_that_of_highs(seeds):
     wrong = []
-    for seed in SEEDS:
+    for seed in seeds:
         question, answer = random_answer(seed)
         other = peer.largest_load_factor(question)
         if answer.load_factor != (
@@ -185,9 +191,10 @@ def test_a_symmetric_stance_has_a_symmetric_plan(hold, lateral):
             )
 
 
-def test_dual_bound_of_the_margin_proves_its_optimum():
+@many
+def test_dual_bound_of_the_margin_proves_its_optimum(seeds):
     """The multipliers of a linear program bound its optimum from below; the gap is nothing."""
-    for seed in SEEDS[:60]:
+    for seed in seeds[:60]:
         question, answer = random_answer(seed)
         if answer.utilisation is None:
             continue

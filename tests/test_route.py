@@ -143,7 +143,7 @@ def test_a_killed_process_costs_no_stage(route, result):
     )
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_hold_inside_the_palm_names_its_move(route, workers: int):
     move = route.moves[2]
     nearer = Pose(np.array([0.0, 0.0, -0.05]), np.eye(3))

@@ -33,6 +33,7 @@ from zenoh.handlers import FifoChannel
 
 from hand_models.errors import InvalidInputError
 from planner import settling, solve
+from planner.robot_file import RobotFile
 from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest, dispatch
 from service.codec import Format, decode_request
 from service.config import listening, open_session, zenoh_config
@@ -378,8 +379,15 @@ def test_a_server_says_what_it_serves(served: Served) -> None:
     assert served.ready == {"v": 1, "keys": KEYS, "listen": [served.endpoint]}
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("busy", [False, True])
+@pytest.mark.parametrize(
+    ("number", "busy"),
+    [
+        (signal.SIGTERM, True),
+        (signal.SIGINT, False),
+        pytest.param(signal.SIGTERM, False, marks=pytest.mark.slow),
+        pytest.param(signal.SIGINT, True, marks=pytest.mark.slow),
+    ],
+)
 def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     server = Served(free_endpoint())
     payload = msgspec.json.encode(wall_request())
@@ -397,6 +405,29 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     assert took < 3.0
     assert out == ""
     assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
+
+
+def test_a_second_server_of_one_robot_warns(served: Served) -> None:
+    second = Served(free_endpoint(), "-e", served.endpoint)
+    warning, serving = second.stop(signal.SIGTERM)[2].splitlines()
+    assert warning == (
+        "crux: another service already answers crux/robosimian/…: queries may reach either; "
+        "--no-multicast-scouting keeps services apart"
+    )
+    assert serving.startswith("crux: serving ")
+
+
+def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
+    endpoint = free_endpoint()
+    first = zenoh_config(listen=[endpoint], multicast=False)
+    second = zenoh_config(connect=[endpoint], settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(first) as there, open_session(second) as here:
+        service = PlanService(here)
+        assert not service.has_rival()
+        with PlanService(there):
+            assert service.has_rival()
+            assert not PlanService(here, RobotFile("lemur", toml="", urdf="")).has_rival()
+        assert not service.has_rival()
 
 
 def test_a_killed_server_is_noticed_and_its_successor_found() -> None:

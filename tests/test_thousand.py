@@ -18,15 +18,16 @@ from random_requests import random_request
 
 from hand_models.errors import InvalidInputError
 from hand_models.wrench_space import WrenchSpace
+from planner.gathering import gather
 from planner.plan import Plan
 from planner.posture import posture
 from planner.question import Question
-from planner.solve import gather, plan
+from planner.solve import plan
 from service.questions import question as planner_question
 from service.requests import PlanRequest
 
 COUNT = 1000
-FEW = 60
+FEW = 20
 CLOSE = 2e-5
 
 
