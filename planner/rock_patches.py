@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 import numpy as np
-import trimesh
+from trimesh.intersections import slice_faces_plane
 
 from hand_models.frames import Array, Indices, Pose
 from hand_models.hand import SettledHand
@@ -44,9 +44,11 @@ def rock_patch(settled: SettledHand) -> Array:
     near = _near(in_hand, vertices, faces)
     if not len(near.faces):
         return np.zeros((0, 3, 3))
-    inward = np.vstack([np.eye(3), -np.eye(3)])
-    mesh = trimesh.Trimesh(near.vertices, near.faces, process=False)
-    return np.array(mesh.slice_plane(-AROUND * inward, inward).triangles, dtype=float)
+    vertices, faces = near.vertices, near.faces
+    for inward in np.vstack([np.eye(3), -np.eye(3)]):
+        # slicing a whole mesh would need a further package
+        vertices, faces, _ = slice_faces_plane(vertices, faces, inward, -AROUND * inward)
+    return np.asarray(vertices[faces], dtype=float)
 
 
 def _near(in_hand: Pose, vertices: Array, faces: Indices) -> Triangles:
