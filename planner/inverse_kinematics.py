@@ -21,9 +21,6 @@ __all__ = ["IkSolution", "UnreachableError", "solve_limbs", "unreachable"]
 STARTS: Final = 2
 """Postures from which a pose out of reach is approached, beside the best found."""
 
-FAR: Final = 1.0
-"""Reaches beyond a stretched limb from which on nothing else need be known of a pose."""
-
 
 @dataclass(frozen=True, eq=False)
 class IkSolution:
@@ -189,8 +186,6 @@ def _by_limb(batch: LimbBatch, angles: Array) -> Iterator[tuple[str, Array]]:
 def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None]:
     """Return the distance that a limb lacks [m], and the angle at its place if that is in reach."""
     beyond = float(batch.beyond[i])
-    if beyond > FAR * batch.reach[i]:
-        return beyond, None
     limb = batch.limbs[i]
     starts = [best, *starts_near(batch, i, 0)[:STARTS, : batch.joints[i]]]
     lacks = lack(batch.robot.model, limb, batch.poses[limb], starts)

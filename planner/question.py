@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
@@ -20,6 +20,10 @@ Frame = Literal["hand", "body", "world"]
 
 FRAMES: Final = get_args(Frame)
 """In which frames a force may be capped."""
+
+
+LEAST: Final = 1e-3
+"""Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,9 @@ class ForceCap:
     frame: Frame = "hand"
 
     def __post_init__(self) -> None:
+        if isinstance(self.largest_force, list):
+            ranges = tuple((float(low), float(high)) for low, high in self.largest_force)
+            object.__setattr__(self, "largest_force", ranges)
         if self.frame not in FRAMES:
             raise InvalidInputError(
                 f"unknown frame {self.frame!r}; known are {', '.join(FRAMES)}", field="frame"
@@ -96,12 +103,18 @@ class ForceCap:
             for i, (low, high) in enumerate(self.largest_force):
                 if not low <= 0.0 <= high or low == high:
                     raise InvalidInputError(
-                        f"a range with zero in it is needed, got {low:g} to {high:g} N",
+                        f"a range from below to above zero is needed, one end of which may be "
+                        f"zero; got {low:g} to {high:g} N",
                         field=f"largest_force[{i}]",
                     )
-        elif not (math.isfinite(self.largest_force) and self.largest_force > 0.0):
+                if any(0.0 < abs(end) < LEAST for end in (low, high)):
+                    raise InvalidInputError(
+                        f"an end is zero or at least {LEAST:g} N, got {low:g} to {high:g} N",
+                        field=f"largest_force[{i}]",
+                    )
+        elif not (math.isfinite(self.largest_force) and self.largest_force >= LEAST):
             raise InvalidInputError(
-                f"must be above 0 N, got {self.largest_force:g}", field="largest_force"
+                f"must be at least {LEAST:g} N, got {self.largest_force:g}", field="largest_force"
             )
 
 
@@ -125,7 +138,7 @@ class Limits:
 
     utilisation: float = 1.0
     tendon_tension: float | None = None
-    joint_torque: float | Mapping[str, float | tuple[float, ...]] | None = None
+    joint_torque: float | Mapping[str, float | Sequence[float]] | None = None
     per_hand: Mapping[str, ForceCap] = field(default_factory=dict)
     tension_change: float | None = None
 
@@ -139,12 +152,18 @@ class Limits:
             if most is not None and not (math.isfinite(most) and most > 0.0):
                 raise InvalidInputError(f"must be above 0 N, got {most:g}", field=name)
         torque = self.joint_torque
+        if isinstance(torque, Mapping):
+            torque = {
+                limb: tuple(most) if isinstance(most, Sequence) else most
+                for limb, most in torque.items()
+            }
+            object.__setattr__(self, "joint_torque", torque)
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
             for most in given if isinstance(given, tuple) else (given,):
-                if most is not None and not (math.isfinite(most) and most > 0.0):
+                if most is not None and not (math.isfinite(most) and most >= LEAST):
                     raise InvalidInputError(
-                        f"must be above 0 N·m, got {most:g}",
+                        f"must be at least {LEAST:g} N·m, got {most:g}",
                         field="joint_torque" + (f".{limb}" if limb else ""),
                     )
 

@@ -19,6 +19,9 @@ __all__ = ["BuiltModel", "Mount", "build_model", "pose_of"]
 ROOT_JOINT: Final = 1
 """Index of the joint that lets the whole robot move freely, in Pinocchio's model."""
 
+MOST_JOINTS: Final = 64
+"""More joints of a limb than this no request names."""
+
 
 @dataclass(frozen=True)
 class Mount:
@@ -80,6 +83,10 @@ def _limb_joints(
             raise InvalidInputError(
                 f"no joint moves between {body!r} and {mount.link!r}; a limb has at least one",
                 field=field,
+            )
+        if len(chain) > MOST_JOINTS:
+            raise InvalidInputError(
+                f"a limb has at most {MOST_JOINTS} joints, got {len(chain)}", field=field
             )
         for joint in chain:
             other = owner.setdefault(joint.name, limb)

@@ -7,7 +7,6 @@ folder) and ``body`` (a link), then numbers with unit and source. ``[limbs.NAME]
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -41,6 +40,9 @@ MOST_LIMBS: Final = 16
 FARTHEST: Final = 10.0
 """Largest coordinate of a hand in its link, or of a centre of mass [m]; larger, it is in other
 units."""
+
+WEAKEST: Final = 1e-3
+"""Smallest torque limit that is taken for one [N·m]."""
 
 STRONGEST: Final = 1e6
 """Largest torque limit that is taken for one [N·m]."""
@@ -242,9 +244,9 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
 def _torque_limit(table: ParameterTable, section: str) -> tuple[float, ...]:
     value = table.quantity(section, "torque_limit").value
     limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
-    if not limits or not all(0.0 < limit <= STRONGEST and math.isfinite(limit) for limit in limits):
+    if not limits or not all(WEAKEST <= limit <= STRONGEST for limit in limits):
         raise InvalidInputError(
-            f"must be above 0 and at most {STRONGEST:g} N·m, got {_quoted(limits)}",
+            f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
     return limits

@@ -231,7 +231,8 @@ class _Answer:
         far = BALANCED * max(1.0, float(np.linalg.norm(self.data.wrench)))
         if not nearest.solved or nearest.value > far:
             given = len(self.data.wrench) > len(self.wrench)
-            self.certificate = certify(self._hindered(None), None if given else nearest)
+            if not self._held_floating:
+                self.certificate = certify(self._hindered(None), None if given else nearest)
             if self.certificate is not None:
                 self.outcome = replace(self.outcome, solved=False)
         elif not self.outcome.solved and not self.parts.floating:
@@ -241,6 +242,14 @@ class _Answer:
             self.outcome = program.margin(self.data)
             self._settle_tie()
             self._settle_effort()
+
+    @property
+    def _held_floating(self) -> bool:
+        """Whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
+        return any(
+            hand.wrist == "floating" and hand.wrench is not None
+            for hand in self.question.stance.hands
+        )
 
     def _hindered(self, cap: float | None) -> Hindered:
         """Return what a proof is made of: at any utilisation, or within a cap."""
@@ -255,14 +264,17 @@ class _Answer:
         cap = self.question.limits.utilisation
         unproven = self.search is not None and self.search.found == "unproven"
         most = max(idle, key=lambda used: used.utilisation, default=None)
-        if most is not None and most.utilisation > cap + SLACK:
-            alone: bool | None = sum(used.utilisation > cap + SLACK for used in idle) == 1
+        beyond = [used for used in idle if used.utilisation > cap + SLACK]
+        if most is not None and beyond and most.utilisation >= self.utilisation:
+            alone: bool | None = len(beyond) == 1
             if self.utilisation > cap + SLACK:
                 alone = None if unproven else False
             return certify_idle(most, cap, alone)
         if unproven:
             return None
-        return certify(self._hindered(cap))
+        proof = certify(self._hindered(cap))
+        # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
+        return replace(proof, sufficient=()) if proof is not None and beyond else proof
 
     def _find_load_factor(self) -> None:
         if any(used.utilisation > 1.0 + SLACK for used in self._idle_joints()):
@@ -323,6 +335,8 @@ class _Answer:
             reason = shortfall_sentence(self.certificate, touching, floating=self._floating)
         elif self.search is not None:
             reason = "no pose of the floating wrists was found that balances the body"
+            if self._held_floating:
+                reason += " with the wrenches that they are given; that is no proof of none"
             if self.idle_preloads:
                 reason += f"; {self.idle_preloads[0]}"
         else:

@@ -331,3 +331,13 @@ def test_spoilt_requests_get_an_answer():
             decode = msgspec.msgpack if "msgpack" in answer.encoding else msgspec.json
             error = decode.decode(answer.payload)["error"]
             assert error["kind"] != "internal", error
+
+
+def test_a_wrench_that_a_floating_hand_is_not_found_to_give_is_not_proven_impossible():
+    stance = on_wall(limbs=("front_left", "rear_right"))
+    first, second = stance.hands
+    given = replace(first, wrist="floating", wrench=(None, None, 1e5, None, None, None))
+    answer = plan(ask(replace(stance, hands=(given, second))))
+    assert answer.status == "failed"
+    assert answer.certificate is None
+    assert "that is no proof of none" in answer.reason

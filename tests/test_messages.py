@@ -312,7 +312,7 @@ INVALID = [
         ("limits",),
         {"per_hand": {"front_left": {"largest_force": [1.0, [2.0, 5.0], None]}}},
         "limits.per_hand.front_left.largest_force[1]",
-        "a range with zero in it is needed, got 2 to 5 N",
+        "from below to above zero is needed, one end of which may be zero; got 2 to 5 N",
     ),
     (
         ("limits",),
