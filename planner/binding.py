@@ -11,7 +11,7 @@ from planner.plan import LimitName, Price
 from planner.program import SLACK
 from planner.stance_data import JOINT_TORQUE
 
-__all__ = ["Used", "limit_name", "limiting_limit", "prices", "unit_of"]
+__all__ = ["Used", "joint_name", "limit_name", "limiting_limit", "prices", "unit_of", "used_limits"]
 
 BINDING: Final = 1e-6
 """Multipliers below this do not count as binding."""
@@ -31,6 +31,11 @@ def unit_of(limit: str) -> str:
 def limit_name(limb: str, row: Row) -> LimitName:
     """Return the name of a row of a limb's hand."""
     return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
+
+
+def joint_name(limb: str, joint: str) -> LimitName:
+    """Return the name of what a limb's joint bears."""
+    return LimitName(limb, None, None, JOINT_TORQUE, joint)
 
 
 class Used(NamedTuple):

@@ -12,21 +12,16 @@ from typing import Final
 import numpy as np
 
 from hand_models.frames import Array
+from planner.binding import joint_name
 from planner.plan import LimitName
 from planner.posture import Posture, posture_at
 from planner.question import Question
-from planner.stance_data import JOINT_TORQUE
 
-__all__ = ["Motion", "joint_name", "motion_of"]
+__all__ = ["Motion", "motion_of"]
 
 Vector = tuple[float, float, float]
 
 NONE: Final[Vector] = (0.0, 0.0, 0.0)
-
-
-def joint_name(limb: str, joint: str) -> LimitName:
-    """Return the name of what a limb's joint bears."""
-    return LimitName(limb, None, None, JOINT_TORQUE, joint)
 
 
 @dataclass(frozen=True, eq=False)

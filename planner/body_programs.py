@@ -17,8 +17,8 @@ from hand_models.errors import InvalidInputError, SolverError
 from hand_models.frames import Array
 from hand_models.wrench_space import SCALE
 from planner import program, stance_data
-from planner.binding import ALIKE, BINDING, limit_name
-from planner.body_motion import Motion, joint_name, motion_of
+from planner.binding import ALIKE, BINDING, joint_name, limit_name
+from planner.body_motion import Motion, motion_of
 from planner.gathering import gather
 from planner.hand_sets import Hands, Point, widest_at_rest
 from planner.plan import LimitName, Plan
@@ -266,13 +266,14 @@ def _error(
 ) -> float:
     """Return by how much an answer misses the balance, or breaks a row, scaled."""
     loads, t = found.outcome.loads, found.t
-    worst = float(np.abs(stance_data.body_wrench(data, loads) - data.wrench - B @ t).max())
-    for i, (hand, y) in enumerate(zip(data.hands, loads, strict=True)):
-        z = y / hand.unit
-        used = hand.L @ z + hand.l0 + (0.0 if K is None else K[i] @ t)
-        worst = max(worst, float(np.max(used - cap, initial=0.0)))
-        worst = max(worst, float(np.max(hand.H @ z - hand.h, initial=0.0)))
-    return worst
+    missing = float(np.abs(stance_data.body_wrench(data, loads) - data.wrench - B @ t).max())
+    if K is not None:
+        hands = tuple(
+            hand._replace(l0=hand.l0 + torque @ t)
+            for hand, torque in zip(data.hands, K, strict=True)
+        )
+        data = StanceData(hands, data.wrench)
+    return max(missing, stance_data.beyond(data, loads, cap))
 
 
 def _unsolved(outcome: Outcome) -> SolverError:

@@ -21,7 +21,7 @@ from planner.hand_sets import Hands
 from planner.palm_choice import NEARBY, exchanged, first_plan, starts
 from planner.program import SLACK
 
-__all__ = ["PROGRAMS", "LargestFactor", "least_use", "most_load"]
+__all__ = ["NO_WRENCH", "PROGRAMS", "LargestFactor", "least_use", "most_load"]
 
 PROGRAMS: Final = 320
 """How many programs a question may cost, so that four floating hands cost some ten seconds at most.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -162,7 +162,8 @@ def solve_limbs(
     positions = np.linalg.norm(errors[:, :3], axis=1) * batch.reach
     turns = np.linalg.norm(errors[:, 3:], axis=1)
     found = {}
-    for i, (limb, values) in enumerate(_by_limb(batch, angles)):
+    for i, limb in enumerate(batch.limbs):
+        values = angles[i, : batch.joints[i]].copy()
         missing, turned = 0.0, None
         if not solved[i]:
             missing, turned = _lacking(batch, i, values)
@@ -175,12 +176,6 @@ def solve_limbs(
             turned=turned,
         )
     return found
-
-
-def _by_limb(batch: LimbBatch, angles: Array) -> Iterator[tuple[str, Array]]:
-    """Yield every limb with its own angles, shape (n,)."""
-    for i, limb in enumerate(batch.limbs):
-        yield limb, angles[i, : batch.joints[i]].copy()
 
 
 def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None]:

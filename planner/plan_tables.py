@@ -33,8 +33,6 @@ FIRST: Final = 24
 LETTERS: Final = 64
 """Of such a line."""
 
-INDENT: Final = "    "
-
 GAP: Final = 0.025
 """Above and below a table, over the panel's height."""
 

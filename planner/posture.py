@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Pose
 from planner.hand_rows import JointLoads
+from planner.inverse_kinematics import solve_limbs, unreachable
 from planner.question import Question
 from planner.stance import Stance
 
@@ -172,8 +173,6 @@ def _given(
 
 def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> dict[str, Array]:
     """Return angles for the hands' poses, with low torques where each carries its share."""
-    from planner.inverse_kinematics import solve_limbs, unreachable
-
     robot = question.stance.robot
     force = robot.mass * gravity / len(poses)
     shares = {

@@ -14,10 +14,10 @@ from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, wrench_transport
 from hand_models.hand import SettledHand
 from planner import dual_bounds, program, stance_data
-from planner.binding import Used, limiting_limit, prices, unit_of, used_limits
+from planner.binding import Used, joint_name, limiting_limit, prices, unit_of, used_limits
 from planner.budget import Budget
 from planner.certificate import Hindered, certify, certify_idle
-from planner.continuation import PROGRAMS, LargestFactor, least_use, most_load
+from planner.continuation import NO_WRENCH, PROGRAMS, LargestFactor, least_use, most_load
 from planner.explain import (
     LEAST_FACTOR,
     NO_FACTOR,
@@ -48,7 +48,6 @@ from planner.posture import Posture, posture
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
 from planner.reading import read_floating_hand, read_hand
-from planner.stance_data import JOINT_TORQUE
 from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
 from planner.verify import problems
 
@@ -56,9 +55,6 @@ __all__ = ["plan"]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
-
-NO_WRENCH: Final = 1e-9
-"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
@@ -111,8 +107,9 @@ class _Answer:
         self.parts = hands
         self.spaces, self.data = hands.sets(hands.at_rest(hands.idle))
         self.wrench = wrench
-        limbs = [hand.limb for hand in question.stance.hands]
-        self.idle_preloads = idle_preloads(limbs, settled, hands.wrists)
+        self.limbs = [hand.limb for hand in question.stance.hands]
+        self.idle = _idle_joints(where, self.limbs)
+        self.idle_preloads = idle_preloads(self.limbs, settled, hands.wrists)
         self.search: Settled | None = None
         self.least_used: Settled | None = None
         self.budget = Budget(PROGRAMS)
@@ -206,12 +203,11 @@ class _Answer:
         self.loads = loads
         self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
         self.utilisation = max(hand.utilisation for hand in self.hands)
-        idle = [used.utilisation for used in self._idle_joints()]
         self.wrong = problems(
             self.question,
             self.settled,
             self.hands,
-            max([self.utilisation, *idle]),
+            self._whole_utilisation,
             self.wrench,
             self.where,
             stance_data.used_effort(self.data, loads),
@@ -254,30 +250,29 @@ class _Answer:
     def _hindered(self, cap: float | None) -> Hindered:
         """Return what a proof is made of: at any utilisation, or within a cap."""
         limits = self.question.limits
-        return Hindered(self.data, self._limbs, self.spaces, self.parts.held, cap, limits)
+        return Hindered(self.data, self.limbs, self.spaces, self.parts.held, cap, limits)
 
-    def _overload(self, idle: Sequence[Used]) -> Certificate | None:
+    def _overload(self) -> Certificate | None:
         """Return the proof that no plan keeps to the cap on the utilisation; None without one.
 
         Of floating hands with their sets linearised at the plan.
         """
         cap = self.question.limits.utilisation
-        unproven = self.search is not None and self.search.found == "unproven"
-        most = max(idle, key=lambda used: used.utilisation, default=None)
-        beyond = [used for used in idle if used.utilisation > cap + SLACK]
+        most = max(self.idle, key=lambda used: used.utilisation, default=None)
+        beyond = [used for used in self.idle if used.utilisation > cap + SLACK]
         if most is not None and beyond and most.utilisation >= self.utilisation:
             alone: bool | None = len(beyond) == 1
             if self.utilisation > cap + SLACK:
-                alone = None if unproven else False
+                alone = None if self._unproven else False
             return certify_idle(most, cap, alone)
-        if unproven:
+        if self._unproven:
             return None
         proof = certify(self._hindered(cap))
         # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
         return replace(proof, sufficient=()) if proof is not None and beyond else proof
 
     def _find_load_factor(self) -> None:
-        if any(used.utilisation > 1.0 + SLACK for used in self._idle_joints()):
+        if any(used.utilisation > 1.0 + SLACK for used in self.idle):
             # a limb without a hand cannot bear itself, whatever the body needs
             return
         if not np.abs(self.data.wrench[:6]).max() > NO_WRENCH:
@@ -317,16 +312,15 @@ class _Answer:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
             else:
                 verified, hands = True, self.hands
-                idle = self._idle_joints()
-                utilisation = max([self.utilisation, *(used.utilisation for used in idle)])
+                utilisation = self._whole_utilisation
                 cap = self.question.limits.utilisation
                 status = "optimal" if utilisation <= cap + SLACK else "overloaded"
                 residual = self._residual(hands)
-                dear = self._prices(idle)
-                limiting, reason = self._explain(utilisation, idle, dear)
-                self._find_path(idle)
+                dear = self._prices()
+                limiting, reason = self._explain(utilisation, dear)
+                self._find_path()
                 if status == "overloaded":
-                    self.certificate = self._overload(idle)
+                    self.certificate = self._overload()
                     reason += overload_sentence(self.certificate, floating=self._floating)
         elif self.certificate is not None:
             status = "infeasible"
@@ -367,29 +361,28 @@ class _Answer:
             time=Times(times.model, times.solve, time.perf_counter() - start),
         )
 
-    def _find_path(self, idle: Sequence[Used]) -> None:
+    def _find_path(self) -> None:
         """Find whether the way from the present tensions, if any are given, is safe."""
         if not self.question.present:
             return
         self.path = tension_path(
             self.data,
-            self._limbs,
+            self.limbs,
             self.spaces,
             self.loads,
             self.question.present,
             self.question.limits.utilisation,
-            idle,
+            self.idle,
         )
         self.path_unknown = self.path is None
 
     def _warnings(self) -> tuple[str, ...]:
         found = warnings(self.question.stance, self.settled)
-        limbs = [hand.limb for hand in self.question.stance.hands]
         cap = self.question.limits.tendon_tension
-        found += (*self.idle_preloads, *strained_preloads(limbs, self.parts.wrists, cap))
+        found += (*self.idle_preloads, *strained_preloads(self.limbs, self.parts.wrists, cap))
         if self.outcome.solved:
             found += tuple(far_wrists(self.hands))
-        if self.search is not None and self.search.found == "unproven":
+        if self._unproven:
             found += (UNPROVEN,)
         if self.path is not None and not self.path.safe:
             found += (unsafe_sentence(self.path),)
@@ -407,7 +400,7 @@ class _Answer:
 
         With floating hands, the best of their sets about the plan.
         """
-        if self.search is not None and self.search.found == "unproven":
+        if self._unproven:
             return []
         data = self.data
         if self.least_used is not None and self.least_effort is not None:
@@ -434,27 +427,19 @@ class _Answer:
         return np.asarray(total)
 
     @property
-    def _limbs(self) -> list[str]:
-        return [hand.limb for hand in self.question.stance.hands]
-
-    @property
     def _floating(self) -> list[str]:
-        pairs = zip(self._limbs, self.parts.wrists, strict=True)
+        pairs = zip(self.limbs, self.parts.wrists, strict=True)
         return [limb for limb, wrist in pairs if wrist is not None]
 
-    def _idle_joints(self) -> list[Used]:
-        """Return how much of their joints' torque limbs without a hand use."""
-        if self.where is None:
-            return []
-        found = []
-        for limb, joints in self.where.joints.items():
-            if limb not in self._limbs:
-                for name, torque, most in zip(
-                    joints.names, joints.gravity, joints.limits, strict=True
-                ):
-                    named = LimitName(limb, None, None, JOINT_TORQUE, name)
-                    found.append(Used(named, abs(float(torque)), float(most)))
-        return found
+    @property
+    def _unproven(self) -> bool:
+        """Whether a search for floating wrists ended without proof."""
+        return self.search is not None and self.search.found == "unproven"
+
+    @property
+    def _whole_utilisation(self) -> float:
+        """The largest of the hands, and of the joints of limbs without one."""
+        return max([self.utilisation, *(used.utilisation for used in self.idle)])
 
     def _joint_torque(self, hands: Sequence[HandPlan] | None) -> dict[str, Array] | None:
         """Return the torques of all joints [N·m], as the hands' wrenches make them."""
@@ -466,11 +451,9 @@ class _Answer:
             for limb, joints in self.where.joints.items()
         }
 
-    def _explain(
-        self, utilisation: float, idle: Sequence[Used], dear: Sequence[Price]
-    ) -> tuple[LimitName | None, str]:
+    def _explain(self, utilisation: float, dear: Sequence[Price]) -> tuple[LimitName | None, str]:
         """Return the limit with the largest utilisation, and a sentence about it."""
-        used = [*used_limits(self._limbs, self.spaces, self.loads), *idle]
+        used = [*used_limits(self.limbs, self.spaces, self.loads), *self.idle]
         most = limiting_limit(used, utilisation, dear)
         if most is None:
             return None, "nothing limits this stance"
@@ -481,18 +464,28 @@ class _Answer:
             sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
         return most.name, sentence
 
-    def _prices(self, idle: Sequence[Used]) -> tuple[Price, ...]:
+    def _prices(self) -> tuple[Price, ...]:
         """Return what more of each limit that binds would take off the utilisation."""
-        most = max(idle, key=lambda used: used.utilisation, default=None)
+        most = max(self.idle, key=lambda used: used.utilisation, default=None)
         if most is not None and most.utilisation > self.utilisation + SLACK:
             # a limb without a hand bears the most: nothing else counts
             price = most.utilisation / most.capacity
             return (Price(most.name, price, unit_of(most.name.limit)),)
         duals, value = self.outcome.limit_duals, self.outcome.value
-        return prices(self._limbs, self.spaces, duals, value)
+        return prices(self.limbs, self.spaces, duals, value)
 
     def _effort_prices(self) -> tuple[Price, ...] | None:
         """Return what more of each limit that binds would take off the effort."""
         if self.least_effort is None:
             return None
-        return prices(self._limbs, self.spaces, self.least_effort.limit_duals, self.cap)
+        return prices(self.limbs, self.spaces, self.least_effort.limit_duals, self.cap)
+
+
+def _idle_joints(where: Posture | None, limbs: Sequence[str]) -> list[Used]:
+    """Return how much of their joints' torque limbs without a hand use."""
+    return [
+        Used(joint_name(limb, name), abs(float(torque)), float(most))
+        for limb, joints in ({} if where is None else where.joints).items()
+        if limb not in limbs
+        for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)
+    ]

@@ -27,6 +27,7 @@ __all__ = [
     "HandData",
     "Shape",
     "StanceData",
+    "beyond",
     "body_wrench",
     "used_effort",
 ]
@@ -190,6 +191,16 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
     """Return the scaled balance that the hands' loads y give, shape (nb,)."""
     parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
     return np.asarray(sum(parts, start=np.zeros_like(data.wrench)))
+
+
+def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
+    """Return by how much loads y exceed limits at a cap, or break hard rows, scaled; at least 0."""
+    worst = 0.0
+    for hand, y in zip(data.hands, loads, strict=True):
+        z = y / hand.unit
+        worst = max(worst, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
+        worst = max(worst, float((hand.H @ z - hand.h).max(initial=0.0)))
+    return worst
 
 
 def used_effort(data: StanceData, loads: Sequence[Array]) -> float:

@@ -211,9 +211,5 @@ def _least(data: StanceData, still: float) -> float | None:
 def _holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
     """Whether loads balance, and keep to hard rows and to limits at the cap."""
     error = np.abs(stance_data.body_wrench(data, loads) - data.wrench).max()
-    beyond = 0.0
-    for hand, y in zip(data.hands, loads, strict=True):
-        z = y / hand.unit
-        beyond = max(beyond, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
-        beyond = max(beyond, float((hand.H @ z - hand.h).max(initial=0.0)))
-    return bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max()))) and beyond <= SLACK
+    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
+    return balances and stance_data.beyond(data, loads, cap) <= SLACK

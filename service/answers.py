@@ -29,7 +29,7 @@ from planner.plan import (
 from service import replies
 from service.replies import AXES
 
-__all__ = ["plan_reply", "wrench_space_reply"]
+__all__ = ["limit_reply", "plan_reply", "vector", "wrench_space_reply"]
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
@@ -48,12 +48,12 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         status=answer.status,
         reason=answer.reason,
         warnings=list(answer.warnings),
-        body_wrench=_vector(answer.body_wrench),
+        body_wrench=vector(answer.body_wrench),
         utilisation=_number(answer.utilisation),
         effort=_number(answer.effort),
         load_factor=_number(answer.load_factor),
         load_factor_unbounded=answer.load_factor_unbounded,
-        limiting=None if answer.limiting is None else _limit(answer.limiting),
+        limiting=None if answer.limiting is None else limit_reply(answer.limiting),
         hands=None if answer.hands is None else [_hand(h, model) for h in answer.hands],
         joints=_by_limb(answer.joints),
         joint_torque=_by_limb(answer.joint_torque),
@@ -61,7 +61,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         prices=_prices(answer.prices),
         effort_prices=_prices(answer.effort_prices),
         certificate=_certificate(answer, model),
-        residual=None if answer.residual is None else _vector(answer.residual),
+        residual=None if answer.residual is None else vector(answer.residual),
         path=None if answer.path is None else _path(answer.path),
         verified=answer.verified,
         solver=replies.Solver(
@@ -109,10 +109,10 @@ def wrench_space_reply(
                 phalanx=tile.phalanx,
                 contact=tile.contact,
                 stop=_stop(settled, tile),
-                position=_vector(position),
-                shear_axis=_vector(axes[0]),
-                normal_axis=_vector(axes[1]),
-                lateral_axis=_vector(axes[2]),
+                position=vector(position),
+                shear_axis=vector(axes[0]),
+                normal_axis=vector(axes[1]),
+                lateral_axis=vector(axes[2]),
             )
             for tile, position, axes in zip(
                 settled.tiles, settled.positions, settled.axes, strict=True
@@ -157,19 +157,20 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
     faces = space.half_spaces()
     return replies.HalfSpaces(
         _vectors(faces.normals),
-        _vector(faces.offsets),
+        vector(faces.offsets),
         replies.HalfSpaceEquations(
-            _vectors(faces.equation_normals), _vector(faces.equation_offsets)
+            _vectors(faces.equation_normals), vector(faces.equation_offsets)
         ),
     )
 
 
-def _vector(values: Array) -> list[float]:
+def vector(values: Array) -> list[float]:
+    """Return an array as it travels."""
     return [float(value) for value in values]
 
 
 def _vectors(values: Array) -> list[list[float]]:
-    return [_vector(row) for row in values]
+    return [vector(row) for row in values]
 
 
 def _number(value: float | None) -> float | None:
@@ -177,7 +178,8 @@ def _number(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
-def _limit(name: LimitName) -> replies.LimitName:
+def limit_reply(name: LimitName) -> replies.LimitName:
+    """Return a limit's name as it travels."""
     return replies.LimitName(
         limb=name.limb,
         finger=name.finger,
@@ -205,7 +207,7 @@ def _prices(prices: Iterable[Price] | None) -> list[replies.Price] | None:
 
 
 def _by_limb(values: Mapping[str, Array] | None) -> dict[str, list[float]] | None:
-    return None if values is None else {limb: _vector(value) for limb, value in values.items()}
+    return None if values is None else {limb: vector(value) for limb, value in values.items()}
 
 
 def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
@@ -215,19 +217,19 @@ def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
         return None
     return replies.Certificate(
         utilisation=_number(proof.utilisation),
-        direction=_vector(proof.direction),
-        held={limb: _vector(part) for limb, part in proof.held.items()},
+        direction=vector(proof.direction),
+        held={limb: vector(part) for limb, part in proof.held.items()},
         supremum=float(proof.supremum),
         needed=float(proof.needed),
-        shortfall=None if proof.shortfall is None else _vector(proof.shortfall),
-        nearest=None if proof.nearest is None else _vector(proof.nearest),
-        blocking=[_limit(name) for name in proof.blocking],
+        shortfall=None if proof.shortfall is None else vector(proof.shortfall),
+        nearest=None if proof.nearest is None else vector(proof.nearest),
+        blocking=[limit_reply(name) for name in proof.blocking],
         irreducible=None
         if proof.irreducible is None
-        else [_limit(name) for name in proof.irreducible],
+        else [limit_reply(name) for name in proof.irreducible],
         sufficient=None
         if proof.sufficient is None
-        else [_limit(name) for name in proof.sufficient],
+        else [limit_reply(name) for name in proof.sufficient],
         wrench_spaces={limb: _wrench_set(space) for limb, space in proof.spaces.items()}
         if model and answer.hands is None
         else UNSET,
@@ -240,7 +242,7 @@ def _path(path: TensionPath) -> replies.TensionPath:
         safe_part=float(path.safe_part),
         utilisation_at_present=_number(path.utilisation_at_present),
         largest_change=float(path.largest_change),
-        limiting=[_limit(name) for name in path.limiting],
+        limiting=[limit_reply(name) for name in path.limiting],
     )
 
 
@@ -248,7 +250,7 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
     palm = part.palm
     return replies.Hand(
         limb=part.limb,
-        wrench=_vector(part.wrench),
+        wrench=vector(part.wrench),
         fingers=[
             replies.Finger(
                 name=finger.name,
@@ -261,9 +263,9 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
             for finger in part.fingers
         ],
         palm=replies.Palm(
-            position=_vector(palm.position),
-            force=_vector(palm.force),
-            moment=_vector(palm.moment),
+            position=vector(palm.position),
+            force=vector(palm.force),
+            moment=vector(palm.moment),
             engaged=[int(tile) for tile in palm.engaged],
             utilisation=float(palm.utilisation),
         ),
@@ -278,14 +280,14 @@ def _tile(tile: TileLoad, model: bool) -> replies.Tile:
     return replies.Tile(
         phalanx=tile.phalanx,
         contact=tile.contact,
-        position=_vector(tile.position),
-        force=_vector(tile.force),
+        position=vector(tile.position),
+        force=vector(tile.force),
         shear=float(tile.shear),
         normal=float(tile.normal),
         lateral=float(tile.lateral),
-        shear_axis=_vector(tile.shear_axis),
-        normal_axis=_vector(tile.normal_axis),
-        lateral_axis=_vector(tile.lateral_axis),
+        shear_axis=vector(tile.shear_axis),
+        normal_axis=vector(tile.normal_axis),
+        lateral_axis=vector(tile.lateral_axis),
         utilisation=float(tile.utilisation),
         load_at_zero=_law(tile.load_at_zero, model),
         load_per_newton=_law(tile.load_per_newton, model),
@@ -296,7 +298,7 @@ def _tile(tile: TileLoad, model: bool) -> replies.Tile:
 
 
 def _law(loads: Array | None, model: bool) -> list[float] | UnsetType:
-    return _vector(loads) if model and loads is not None else UNSET
+    return vector(loads) if model and loads is not None else UNSET
 
 
 def _wrist(wrist: WristPlan | None) -> replies.Wrist:
@@ -304,7 +306,7 @@ def _wrist(wrist: WristPlan | None) -> replies.Wrist:
         return replies.Wrist(mode="fixed")
     return replies.Wrist(
         mode="floating",
-        twist=_vector(wrist.twist),
+        twist=vector(wrist.twist),
         palm=wrist.palm,
         rounds=wrist.rounds,
         error=float(wrist.error),
@@ -322,7 +324,7 @@ def _both_signs(plane: HalfPlane) -> list[list[float]]:
 def _seating(seating: Seating) -> replies.Seating:
     pose = seating.pose
     return replies.Seating(
-        seating.rule, replies.PlacedFrame(_vector(pose.position), _vector(pose.quaternion()))
+        seating.rule, replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
     )
 
 
@@ -331,9 +333,9 @@ def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
     constants = np.concatenate([space.l0, np.zeros(len(space.h))])
     capacities = np.concatenate([space.s, space.h])
     return replies.WrenchSet(
-        origin=_vector(space.origin),
+        origin=vector(space.origin),
         generators=[
-            replies.Generator(name, _vector(column))
+            replies.Generator(name, vector(column))
             for name, column in zip(space.columns, space.generators.T, strict=True)
         ],
         rows=[
@@ -344,7 +346,7 @@ def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
                 phalanx=row.phalanx,
                 limit=row.limit,
                 joint=row.joint,
-                coefficients=_vector(a),
+                coefficients=vector(a),
                 constant=float(constant),
                 capacity=float(capacity),
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from hand_models.frames import Array
 from planner.body_space import COMPONENTS, BodySpace, End, Section
 from planner.plan import LimitName
 from service import replies
+from service.answers import limit_reply, vector
 from service.own_robot import ROBOTS, Robots
 from service.questions import question
 from service.replies import BodySpaceReply
@@ -91,7 +91,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         robot=asked.stance.robot.name,
         status=space.plan.status,
         reason=space.plan.reason,
-        body_wrench=_vector(space.needed),
+        body_wrench=vector(space.needed),
         utilisation=space.plan.utilisation,
         exact=space.exact,
         error=error,
@@ -148,8 +148,8 @@ def _section(section: Section) -> replies.BodySection:
     return replies.BodySection(
         axes=list(section.axes),
         others=section.others,
-        inner=[] if polygon is None else [_vector(corner) for corner in polygon.inner],
-        outer=[] if polygon is None else [_vector(corner) for corner in polygon.outer],
+        inner=[] if polygon is None else [vector(corner) for corner in polygon.inner],
+        outer=[] if polygon is None else [vector(corner) for corner in polygon.outer],
         gap=None if polygon is None else polygon.gap,
         limiting=[] if polygon is None else [_limit(name) for name in polygon.limiting],
     )
@@ -173,7 +173,7 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
     if end is None:
         return None
     return replies.Acceleration(
-        direction=_vector(way[-3:]),
+        direction=vector(way[-3:]),
         acceleration=max(end.reach, 0.0),
         limiting=_limit(end.limiting),
     )
@@ -187,11 +187,7 @@ def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
 
 
 def _limit(name: LimitName | None) -> replies.LimitName | None:
-    return None if name is None else replies.LimitName(**asdict(name))
-
-
-def _vector(values: Array) -> list[float]:
-    return [float(value) for value in values]
+    return None if name is None else limit_reply(name)
 
 
 # For a person -----------------------------------------------------------------------------------
