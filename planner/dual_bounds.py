@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from hand_models.frames import Array
-from planner.program import Outcome
+from planner.program import TIE, Outcome, tie_weight
 from planner.stance_data import StanceData
 
-__all__ = ["least_bound", "least_effort_bound"]
+__all__ = ["least_bound", "least_effort_bound", "unique_bound"]
 
 STATIONARY: Final = 1e-5
 """How far multipliers may be from stationary, and below zero, to count as a bound."""
@@ -26,6 +26,27 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
     slopes = [np.zeros(len(hand.unit)) for hand in data.hands]
     leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
     return _dual_bound(data, outcome, slopes, 0.0, leak)
+
+
+def unique_bound(data: StanceData, outcome: Outcome) -> float:
+    """Return a lower bound of the least utilisation from the multipliers of `Unique`.
+
+    Its second term f is convex, so with the plan z₁ and its slope every plan z has
+
+        u ≥ [least of u + ∇f(z₁)·z] + f(z₁) − ∇f(z₁)·z₁ − f(z),
+
+    the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
+    `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
+    """
+    slopes, value = [], 0.0
+    leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
+    weight = tie_weight(data.shape)
+    for hand, y in zip(data.hands, outcome.loads, strict=True):
+        small = hand.tie * y / hand.unit
+        slopes.append(2.0 * weight * hand.tie * small)
+        value -= weight * float(small @ small)
+    value -= TIE * outcome.value**2
+    return _dual_bound(data, outcome, slopes, 0.0, leak) + value
 
 
 def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:

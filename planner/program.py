@@ -8,9 +8,10 @@ wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give
 Below these six rows the balance has one for each component of a hand's wrench that is given
 (`held`). What joints, caps and largest changes of tension say are rows of the hands' sets.
 
-Seven programs share these rows:
+Eight programs share these rows:
 
 =============  =============================================================================
+`Unique`       min u + `TIE` · mean (tension / maximum)²       least utilisation, made unique
 `Margin`       min u                              least utilisation; its duals are the prices
 `Curved`       min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
 `TieBreak`     min Σ (tension / maximum)²         among plans of least utilisation
@@ -23,27 +24,30 @@ Seven programs share these rows:
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
 body wrenches over `WRENCH_UNIT`, limit rows over their capacities. Data enter as whole-block
 parameters (disciplined parametrised programming), so a program depends on the shape of a stance
-only, is built once and solved with new data after.
+only, is compiled once and solved with new data after (`planner.compiled`).
 """
 
 from __future__ import annotations
 
-import threading
-import warnings
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, ClassVar, Final, NamedTuple, Self
 
 import cvxpy as cp
 import numpy as np
 
 from hand_models.frames import Array
+from hand_models.hand import FINGERS
+from planner.compiled import Compiled
 from planner.stance_data import Shape, StanceData
 
 __all__ = [
+    "SETTINGS",
     "SOLVER",
+    "TIE",
     "Curved",
     "Effort",
     "LoadFactor",
@@ -53,6 +57,8 @@ __all__ = [
     "Reach",
     "Reached",
     "TieBreak",
+    "Unique",
+    "tie_weight",
 ]
 
 SOLVER: Final = "CLARABEL"
@@ -63,8 +69,12 @@ UNLIMITED: Final = 1e4
 SLACK: Final = 1e-6
 """What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
 
+TIE: Final = 8e-6
+"""Weight of the mean square of relative tensions beside the utilisation."""
+
 SETTINGS: Final[dict[str, Any]] = {
     "equilibrate_enable": False,
+    "iterative_refinement_enable": False,
     "presolve_enable": False,
     "chordal_decomposition_enable": False,
     "max_threads": 1,
@@ -72,10 +82,16 @@ SETTINGS: Final[dict[str, Any]] = {
     "tol_gap_rel": 1e-9,
     "tol_feas": 1e-9,
 }
-"""One physical scaling instead of equilibration; see the solver's documentation for the rest."""
+"""One physical scaling instead of equilibration, and no refinement of solutions that are good."""
 
-CAREFUL: Final[dict[str, Any]] = {"max_threads": 1, "warm_start": False}
-"""The solver's own defaults, for a second try, on a new solver: an old one keeps its settings."""
+SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11}
+"""Where a small term of the objective decides."""
+
+REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
+"""For a second try."""
+
+CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
+"""The solver's own defaults, for a third."""
 
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
@@ -89,14 +105,15 @@ class Outcome:
     solved : bool
         Whether the solver says so; the plan is checked apart from it.
     status : str
-        CVXPY's word.
+        CVXPY's word, or `planner.compiled.OUT_OF_TIME`.
     iterations : int
     value : float
         Objective, NaN if not solved.
     loads : tuple of ndarray
         y of each hand [N], of a floating one [m, rad]; empty if not solved.
     limit_duals, hard_duals : tuple of ndarray
-        Multipliers of each hand's rows; empty if not solved.
+        Multipliers of each hand's rows; where there is no solution, the proof of that. Empty if
+        the solver has neither.
     balance_dual : ndarray or None
         Multipliers of the balance, shape (nb,).
     """
@@ -112,10 +129,11 @@ class Outcome:
 
 
 class _Program(ABC):
-    """A program for one shape of stance. Safe to call from several threads, one at a time."""
+    """A program for one shape of stance, compiled. Safe to call from several threads."""
+
+    settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED, CAREFUL)
 
     def __init__(self, shape: Shape) -> None:
-        self._lock = threading.Lock()
         self.shape = shape
         self.z = [cp.Variable(m) for m, _, _, _ in shape.hands]
         self.G = [cp.Parameter((shape.balance, m)) for m, _, _, _ in shape.hands]
@@ -123,18 +141,28 @@ class _Program(ABC):
         self.l0: list[cp.Parameter] = []
         self.H = [cp.Parameter((nh, m)) for m, _, nh, _ in shape.hands]
         self.h = [cp.Parameter(nh) for _, _, nh, _ in shape.hands]
-        self._units = [np.ones(m) for m, _, _, _ in shape.hands]
         self.offset = cp.Parameter(shape.balance)
         """W − Σ g, or −Σ g where W is scaled apart."""
         self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
         self.hard = [H @ z <= h for H, z, h in zip(self.H, self.z, self.h, strict=True)]
         self.limits: list[cp.Constraint] = []
+        self.own: list[cp.Parameter] = []
+        """Parameters beside the stance's."""
+        self.further: list[cp.Variable] = []
+        """Variables beside the loads whose values are wanted."""
         self.balance: cp.Constraint
         self.problem = self.define()
+        self.compiled = Compiled(
+            self.problem,
+            [*self.G, *self.L, *self.l0, *self.H, *self.h, self.offset, *self.own],
+            [*self.z, *self.further],
+            [self.balance, *self.limits, *self.hard],
+            self.settings,
+        )
 
     @abstractmethod
     def define(self) -> cp.Problem:
-        """Return the problem, with `limits` and `balance` set."""
+        """Return the problem, with `limits`, `balance`, `own` and `further` set."""
 
     @classmethod
     def built(cls, shape: Shape, *further: int) -> Self:
@@ -149,46 +177,41 @@ class _Program(ABC):
         self.l0 = [cp.Parameter(nl) for _, nl, _, _ in self.shape.hands]
         return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
 
-    def _load(self, data: StanceData) -> None:
-        for i, hand in enumerate(data.hands):
-            self.G[i].value = hand.G
-            if self.L:
-                self.L[i].value, self.l0[i].value = hand.L, hand.l0
-            self.H[i].value, self.h[i].value = hand.H, hand.h
-            self._units[i] = hand.unit
-        self.offset.value = data.wrench - sum(hand.g for hand in data.hands)
+    def run(self, data: StanceData, *own: Any) -> tuple[Outcome, list[Array]]:
+        """Solve with the stance's data and the values of `own`.
 
-    def _run(self) -> Outcome:
-        """Solve; where the tuned settings fail, once more with the solver's own."""
-        outcome = Outcome(False, "error", 0, float("nan"))
-        for settings in (SETTINGS, CAREFUL):
-            # a solve that diverges leaves loads whose squares overflow: its value is not finite
-            with warnings.catch_warnings(), np.errstate(over="ignore"):
-                warnings.simplefilter("ignore", UserWarning)
-                try:
-                    self.problem.solve(solver=SOLVER, enforce_dpp=True, **settings)
-                except cp.SolverError:
-                    outcome = Outcome(False, str(cp.SOLVER_ERROR), 0, float("nan"))
-                    continue
-            stats = self.problem.solver_stats
-            iterations = int(stats.num_iters or 0) if stats else 0
-            outcome = Outcome(False, self.problem.status, iterations, float("nan"))
-            if self.problem.status in SOLVED and np.isfinite(self.problem.value):
-                return Outcome(
-                    solved=True,
-                    status=self.problem.status,
-                    iterations=iterations,
-                    value=float(self.problem.value),
-                    loads=tuple(
-                        z.value * unit for z, unit in zip(self.z, self._units, strict=True)
-                    ),
-                    limit_duals=tuple(np.asarray(row.dual_value) for row in self.limits),
-                    hard_duals=tuple(np.asarray(row.dual_value) for row in self.hard),
-                    balance_dual=np.asarray(self.balance.dual_value),
-                )
-            if self.problem.status in (cp.INFEASIBLE, cp.UNBOUNDED):
-                break
-        return outcome
+        Returns
+        -------
+        outcome : Outcome
+        further : list of ndarray
+            Values of the variables `further`; empty where there is no solution.
+        """
+        hands = data.hands
+        limits = [*(hand.L for hand in hands), *(hand.l0 for hand in hands)] if self.L else []
+        values = [
+            *(hand.G for hand in hands),
+            *limits,
+            *(hand.H for hand in hands),
+            *(hand.h for hand in hands),
+            data.offset,
+            *own,
+        ]
+        found = self.compiled.solve(values)
+        solved = found.status in SOLVED and math.isfinite(found.value)
+        duals, first = found.multipliers, 1 + len(self.limits)
+        outcome = Outcome(
+            solved=solved,
+            status=found.status,
+            iterations=found.iterations,
+            value=found.value if solved else math.nan,
+            loads=tuple(z * hand.unit for z, hand in zip(found.variables, hands, strict=False))
+            if solved
+            else (),
+            limit_duals=duals[1:first],
+            hard_duals=duals[first:],
+            balance_dual=duals[0] if duals else None,
+        )
+        return outcome, list(found.variables[len(hands) :]) if solved else []
 
 
 class Margin(_Program):
@@ -202,9 +225,39 @@ class Margin(_Program):
 
     def solve(self, data: StanceData) -> Outcome:
         """Return the plan of least utilisation; ``value`` is that utilisation."""
-        with self._lock:
-            self._load(data)
-            return self._run()
+        return self.run(data)[0]
+
+
+class Unique(_Program):
+    """min u + `TIE` · mean (tension / maximum)²: the plan that is meant, in one solve.
+
+    A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
+    """
+
+    settings = (SHARP, REFINED, CAREFUL)
+
+    def define(self) -> cp.Problem:
+        self.u = cp.Variable()
+        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.own, self.further = [*self.weights], [self.u]
+        self.limits = [row <= self.u for row in self.utilisations()]
+        self.balance = self.reaction == self.offset
+        ties = sum(
+            cp.sum_squares(cp.multiply(weights, z))
+            for weights, z in zip(self.weights, self.z, strict=True)
+        )
+        rows = [self.balance, *self.limits, *self.hard]
+        return cp.Problem(cp.Minimize(self.u + tie_weight(self.shape) * ties), rows)
+
+    def solve(self, data: StanceData) -> Outcome:
+        """Return the plan of least utilisation; ``value`` is that utilisation."""
+        outcome, further = self.run(data, *(hand.tie for hand in data.hands))
+        return replace(outcome, value=float(further[0])) if further else outcome
+
+
+def tie_weight(shape: Shape) -> float:
+    """Return what `Unique` weighs the sum of squares with: `TIE` over the number of tendons."""
+    return TIE / (len(FINGERS) * len(shape.hands))
 
 
 class Curved(_Program):
@@ -215,6 +268,7 @@ class Curved(_Program):
         size = sum(z.shape[0] for z in self.z)
         self.root = cp.Parameter((size, size))
         self.centre = cp.Parameter(size)
+        self.own = [self.root, self.centre]
         self.limits = [row <= self.u for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         bent = cp.sum_squares(self.root @ cp.hstack(self.z) - self.centre)
@@ -223,12 +277,8 @@ class Curved(_Program):
 
     def solve(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
         """Return the plan for the root R (M, M) of the curvature in all hands' z, about their y."""
-        with self._lock:
-            self._load(data)
-            z = [y / hand.unit for hand, y in zip(data.hands, near, strict=True)]
-            self.root.value = root
-            self.centre.value = root @ np.concatenate(z)
-            return self._run()
+        z = [y / hand.unit for hand, y in zip(data.hands, near, strict=True)]
+        return self.run(data, root, root @ np.concatenate(z))[0]
 
 
 class TieBreak(_Program):
@@ -237,6 +287,7 @@ class TieBreak(_Program):
     def define(self) -> cp.Problem:
         self.cap = cp.Parameter()
         self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.own = [self.cap, *self.weights]
         self.limits = [row <= self.cap for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         effort = sum(
@@ -247,14 +298,9 @@ class TieBreak(_Program):
 
     def solve(self, data: StanceData, cap: float) -> Outcome:
         """Return the plan that is meant among those with utilisation at most ``cap``."""
-        with self._lock:
-            self._load(data)
-            self.cap.value = cap
-            # weights relative to the largest: the minimiser does not change
-            largest = max(float(hand.tie.max(initial=0.0)) for hand in data.hands)
-            for parameter, hand in zip(self.weights, data.hands, strict=True):
-                parameter.value = hand.tie / largest
-            return self._run()
+        # weights relative to the largest: the minimiser does not change
+        largest = max(float(hand.tie.max(initial=0.0)) for hand in data.hands)
+        return self.run(data, cap, *(hand.tie / largest for hand in data.hands))[0]
 
 
 class Effort(_Program):
@@ -268,6 +314,7 @@ class Effort(_Program):
         self.E = [cp.Parameter((ne, m)) for m, _, _, ne in self.shape.hands]
         self.e0 = [cp.Parameter(ne) for _, _, _, ne in self.shape.hands]
         self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
+        self.own = [self.cap, *self.E, *self.e0, *self.weights]
         self.limits = [row <= self.cap for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         effort = sum(
@@ -278,13 +325,9 @@ class Effort(_Program):
 
     def solve(self, data: StanceData, cap: float) -> Outcome:
         """Return the plan of least effort among those with utilisation at most ``cap``."""
-        with self._lock:
-            self._load(data)
-            self.cap.value = cap
-            for i, hand in enumerate(data.hands):
-                self.E[i].value, self.e0[i].value = hand.E, hand.e0
-                self.weights[i].value = hand.rest
-            return self._run()
+        hands = data.hands
+        efforts = (*(hand.E for hand in hands), *(hand.e0 for hand in hands))
+        return self.run(data, cap, *efforts, *(hand.rest for hand in hands))[0]
 
 
 class LoadFactor(_Program):
@@ -293,6 +336,7 @@ class LoadFactor(_Program):
     def define(self) -> cp.Problem:
         self.factor = cp.Variable(nonneg=True)
         self.wrench = cp.Parameter(self.shape.balance)
+        self.own = [self.wrench]
         self.limits = [row <= 1.0 for row in self.utilisations()]
         self.balance = self.reaction == self.offset + self.wrench * self.factor
         return cp.Problem(cp.Maximize(self.factor), [self.balance, *self.limits, *self.hard])
@@ -302,11 +346,8 @@ class LoadFactor(_Program):
         body, held = data.wrench.copy(), data.wrench.copy()
         body[6:], held[:6] = 0.0, 0.0
         size = float(np.abs(body).max())
-        with self._lock:
-            self._load(data.turned(held))
-            # of unit size, or a small wrench and its large factor would defeat the solver
-            self.wrench.value = body / size
-            outcome = self._run()
+        # of unit size, or a small wrench and its large factor would defeat the solver
+        outcome, _ = self.run(data.turned(held), body / size)
         return replace(outcome, value=outcome.value / size)
 
 
@@ -323,10 +364,12 @@ class Reach(_Program):
 
     def define(self) -> cp.Problem:
         self.t = cp.Variable(self.directions)
+        self.further = [self.t]
         self.goal = cp.Parameter(self.directions)
         self.cap = cp.Parameter()
         self.B = cp.Parameter((self.shape.balance, self.directions))
         self.K = [cp.Parameter((nl, self.directions)) for _, nl, _, _ in self.shape.hands]
+        self.own = [self.goal, self.B, self.cap, *self.K]
         self.limits = [
             row + K @ self.t <= self.cap for row, K in zip(self.utilisations(), self.K, strict=True)
         ]
@@ -342,15 +385,10 @@ class Reach(_Program):
         K: Sequence[Array] | None = None,
     ) -> Reached:
         """Return the farthest t for the goal c (k,), with B (nb, k) and K (nl, k) of each hand."""
-        with self._lock:
-            self._load(data)
-            self.goal.value, self.B.value, self.cap.value = goal, B, cap
-            for i, hand in enumerate(data.hands):
-                none = np.zeros((len(hand.l0), self.directions))
-                self.K[i].value = none if K is None else K[i]
-            outcome = self._run()
-            t = self.t.value if outcome.solved else None
-        return Reached(outcome, np.full(self.directions, np.nan) if t is None else np.asarray(t))
+        if K is None:
+            K = [np.zeros((len(hand.l0), self.directions)) for hand in data.hands]
+        outcome, further = self.run(data, goal, B, cap, *K)
+        return Reached(outcome, further[0] if further else np.full(self.directions, np.nan))
 
 
 class Reached(NamedTuple):
@@ -382,12 +420,10 @@ class Nearest(_Program):
 
     def solve(self, data: StanceData) -> Outcome:
         """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""
-        with self._lock:
-            self._load(data)
-            return self._run()
+        return self.run(data)[0]
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _built(kind: type[_Program], shape: Shape, *further: int) -> _Program:
     return kind(shape, *further)
 
@@ -395,6 +431,11 @@ def _built(kind: type[_Program], shape: Shape, *further: int) -> _Program:
 def margin(data: StanceData) -> Outcome:
     """Solve `Margin`, built once for each shape."""
     return Margin.built(data.shape).solve(data)
+
+
+def unique(data: StanceData) -> Outcome:
+    """Solve `Unique`, built once for each shape."""
+    return Unique.built(data.shape).solve(data)
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:

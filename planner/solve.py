@@ -115,6 +115,8 @@ class _Answer:
         self.budget = Budget(PROGRAMS)
         self.known_factor: LargestFactor | None = None
         self.outcome: Outcome
+        self.bound: float | None = None
+        """Of the least utilisation, from below, where it is known already."""
         self.loads: tuple[Array, ...] = ()
         self.hands: tuple[HandPlan, ...] = ()
         self.least_effort: Outcome | None = None
@@ -135,8 +137,7 @@ class _Answer:
         if self.parts.floating:
             self._settle_wrists()
         else:
-            self.outcome = program.margin(self.data)
-            self._settle_tie()
+            self._settle_fixed()
         self._settle_effort()
         if not self.outcome.solved or self.wrong:
             self._look_again()
@@ -158,6 +159,23 @@ class _Answer:
         self.search = found
         self.spaces, self.data = found.sets
         self._take(found.point.loads)
+
+    def _settle_fixed(self) -> None:
+        """Take the plan of least utilisation: in one solve, if it proves to be as good as two."""
+        self.outcome = program.unique(self.data)
+        if self.outcome.solved:
+            self._take(self.outcome.loads)
+            if not self.wrong:
+                self.bound = dual_bounds.unique_bound(self.data, self.outcome)
+                used = self.outcome.value
+                if used - self.bound <= OPTIMAL * max(1.0, used):
+                    return
+        self._settle_in_two()
+
+    def _settle_in_two(self) -> None:
+        """Take the plan of least effort among those of the very least utilisation."""
+        self.outcome, self.bound = program.margin(self.data), None
+        self._settle_tie()
 
     def _settle_tie(self) -> None:
         """Take the plan of least effort among those of least utilisation."""
@@ -235,8 +253,7 @@ class _Answer:
             # rounding put the wrench a hair outside: plan for the nearest that can be had
             inside = stance_data.body_wrench(self.data, nearest.loads)
             self.data = self.data.turned(inside)
-            self.outcome = program.margin(self.data)
-            self._settle_tie()
+            self._settle_in_two()
             self._settle_effort()
 
     @property
@@ -406,7 +423,9 @@ class _Answer:
         if self.least_used is not None and self.least_effort is not None:
             # of these sets, which are about another point, the outcome is
             data = self.least_used.sets.data
-        bound = dual_bounds.least_bound(data, self.outcome)
+        bound = self.bound
+        if bound is None:
+            bound = dual_bounds.least_bound(data, self.outcome)
         used = self.utilisation if self.least_effort is None else self.outcome.value
         if used - bound > OPTIMAL * max(1.0, used):
             return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]

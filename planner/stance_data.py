@@ -178,6 +178,11 @@ class StanceData:
         """What a program is built for."""
         return Shape(len(self.wrench), tuple(hand.shape for hand in self.hands))
 
+    @property
+    def offset(self) -> Array:
+        """What the loads' part of the balance is to give, W − Σ g, shape (nb,)."""
+        return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
+
     def capped(self, utilisation: float) -> StanceData:
         """Return the stance with limits at a utilisation as hard rows, and no others."""
         return StanceData(tuple(hand.capped(utilisation) for hand in self.hands), self.wrench)

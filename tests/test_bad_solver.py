@@ -24,11 +24,11 @@ def honest_outcome() -> Outcome:
         found["outcome"] = original(data)
         return found["outcome"]
 
-    original, program.margin = program.margin, keep
+    original, program.unique = program.unique, keep
     try:
         plan(QUESTION)
     finally:
-        program.margin = original
+        program.unique = original
     return found["outcome"]
 
 
@@ -48,7 +48,8 @@ LIES = {
 @pytest.mark.parametrize("lie", LIES.values(), ids=LIES.keys())
 def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
     outcome = lie(honest_outcome())
-    monkeypatch.setattr(program, "margin", lambda data: outcome)
+    for name in ("unique", "margin"):
+        monkeypatch.setattr(program, name, lambda data: outcome)
     answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
     assert answer.status == "failed"
     assert not answer.verified
@@ -81,7 +82,8 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 ):
     question, loads = gently(tension, hold, closing_tension)
     lie = replace(honest_outcome(), value=-1.0, loads=loads)
-    monkeypatch.setattr(program, "margin", lambda data: lie)
+    for name in ("unique", "margin"):
+        monkeypatch.setattr(program, name, lambda data: lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is
     truth = plan(question)
     assert truth.status == "infeasible"
@@ -96,7 +98,8 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 @pytest.mark.parametrize("word", ["infeasible", "user_limit", "solver_error"])
 def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
     nothing = Outcome(False, word, 0, float("nan"))
-    monkeypatch.setattr(program, "margin", lambda data: nothing)
+    for name in ("unique", "margin"):
+        monkeypatch.setattr(program, name, lambda data: nothing)
     answer = plan(QUESTION)
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -117,7 +120,8 @@ def test_a_distance_that_is_made_up_gets_no_certificate(monkeypatch):
     """Both programs lie that a stance that can be balanced is infeasible."""
     loads = tuple(0.0 * y for y in honest_outcome().loads)
     far = Outcome(True, "optimal", 1, 3.0, loads=loads)
-    monkeypatch.setattr(program, "margin", lambda d: Outcome(False, "infeasible", 0, float("nan")))
+    for name in ("unique", "margin"):
+        monkeypatch.setattr(program, name, lambda d: Outcome(False, "infeasible", 0, float("nan")))
     monkeypatch.setattr(program, "nearest", lambda data: far)
     answer = plan(QUESTION)
     assert answer.status == "failed"

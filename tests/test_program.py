@@ -26,6 +26,7 @@ AGREE = 1e-5
 KINDS = (
     program.Margin,
     program.TieBreak,
+    program.Unique,
     program.Effort,
     program.LoadFactor,
     program.Nearest,
@@ -96,7 +97,7 @@ def test_stances_of_one_shape_share_their_programs():
     plan(ask(on_wall(overhang=0.1, off=0.25), "load_factor"))
     after = program._built.cache_info()
     assert after.misses == before.misses
-    assert after.hits == before.hits + 3
+    assert after.hits == before.hits + 2
 
 
 def test_a_program_remembers_nothing_of_the_question_before():
@@ -138,7 +139,7 @@ def test_among_the_optima_the_plan_has_the_least_effort(question):
     maximum = question.stance.robot.hand.maximum_tension
     column_names = [name for space in peer.spaces(question) for name in space.columns]
     is_tension = np.array([name.endswith("/tension") for name in column_names])
-    cap = answer.utilisation
+    cap = answer.utilisation + 1e-6
     size, unit = maximum, np.array([300.0] * 3 + [30.0] * 3)
 
     def effort(y):
