@@ -19,15 +19,16 @@ with the fingernail's pulley r_n and angle ψ.
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
+from typing import TypeVar
 
 from hand_models.errors import InvalidInputError
-from hand_models.finger import SettledFinger
 from hand_models.frames import Array
 from hand_models.parameters import ParameterTable
 
 __all__ = ["TendonDrive"]
+
+T = TypeVar("T", float, Array)
+"""One tendon's number, or an array of several's."""
 
 
 @dataclass(frozen=True)
@@ -111,23 +112,18 @@ class TendonDrive:
         """(I − I_0) / f [A/N]."""
         return self.torque_per_newton / self.torque_constant
 
-    def torque(self, tension: float) -> float:
+    def torque(self, tension: T) -> T:
         """Return the motor's torque τ that tightens a tendon to a tension [N·m]."""
         return tension * self.torque_per_newton
 
-    def current(self, tension: float) -> float:
+    def current(self, tension: T) -> T:
         """Return the current I that the motor draws then [A]."""
         return tension * self.current_per_newton + self.no_load_current
 
     def winch_angle(
-        self,
-        finger: SettledFinger,
-        tension: float,
-        shears: Array,
-        losses: Array,
-        nail_drawn: float = 0.0,
-    ) -> float:
-        """Return how far the winch turns from the open finger to a tension [rad].
+        self, joints: T, tension: T, shears: T, losses: T, nail_drawn: T | float = 0.0
+    ) -> T:
+        """Return how far winches turn from the open finger to a tension [rad].
 
         The open finger is straight (q = 0), its tiles at rest. The motor turns ``gear_ratio`` times
         as far. A tile's end stop is not published and none is modelled, so a tile that touches
@@ -135,16 +131,15 @@ class TendonDrive:
 
         Parameters
         ----------
-        finger : SettledFinger
-        tension : float
+        joints : float or ndarray
+            Σ r_i q_i of each finger [m].
+        tension : float or ndarray
             f [N].
-        shears, losses : ndarray, shape (n,)
-            T [N] and the diagonal of M (Eq. 8) of each of the tendon's tiles, the base tile's
-            first if there is one.
-        nail_drawn : float, optional
+        shears, losses : float or ndarray
+            T [N] and the diagonal of M (Eq. 8), each summed over the tendon's tiles, the base
+            tile's too if there is one.
+        nail_drawn : float or ndarray, optional
             r_n ψ of the fingernail [m].
         """
-        joints = float(np.asarray(finger.model.pulley_radii) @ finger.joint_angles)
         travel = (self.pulley_ratio * losses * tension - shears) / self.tile_stiffness
-        drawn = nail_drawn + joints + self.pulley_ratio * float(travel.sum())
-        return drawn / self.winch_radius
+        return (nail_drawn + joints + self.pulley_ratio * travel) / self.winch_radius

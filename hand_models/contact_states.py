@@ -10,46 +10,58 @@ drawn in as possible (`close`).
 
 A joint that balances without contact does so at the closing tension; at others it is taken as
 locked where it is, one link like a joint at its limit.
+
+All fingers, and all states that are tried, go through the same arithmetic on arrays together
+(`hand_models.postures`, `hand_models.posture_loads`); where phalanges balance `hand_models.swings`
+finds.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.finger import FingerModel, SettledFinger
-from hand_models.frames import Array
+from hand_models.frames import Array, Indices
+from hand_models.laying import NONE
+from hand_models.limit_postures import OPEN_FIRST, PATTERNS, at_limits
+from hand_models.mixed_rows import section_rows
+from hand_models.posture_loads import Loads, Tendons, loads, stay, turns
+from hand_models.postures import Postures, are_clear, settle
+from hand_models.section_rows import Flags
 from hand_models.sections import Section
-from hand_models.settling import (
-    JOINTS,
-    OPEN_FIRST,
-    PATTERNS,
-    held,
-    is_clear,
-    posture,
-    settle,
-    straight,
-)
+from hand_models.settling import JOINTS, straight
 from hand_models.spines import Surface
+from hand_models.swings import Swings
 
-__all__ = ["ClosedFinger", "cling", "close", "stays"]
+__all__ = ["ClosedFinger", "Closing", "cling", "close", "close_all"]
 
-SWINGS: Final = 17
-"""Angles at which a phalanx without contact is tried."""
+NOTHING: Final = (-1, 0.0)
+"""Contacts, and tendon drawn in [m], before any state has been found to stay."""
 
-HALVINGS: Final = 11
-"""Of the interval between them."""
 
-UNBALANCED: Final = 1e-3
-"""Torque that may be left at a joint that balances without contact, about half a percent of a
-tendon's [N·m]."""
+class Closing(NamedTuple):
+    """A finger that is to close.
 
-BALANCED: Final = 1e-9
-"""How much torque a stop may seem to pull, by rounding [N·m]."""
+    Attributes
+    ----------
+    section : Section or None
+        Rock in the finger's plane, the proximal joint at its origin.
+    surface : Surface
+        What the tiles hold.
+    tension : float
+        At which the tiles catch the rock [N].
+    base_tile : bool
+        Whether a base tile comes first on the tendon.
+    """
+
+    section: Section | None
+    surface: Surface
+    tension: float
+    base_tile: bool = False
 
 
 class ClosedFinger(NamedTuple):
@@ -82,182 +94,142 @@ def close(
     closing_tension: float,
     base_tile: bool = False,
 ) -> ClosedFinger | None:
-    """Close a finger on the rock, and find the contact state in which it stays.
+    """Close one finger; see `close_all`."""
+    return close_all(model, [Closing(section, surface, closing_tension, base_tile)])[0]
+
+
+def close_all(model: FingerModel, closings: Sequence[Closing]) -> list[ClosedFinger | None]:
+    """Close fingers on the rock, and find the contact states in which they stay.
 
     Parameters
     ----------
     model : FingerModel
-    section : Section or None
-        Rock in the finger's plane, the proximal joint at its origin.
-    surface : Surface
-        What the tiles hold.
-    closing_tension : float
-        At which the tiles catch the rock [N].
-    base_tile : bool, optional
-        Whether a base tile comes first on the tendon.
+    closings : sequence of Closing
 
     Returns
     -------
-    ClosedFinger or None
+    list of ClosedFinger or None
         With all three phalanges on the rock if they stay there. If no state balances at the
         closing tension, the bottom-up one as long as some tension keeps its tiles dragged forward
         and its stops pushing (a tile may be beyond its limit then), or else the open finger. None
         if the finger stands in rock wherever its joints turn.
     """
-
-    def loaded(finger: SettledFinger | None) -> ClosedFinger | None:
-        if finger is None:
-            return None
-        shears = finger.shears(closing_tension, base_tile)
-        try:
-            normals = finger.normals(shears, base_tile)
-        except np.linalg.LinAlgError:
-            return None
-        torques = finger.stop_torques(shears, normals, base_tile)
-        return ClosedFinger(finger, shears, normals, torques)
-
-    def staying(finger: SettledFinger | None, pressed: bool = False) -> ClosedFinger | None:
-        closed = loaded(finger)
-        if closed is None or not stays(closed, surface, closing_tension, pressed=pressed):
-            return None
-        return closed if is_clear(closed.finger, section) else None
-
-    first = settle(model, section, (0.0, 0.0))
-    closed = staying(first)
-    if closed is not None and len(first.bearing) == JOINTS:
-        return closed
-    # the search for other states goes over a sketch; what it finds is laid on the rock itself
-    sketch = None if section is None else section.sketch(model.reach)
-    states = [] if closed is None else [closed]
-    if section is not None and sketch is not None:
-        for i, angle in _balances(model, sketch, loaded, closing_tension):
-            closed = staying(held(model, section, first.contacts[:i], angle))
-            states += [closed] if closed is not None else []
-    if not any(state.finger.bearing for state in states):
-        states += _at_limits(model, section, sketch, staying)
-    if states:
-        return max(states, key=_hold)
-    closed = loaded(first)
-    if closed is not None and is_clear(first, section) and _tensions(closed):
-        return closed
-    return loaded(next((f for p in OPEN_FIRST if (f := posture(model, section, p))), None))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _Search(model, closings).results()
 
 
-def _at_limits(
-    model: FingerModel,
-    section: Section | None,
-    sketch: Section | None,
-    staying: Callable[[SettledFinger | None, bool], ClosedFinger | None],
-) -> list[ClosedFinger]:
-    """Return the states with joints at their limits that stay, of those with most contacts."""
-    for _, patterns in itertools.groupby(PATTERNS, lambda pattern: len(pattern.bearing)):
-        found = [p for p in patterns if staying(posture(model, sketch, p), True) is not None]
-        states = [state for p in found if (state := staying(posture(model, section, p), True))]
-        if states:
-            return states
-    return []
+class _Tried(NamedTuple):
+    """Contact states that have been tried, one a column.
+
+    Attributes
+    ----------
+    of : ndarray of int, shape (n,)
+        Whose they are.
+    fingers : Postures
+    loads : Loads
+    stays : ndarray of bool, shape (n,)
+    """
+
+    of: Indices
+    fingers: Postures
+    loads: Loads
+    stays: Flags
+
+    def closed(self, model: FingerModel, column: int) -> ClosedFinger:
+        """Return one of them."""
+        loads = (value[..., column].copy() for value in self.loads)
+        return ClosedFinger(self.fingers.finger(model, column), *loads)
 
 
-def stays(closed: ClosedFinger, surface: Surface, tension: float, *, pressed: bool = False) -> bool:
-    """Whether no contact breaks at a tension, and no joint leaves its limit.
-
-    A contact breaks where its tile is pulled off beyond its limit curve; a bare frame only presses.
-    A tile that slips under shear keeps its contact.
+class _Search:
+    """The search for the contact states of some fingers.
 
     Parameters
     ----------
-    closed : ClosedFinger
-    surface : Surface
-    tension : float
-        [N]
-    pressed : bool, optional
-        Whether tiles may only press as well: spines that were not on the rock before are not
-        engaged by pulling.
+    model : FingerModel
+    closings : sequence of Closing
     """
-    finger = closed.finger
-    powers = np.array([1.0, tension])
-    shears, normals, torques = (
-        closed.shears @ powers,
-        closed.normals @ powers,
-        closed.torques @ powers,
-    )
-    for contact, torque in zip(finger.contacts, torques.tolist(), strict=True):
-        if contact.stop == "upper" and torque < -BALANCED:
-            return False
-        if contact.stop == "lower" and torque > BALANCED:
-            return False
-        if contact.stop == "balance" and abs(torque) > UNBALANCED:
-            return False
-    for i in finger.bearing:
-        if normals[i] >= 0.0:
-            continue
-        if pressed or not finger.touching[i] or shears[i] < 0.0:
-            return False
-        held = float(surface.strength(math.atan2(-normals[i], shears[i])))
-        if shears[i] <= surface.shear_limit and math.hypot(shears[i], normals[i]) > held:
-            return False
-    return True
+
+    def __init__(self, model: FingerModel, closings: Sequence[Closing]) -> None:
+        self._model = model
+        self._rock = section_rows([closing.section for closing in closings])
+        self._tendons = Tendons.of(
+            model,
+            [closing.tension for closing in closings],
+            [closing.base_tile for closing in closings],
+            [closing.surface for closing in closings],
+        )
+        self._in_air = [closing.section is None for closing in closings]
+        self._hold = [NOTHING] * len(closings)
+        self._found: list[ClosedFinger | None] = [None] * len(closings)
+
+    def results(self) -> list[ClosedFinger | None]:
+        """Return the fingers at rest."""
+        everyone = np.arange(len(self._found))
+        first = self._tried(everyone, settle(self._model, self._rock, len(everyone)))
+        self._offer(first)
+        # a closed finger in the air cannot hold more
+        most = [0 if in_air else JOINTS for in_air in self._in_air]
+        searching = [i for i, (contacts, _) in enumerate(self._hold) if contacts < most[i]]
+        if searching:
+            pulls = first.loads.at(self._tendons.closing).normals
+            swings = Swings(self._model, self._rock, self._tendons, first.fingers, pulls)
+            self._offer(self._tried(*swings.balances(searching)))
+        idle = [i for i in searching if self._hold[i][0] <= 0]
+        if idle:
+            self._turn_to_limits(idle, first)
+        return self._found
+
+    def _tried(self, of: Indices, fingers: Postures) -> _Tried:
+        """Load fingers in some state, and find out whether they stay there."""
+        rock, tendons = self._rock.take(of), self._tendons.take(of)
+        loaded = loads(self._model, fingers, tendons)
+        stays = stay(fingers, loaded, tendons)
+        if stays.any():
+            stays &= are_clear(self._model, rock, fingers)
+        return _Tried(of, fingers, loaded, stays)
+
+    def _offer(self, tried: _Tried) -> None:
+        """Take states that stay: contacts count first, then tendon drawn in."""
+        contacts = (tried.fingers.kinds != NONE).sum(axis=0)
+        drawn = np.array(self._model.pulley_radii) @ turns(tried.fingers)
+        for column in np.flatnonzero(tried.stays).tolist():
+            of, hold = int(tried.of[column]), (int(contacts[column]), float(drawn[column]))
+            if hold > self._hold[of]:
+                self._hold[of] = hold
+                self._found[of] = tried.closed(self._model, column)
+
+    def _turn_to_limits(self, idle: list[int], first: _Tried) -> None:
+        """Try all states with joints at their limits."""
+        count = len(PATTERNS)
+        of, patterns = np.repeat(idle, count), np.tile(np.arange(count), len(idle))
+        rock, tendons = self._rock.take(of), self._tendons.take(of)
+        fingers, possible = at_limits(self._model, rock, patterns)
+        loaded = loads(self._model, fingers, tendons)
+        stays = possible & stay(fingers, loaded, tendons, pressed=True)
+        tried = _Tried(of, fingers, loaded, stays)
+        self._offer(tried)
+        # where no state balances at the closing tension
+        lost = [i for i in idle if self._found[i] is None]
+        if not lost:
+            return
+        columns = np.array(lost)
+        clear = are_clear(self._model, self._rock.take(columns), first.fingers.take(columns))
+        for i, free in zip(lost, clear.tolist(), strict=True):
+            bottom_up = first.closed(self._model, i)
+            if free and _some_tension(bottom_up):
+                self._found[i] = bottom_up
+                continue
+            columns = count * idle.index(i) + OPEN_FIRST
+            opened = columns[possible[columns]]
+            if len(opened):
+                self._found[i] = tried.closed(self._model, opened[0])
 
 
-def _balances(
-    model: FingerModel,
-    section: Section,
-    loaded: Callable[[SettledFinger | None], ClosedFinger | None],
-    tension: float,
-) -> Iterator[tuple[int, float]]:
-    """Yield phalanges, and the angle at which each balances with no rock that presses on it.
-
-    Those that their contact pulls at, that find no rock of their own, or that put a later phalanx
-    into the rock. Where they balance, phalanges beyond them bear; a little closer the joint would
-    be turned back, a little opener turned in.
-    """
-    powers = np.array([1.0, tension])
-    first = settle(model, section, (0.0, 0.0))
-    closed = loaded(first)
-    pulls = np.zeros(JOINTS) if closed is None else closed.normals @ powers
-    before = 0.0
-    for i, contact in enumerate(first.contacts):
-        blocks = any(later.stop == "lower" for later in first.contacts[i + 1 :])
-        if contact.stop != "upper" and pulls[i] >= 0.0 and not blocks:
-            before = contact.angle
-            continue
-
-        def turned_in(angle: float, i: int = i) -> bool | None:
-            """Whether a joint is turned in at an angle; None where nothing beyond it bears."""
-            state = loaded(held(model, section, first.contacts[:i], angle))
-            if state is None or not any(j > i for j in state.finger.bearing):
-                return None
-            bears = i in state.finger.bearing
-            return bool((state.normals if bears else state.torques)[i] @ powers >= 0.0)
-
-        # one that has been on the rock swings back a little rather than far
-        backs = np.linspace(1.0, 0.0, SWINGS) ** (1 if contact.stop == "upper" else 2)
-        swing = contact.angle - before - model.joint_lower[i]
-        angles = (contact.angle - swing * backs).tolist()
-        signs = [turned_in(angle) for angle in angles]
-        crossings = [k for k in range(SWINGS - 1) if signs[k] and not signs[k + 1]]
-        for k in reversed(crossings):
-            low, high = angles[k], angles[k + 1]
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if turned_in(middle) else (low, middle)
-            yield i, low
-        before = contact.angle
-
-
-def _hold(closed: ClosedFinger) -> tuple[int, float]:
-    """Rank a contact state: contacts first, then tendon drawn in."""
-    return len(closed.finger.bearing), _drawn(closed)
-
-
-def _drawn(closed: ClosedFinger) -> float:
-    """Return how much tendon the joints have drawn in [m]."""
-    finger = closed.finger
-    return float(np.asarray(finger.model.pulley_radii) @ finger.joint_angles)
-
-
-def _tensions(closed: ClosedFinger) -> bool:
+def _some_tension(closed: ClosedFinger) -> bool:
     """Whether some tension drags the tiles forward and presses bare frames and joints on stops."""
+    if not np.isfinite(closed.normals).all():
+        return False
     least, most = 0.0, math.inf
     sides = [{"upper": 1.0, "lower": -1.0}.get(c.stop or "", 0.0) for c in closed.finger.contacts]
     frames = [i for i in closed.finger.bearing if not closed.finger.touching[i]]

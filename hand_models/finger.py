@@ -148,6 +148,14 @@ class FingerModel:
         half = self.tile_length / 2.0
         return self.tile_centre - half, self.tile_centre + half
 
+    def losses(self, base_tile: bool) -> Array:
+        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
+
+        A tile on the base comes first on the tendon, so it shifts the others by one.
+        """
+        first = 1 if base_tile else 0
+        return np.asarray((1.0 - self.friction) ** np.arange(first, first + 3))
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -246,12 +254,8 @@ class SettledFinger:
         return np.array([*(contact.joint for contact in self.contacts), self.pin])
 
     def losses(self, base_tile: bool) -> Array:
-        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
-
-        A tile on the base comes first on the tendon, so it shifts the others by one.
-        """
-        first = 1 if base_tile else 0
-        return np.asarray((1.0 - self.model.friction) ** np.arange(first, first + 3))
+        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,)."""
+        return self.model.losses(base_tile)
 
     def shears(self, closing_tension: float, base_tile: bool = False) -> Array:
         """Return each tile's shear as an affine function of tension.

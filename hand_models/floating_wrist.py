@@ -13,7 +13,7 @@ each of its ways of carrying is a set of its own. A tendon's stick and slip stay
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final, Literal
 
 import numpy as np
@@ -24,7 +24,7 @@ from hand_models.compliant_hand import CompliantHand, HandLoads
 from hand_models.frames import Array, Indices
 from hand_models.hand import FINGERS
 from hand_models.resettling import Numbers
-from hand_models.row_layout import RowLayout, row_layout
+from hand_models.row_layout import KEPT, RowLayout, layout_of
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
 from hand_models.wrist_pose import Evaluation, Verdict, range_rows
@@ -72,17 +72,12 @@ class FloatingWrist:
     @cached_property
     def layout(self) -> RowLayout:
         """Names and coefficients of the rows."""
-        settled = self.hand.settled
-        engaged = [i for i in range(len(FINGERS)) if settled.touching[settled.finger_of == i].any()]
-        return row_layout(
-            settled.tiles,
-            tuple(engaged),
-            tuple(engaged) if settled.grasp.lateral else (),
-            settled.surface.pieces(),
-            tuple((i, j) for i, j, _ in settled.stops),
-            bool(settled.palm.engaged),
-            False,
-        )
+        return layout_of(self.hand.settled, sticking=False)
+
+    @cached_property
+    def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
+        """Of `RowLayout.planes`."""
+        return self.layout.planes(self.hand.settled.surface.pieces())
 
     @property
     def limits(self) -> tuple[Row, ...]:
@@ -99,7 +94,7 @@ class FloatingWrist:
         n = len(settled.tiles)
         rows = len(layout.limits) - len(HELD)
         P, p, s = np.zeros((rows, 3 * n + len(FINGERS) + 2)), np.zeros(rows), np.empty(rows)
-        tile, a_shear, a_normal, a_lateral, capacity = layout.planes
+        tile, a_shear, a_normal, a_lateral, capacity = self._planes
         k = len(tile)
         index = np.arange(k)
         P[index, tile], P[index, n + tile], P[index, 2 * n + tile] = a_shear, a_normal, a_lateral
@@ -173,7 +168,7 @@ class FloatingWrist:
     def sieve(self, twists: Array) -> Indices:
         """Return which twists pass the limits of each finger's tiles, one finger after another."""
         left = np.arange(len(twists))
-        tile, a_shear, a_normal, a_lateral, capacity = self.layout.planes
+        tile, a_shear, a_normal, a_lateral, capacity = self._planes
         for i in self.layout.engaged:
             own = self.hand.tiles_of(i)
             mine = np.isin(tile, own)
@@ -251,10 +246,11 @@ class FloatingWrist:
             signs = np.where([dragging, pressing], -1.0, 1.0)
             H = np.vstack([H, signs[:, None] * palm_slope * PALM_ROWS])
             h = np.concatenate([h, -signs * palm_start * PALM_ROWS])
-        rows = layout.limits + layout.hard
+        rows = layout.rows
         if within is not None:
             sides, most, names = range_rows(WRIST, at, within)
-            H, h, rows = np.vstack([H, sides]), np.concatenate([h, most]), rows + names
+            H, h = np.vstack([H, sides]), np.concatenate([h, most])
+            rows = _with_range(layout, names)
 
         wrenches = hand.wrenches(loads)
         generators = _slopes(wrenches)
@@ -274,6 +270,12 @@ class FloatingWrist:
             h=h,
             D=D,
         )
+
+
+@lru_cache(maxsize=KEPT)
+def _with_range(layout: RowLayout, names: tuple[Row, ...]) -> tuple[Row, ...]:
+    """Return the names of all rows, the same tuple for the same rows."""
+    return layout.rows + names
 
 
 def _slopes(values: Numbers) -> Array:

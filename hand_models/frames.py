@@ -5,17 +5,25 @@ Wrenches are ``[fx, fy, fz, mx, my, mz]``: force first, moment about the frame's
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from hand_models.errors import InvalidInputError
 
-__all__ = ["QUATERNION_NORM_TOLERANCE", "Array", "Indices", "Pose", "skew", "wrench_transport"]
+__all__ = [
+    "QUATERNION_NORM_TOLERANCE",
+    "Array",
+    "Indices",
+    "Pose",
+    "skew",
+    "wrench_transport",
+    "wrench_transports",
+]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -38,8 +46,9 @@ def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
         raise InvalidInputError(f"expected {size} numbers, got {value!r}", field=field) from None
     if vector.shape != (size,):
         raise InvalidInputError(f"expected {size} numbers, got shape {vector.shape}", field=field)
-    if not np.isfinite(vector).all():
-        raise InvalidInputError(f"every number must be finite, got {vector.tolist()}", field=field)
+    numbers = vector.tolist()
+    if not all(map(math.isfinite, numbers)):
+        raise InvalidInputError(f"every number must be finite, got {numbers}", field=field)
     return vector
 
 
@@ -82,18 +91,39 @@ class Pose:
             `QUATERNION_NORM_TOLERANCE`.
         """
         q = finite_vector(orientation, 4, "orientation")
-        norm = float(np.linalg.norm(q))
+        norm = math.hypot(*q.tolist())
         if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
             raise InvalidInputError(
                 f"a quaternion [x, y, z, w] of norm 1 ± {QUATERNION_NORM_TOLERANCE:g} is needed, "
                 f"the norm is {norm:.6g}",
                 field="orientation",
             )
-        return cls(finite_vector(position, 3, "position"), Rotation.from_quat(q).as_matrix())
+        x, y, z, w = (q / norm).tolist()
+        rotation = np.array(
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+                [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+                [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+        )
+        return cls(finite_vector(position, 3, "position"), rotation)
 
     def quaternion(self) -> Array:
         """Return the orientation as ``[x, y, z, w]``, shape (4,), with w ≥ 0."""
-        return np.asarray(Rotation.from_matrix(self.rotation).as_quat(canonical=True))
+        rows = self.rotation.tolist()
+        trace = rows[0][0] + rows[1][1] + rows[2][2]
+        # from the largest of its components, which is never small
+        i = max(range(3), key=lambda axis: rows[axis][axis])
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = [0.0] * 4
+        if trace > rows[i][i]:
+            q[3], (i, j, k) = 1.0 + trace, (0, 1, 2)
+            q[i], q[j] = rows[k][j] - rows[j][k], rows[i][k] - rows[k][i]
+            q[k] = rows[j][i] - rows[i][j]
+        else:
+            q[i], q[3] = 1.0 - trace + 2.0 * rows[i][i], rows[k][j] - rows[j][k]
+            q[j], q[k] = rows[j][i] + rows[i][j], rows[k][i] + rows[i][k]
+        return np.array(q) * (math.copysign(1.0, q[3]) / math.hypot(*q))
 
     def inverse(self) -> Pose:
         """Return the pose of the parent in the child."""
@@ -124,3 +154,27 @@ def wrench_transport(pose: Pose) -> Array:
     transport[:3, :3] = transport[3:, 3:] = pose.rotation
     transport[3:, :3] = skew(pose.position) @ pose.rotation
     return transport
+
+
+SKEW: Final = np.stack([skew(axis) for axis in np.eye(3)])
+"""``SKEW[i]`` is `skew` of the unit vector along axis i."""
+
+
+def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
+    """Return the matrices that carry wrenches from some frames to a body's, shape (n, 6, 6).
+
+    Parameters
+    ----------
+    body : Pose
+        The body in the world.
+    poses : sequence of Pose
+        The frames in the world.
+    """
+    inverse = body.rotation.T
+    rotations = inverse @ np.array([pose.rotation for pose in poses])
+    places = (np.array([pose.position for pose in poses]) - body.position) @ body.rotation
+    transports = np.zeros((len(poses), 6, 6))
+    transports[:, :3, :3] = transports[:, 3:, 3:] = rotations
+    crosses = (places @ SKEW.reshape(3, 9)).reshape(-1, 3, 3)
+    np.matmul(crosses, rotations, out=transports[:, 3:, :3])
+    return transports

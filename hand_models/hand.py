@@ -12,34 +12,52 @@ reaction, but no normal load (``assumed``).
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from collections.abc import Callable, Hashable, Sequence
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from hand_models.actuation import TendonDrive
-from hand_models.contact_states import ClosedFinger, cling, close
 from hand_models.errors import InvalidInputError
-from hand_models.finger import PHALANGES, FingerModel, SettledFinger
-from hand_models.fingernail import Cling, Fingernail
-from hand_models.frames import Array, Indices, Pose
+from hand_models.finger import FingerModel
+from hand_models.finger_frames import FingerFrame, FingerFrames, FrameStack
+from hand_models.fingernail import Fingernail
+from hand_models.frames import Pose
+from hand_models.grasp import Grasp
 from hand_models.holds import Hold
-from hand_models.limit_pieces import HalfPlane
-from hand_models.palm import PalmTendon, shear_capacity
+from hand_models.hooked_nails import no_nails
+from hand_models.laid_loads import TendonLoads
+from hand_models.laying import Layer
+from hand_models.outlined import OutlinedHold
+from hand_models.palm import PalmTendon
 from hand_models.parameters import ParameterTable, hand_table
+from hand_models.placed_hands import Placement
+from hand_models.recent import Recent
 from hand_models.seating import Seating, seat
 from hand_models.sections import Section
-from hand_models.settling import intrusion
+from hand_models.settled_hand import (
+    FINGERS,
+    FINGERTIP_FORCE,
+    NAIL,
+    NAIL_SHEAR,
+    Palm,
+    SettledHand,
+    Tile,
+)
+from hand_models.settling_hands import settle_hands
 from hand_models.spines import Surface
 from hand_models.structure import Structure
 
 __all__ = [
     "FINGERS",
+    "FINGERTIP_FORCE",
+    "NAIL",
+    "NAIL_SHEAR",
     "FingerFrame",
     "Grasp",
     "Palm",
+    "Placement",
     "Seating",
     "SettledHand",
     "SpinyHand",
@@ -47,235 +65,14 @@ __all__ = [
     "spiny_hand",
 ]
 
-FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
-"""Order of every list of four tensions; left is +y of H."""
+KEPT: Final = 256
+"""Settled hands that are kept, those used last: sixty-four stances of four hands."""
 
-NAIL: Final = "nail"
-"""The ultrashort phalanx at a fingertip, by name, and the contact of one that hooks."""
+SCANS: Final = 16
+"""Settled hands on meshes and profiles that are kept, those used last."""
 
-NAIL_SHEAR: Final = "nail_shear"
-"""Name of the limit of a nail that pulls toward its finger's base."""
-
-FINGERTIP_FORCE: Final = "fingertip_force"
-"""Name of the limit of a distal phalanx, or a nail, that presses into the rock."""
-
-OPPOSED: Final = 1e-6
-"""How close to π an outer rotation counts as a pinch [rad]."""
-
-
-@dataclass(frozen=True)
-class Grasp:
-    """How a hand takes a hold.
-
-    Attributes
-    ----------
-    outer_rotation : float
-        Of the outer fingers, in [0, π] [rad].
-    closing_tension : float, optional
-        Of each tendon at the moment the tiles caught the rock [N]; the parameter file's default.
-    palm : bool
-        Whether the palm may carry load.
-    lateral : bool
-        Whether engaged spines may resist sideways.
-    fingernail : bool
-        Whether the fingers stay straight and cling with their nails alone.
-    """
-
-    outer_rotation: float = 0.0
-    closing_tension: float | None = None
-    palm: bool = True
-    lateral: bool = True
-    fingernail: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.outer_rotation <= math.pi + OPPOSED:
-            raise InvalidInputError(
-                f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
-            )
-        tension = self.closing_tension
-        if tension is not None and not (math.isfinite(tension) and tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="closing_tension")
-
-    @property
-    def pinch(self) -> bool:
-        """Whether the outer fingers oppose the inner ones."""
-        return self.outer_rotation >= math.pi - OPPOSED
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One finger tile's place among the hand's rows and columns.
-
-    Attributes
-    ----------
-    finger : str
-    phalanx : str
-        ``base``, ``proximal``, ``middle`` or ``distal``; ``nail`` where the hand clings with it.
-    contact : {'face', 'edge', 'frame', 'nail', 'none'}
-        What of it touches the rock; ``frame`` if its phalanx only rests beside the tile.
-    """
-
-    finger: str
-    phalanx: str
-    contact: str
-
-
-@dataclass(frozen=True, eq=False)
-class Palm:
-    """The palm on its rock.
-
-    Attributes
-    ----------
-    gaps : ndarray, shape (8,)
-        From each tile to the rock along z, infinite where there is none [m].
-    engaged : tuple of int
-        Tiles with rock within the spines' travel.
-    centre : ndarray, shape (3,)
-        Of the engaged tiles, where shear and pressing act [m]; the origin if none are engaged.
-    shear_limit : float
-        Along −x of H on the rock, by load sharing [N].
-    pressing_limit : float
-        Along +z [N].
-    """
-
-    gaps: Array
-    engaged: tuple[int, ...]
-    centre: Array
-    shear_limit: float
-    pressing_limit: float
-
-
-@dataclass(frozen=True, eq=False)
-class SettledHand:
-    """A hand closed on a hold: where every tile is and what each newton of tension loads.
-
-    Attributes
-    ----------
-    hand : SpinyHand
-    hold : Hold
-    grasp : Grasp
-    surface : Surface
-    closing_tension : float
-        [N]
-    seating : Seating
-    fingers : tuple of SettledFinger
-        In the order of `FINGERS`.
-    tiles : tuple of Tile
-        The 14 finger tiles, finger by finger, from the base outward; after each finger's, where the
-        hand clings, its nail.
-    finger_of : ndarray of int, shape (n,)
-        Index of each tile's finger.
-    positions : ndarray, shape (n, 3)
-        Of each tile's contact in H [m].
-    axes : ndarray, shape (n, 3, 3)
-        Rows: the unit force on the rock of shear, of normal and of lateral load, in H.
-    loads : ndarray, shape (n, 2, 2)
-        Shear and normal load, each at zero tension [N] and per newton of tension. A nail's normal
-        load is P across it; its shear A, along it, is passive.
-    nail_angles : ndarray, shape (4,)
-        How far each finger's nail has turned; all the way where it does not hook [rad].
-    nail_normals : ndarray, shape (4, 3)
-        Out of the rock where each finger's nail hooks, in H; zero where none does.
-    nail_rows : tuple of (ndarray, ndarray)
-        H and h of `Fingernail.rows` of each nail that hooks, in the order of the tiles.
-    stops : tuple of (int, int, ndarray)
-        Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
-    palm : Palm
-    """
-
-    hand: SpinyHand
-    hold: Hold
-    grasp: Grasp
-    surface: Surface
-    closing_tension: float
-    seating: Seating
-    fingers: tuple[SettledFinger, ...]
-    tiles: tuple[Tile, ...]
-    finger_of: Indices
-    positions: Array
-    axes: Array
-    loads: Array
-    nail_angles: Array
-    nail_normals: Array
-    nail_rows: tuple[tuple[Array, Array], ...]
-    stops: tuple[tuple[int, int, Array], ...]
-    palm: Palm
-
-    @cached_property
-    def touching(self) -> Array:
-        """Which tiles have rock under them, bool of shape (n,)."""
-        return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
-
-    @cached_property
-    def lateral_shares(self) -> Array:
-        """Share of its finger's lateral reaction that each tile carries, shape (n,)."""
-        counts = np.bincount(self.finger_of, weights=self.touching, minlength=len(FINGERS))
-        return np.where(self.touching, 1.0 / np.maximum(counts, 1.0)[self.finger_of], 0.0)
-
-    @cached_property
-    def nails(self) -> Array:
-        """Which tiles are nails that hook, bool of shape (n,)."""
-        return np.array([tile.contact == NAIL for tile in self.tiles])
-
-    @cached_property
-    def holding(self) -> Array:
-        """Which tiles and nails are on rock that they hold, bool of shape (n,)."""
-        return np.logical_or(self.touching, self.nails)
-
-    def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
-        """Return the limits of a nail's force, toward its finger's base and into the rock."""
-        structure = self.hand.structure
-        base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along
-        into = np.array([0.0, 0.0, 1.0])
-        (shear, normal), (pulled, pressed) = (
-            (self.axes[tile, :2] @ direction).tolist() for direction in (base, into)
-        )
-        return (
-            HalfPlane(NAIL_SHEAR, shear, normal, 0.0, structure.finger_shear),
-            HalfPlane(FINGERTIP_FORCE, pulled, pressed, 0.0, structure.fingertip_force),
-        )
-
-    def tile_loads(
-        self, tensions: Array, laterals: Array | None = None, axials: Array | None = None
-    ) -> Array:
-        """Return shear, normal and lateral load of each finger tile.
-
-        Parameters
-        ----------
-        tensions : ndarray, shape (4,)
-            Of the tendons [N].
-        laterals : ndarray, shape (4,), optional
-            Lateral reaction of each finger on the rock [N].
-        axials : ndarray, shape (4,), optional
-            A of each finger's nail [N].
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            [N]; c_sys + f c_act of Eq. 14.
-        """
-        f = np.asarray(tensions, dtype=float)[self.finger_of]
-        y = np.zeros(len(FINGERS)) if laterals is None else np.asarray(laterals, dtype=float)
-        planar = self.loads[..., 0] + self.loads[..., 1] * f[:, None]
-        if axials is not None:
-            planar[:, 0] += np.where(self.nails, np.asarray(axials)[self.finger_of], 0.0)
-        return np.column_stack([planar, self.lateral_shares * y[self.finger_of]])
-
-
-@dataclass(frozen=True)
-class FingerFrame:
-    """A finger's frame in H: the proximal joint, and unit vectors along and across the finger."""
-
-    joint: Array
-    along: Array
-    across: Array
-
-
-def _cut(frame: FingerFrame, hold: Hold, grasp: Grasp, hand_in_hold: Pose) -> Section | None:
-    """Return the rock in the plane of a finger's frame, raw under one that clings."""
-    cut = hold.raw_section if grasp.fingernail else hold.section
-    rotation = hand_in_hold.rotation
-    return cut(hand_in_hold.apply(frame.joint), rotation @ frame.along, rotation[:, 2])
+ROTATIONS: Final = 64
+"""Choices of outer rotations for which frames are kept, at most."""
 
 
 class SpinyHand:
@@ -290,14 +87,28 @@ class SpinyHand:
     ------
     InvalidInputError
         If a number is missing or impossible.
+
+    Attributes
+    ----------
+    settled, settled_scans : Recent
+        Hands that were settled last on holds given by numbers, and on meshes and profiles;
+        `settle_each` looks there first.
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         self.table = table = table or hand_table()
+        self.settled: Recent[Hashable, SettledHand] = Recent(KEPT)
+        self.settled_scans: Recent[Hashable, SettledHand] = Recent(SCANS)
+        self._frames: dict[tuple[float, ...], FrameStack] = {}
         self.finger = FingerModel.from_table(table)
         self.drive = TendonDrive.from_table(table)
         self.structure = Structure.from_table(table)
         self.nail = Fingernail.from_table(table)
+        self.no_nails = no_nails(self.nail)
+        self.layer = Layer(self.finger)
+        self.tendon_loads = TendonLoads(self.finger)
+        # a tile on a finger's base only shifts the others on a tendon that rubs
+        self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]
         self.mass = table.scalar("hand", "mass")
         self.maximum_tension = table.positive("tendon", "maximum_tension")
         self.closing_tension = table.positive("tendon", "closing_tension")
@@ -350,20 +161,26 @@ class SpinyHand:
             entry = str(error.field).replace("friction", "pulley_friction")
             raise InvalidInputError(error.message, field=f"palm.{entry}") from None
 
+    def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
+        return spiny_hand, (self.table,)
+
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""
-        frames = []
-        for name in FINGERS:
-            side = 1.0 if name.endswith("left") else -1.0
-            mirror = np.array([1.0, side, 1.0])
-            if name.startswith("inner"):
-                joint, along = self.inner_joint * mirror, np.array([1.0, 0.0, 0.0])
-            else:
-                along = np.array([math.cos(outer_rotation), side * math.sin(outer_rotation), 0.0])
-                joint = self.outer_axis * mirror + self.outer_reach * along
-            across = np.array([-along[1], along[0], 0.0])
-            frames.append(FingerFrame(joint, along, across))
-        return tuple(frames)
+        return self.finger_frames(outer_rotation).fingers
+
+    def finger_frames(self, outer_rotation: float) -> FingerFrames:
+        """Return the frames with the tiles that do not turn; up to `ROTATIONS` are kept."""
+        return self.frame_stack((outer_rotation,)).hands[0]
+
+    def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
+        """Return the frames of hands with these rotations; up to `ROTATIONS` stacks are kept."""
+        found = self._frames.get(outer_rotations)
+        if found is None:
+            if len(self._frames) >= ROTATIONS:
+                self._frames.clear()
+            found = FrameStack.of([FingerFrames.of(self, angle) for angle in outer_rotations])
+            self._frames[outer_rotations] = found
+        return found
 
     def seat(self, hold: Hold, grasp: Grasp) -> Seating:
         """Seat the hand on a hold that was given no place; see `hand_models.seating`."""
@@ -372,7 +189,7 @@ class SpinyHand:
     def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
         """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""
         frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
-        return _cut(frame, hold, grasp, hold_in_hand.inverse())
+        return frame.cut(hold, hold_in_hand.inverse(), raw=grasp.fingernail)
 
     def settle(
         self,
@@ -398,166 +215,74 @@ class SpinyHand:
             If the rock stands deeper in the palm than the spines can retract, or in a finger
             wherever its joints turn.
         """
-        grasp = grasp or Grasp()
-        closing = self.closing_tension if grasp.closing_tension is None else grasp.closing_tension
-        if closing > self.maximum_tension:
-            raise InvalidInputError(
-                f"must be at most the tendon's {self.maximum_tension:g} N, got {closing:g}",
-                field="grasp.closing_tension",
-            )
-        seating = self.seat(hold, grasp) if hold_in_hand is None else Seating(hold_in_hand, "given")
-        hand_in_hold = seating.pose.inverse()
-        into_rock = hand_in_hold.rotation[:, 2]
-        palm = self._settle_palm(hold, surface, grasp, hand_in_hold)
+        (settled,) = self.settle_each([Placement(hold, surface, grasp or Grasp(), hold_in_hand)])
+        if isinstance(settled, InvalidInputError):
+            raise settled
+        return settled
 
-        frames = self.frames(grasp.outer_rotation)
-        sections = [_cut(frame, hold, grasp, hand_in_hold) for frame in frames]
-        closed = [
-            self._close(name, section, surface, grasp, closing)
-            for name, section in zip(FINGERS, sections, strict=True)
-        ]
-        nail_angles = np.full(len(FINGERS), self.nail.retraction)
-        nail_normals = np.zeros((len(FINGERS), 3))
-        nail_rows: list[tuple[Array, Array]] = []
-        tiles: list[Tile] = []
-        positions, axes, loads = [], [], []
-        stops: list[tuple[int, int, Array]] = []
-        up = np.array([0.0, 0.0, 1.0])
-        for i, (name, frame, (finger, shears, normals, torques)) in enumerate(
-            zip(FINGERS, frames, closed, strict=True)
-        ):
-            outer = name.startswith("outer")
-            if outer:
-                place = frame.joint + frame.along * (self.base_tile_reach - self.outer_reach)
-                place = np.array([place[0], place[1], self.base_tile_surface])
-                gap = hold.entry(hand_in_hold.apply(place), into_rock)
-                engaged = abs(gap) <= self.spine_travel and not grasp.fingernail
-                tiles.append(Tile(name, "base", "face" if engaged else "none"))
-                positions.append((place + gap * up if engaged else place)[None])
-                axes.append(np.stack([-frame.along, up, frame.across])[None])
-                gain = self.finger.shear_gain
-                shear = ((self.finger.base_engagement - gain) * closing, gain)
-                loads.append(np.array([[shear if engaged else (0.0, 0.0), (0.0, 0.0)]]))
-            u = finger.directions
-            along = u[:, :1] * frame.along + u[:, 1:] * up
-            into = -u[:, 1:] * frame.along + u[:, :1] * up
-            across = np.broadcast_to(frame.across, along.shape)
-            points = finger.points
-            tiles.extend(
-                Tile(name, phalanx, contact.kind)
-                for phalanx, contact in zip(PHALANGES, finger.contacts, strict=True)
-            )
-            positions.append(frame.joint + points[:, :1] * frame.along + points[:, 1:] * up)
-            axes.append(np.stack([-along, into, across], axis=1))
-            loads.append(np.stack([shears, normals], axis=1))
-            if grasp.fingernail:
-                cling = self._cling(name, sections[i], finger, closing)
-                angle = nail_angles[i] if cling is None else cling.hook.angle
-                reach = self.nail.length if cling is None else cling.hook.distance
-                w = math.cos(angle) * frame.along + math.sin(angle) * up
-                v = -math.sin(angle) * frame.along + math.cos(angle) * up
-                tiles.append(Tile(name, NAIL, "none" if cling is None else NAIL))
-                positions.append((frame.joint + finger.pin[0] * frame.along + reach * w)[None])
-                axes.append(np.stack([-w, v, frame.across])[None])
-                force = (0.0, 0.0) if cling is None else cling.force
-                loads.append(np.array([[(0.0, 0.0), force]]))
-                if cling is not None:
-                    nail_angles[i], (s, t) = angle, cling.hook.normal
-                    nail_normals[i] = s * frame.along + t * up
-                    nail_rows.append((cling.H, cling.h))
-            if finger.bearing:
-                stops.extend(
-                    (i, j, torques[j] if contact.stop == "upper" else -torques[j])
-                    for j, contact in enumerate(finger.contacts)
-                    if contact.stop in ("upper", "lower")
+    def settle_each(self, placements: Sequence[Placement]) -> list[SettledHand | InvalidInputError]:
+        """Close hands like this one on their holds, all at once.
+
+        Of the hands that were settled last, `KEPT` are kept, and found again where hold, place,
+        grasp and surface are the same: holds given by numbers where these are equal, meshes and
+        profiles where they are the same object (of these, whose data may be large, `SCANS`). Their
+        arrays are read-only.
+
+        Parameters
+        ----------
+        placements : sequence of Placement
+
+        Returns
+        -------
+        list of SettledHand or InvalidInputError
+            In order; the error that `settle` would raise in place of a hand that cannot be where
+            it is.
+        """
+        scanned = [isinstance(each.hold, OutlinedHold) for each in placements]
+        if not any(scanned):
+            return self._known_or_settled(self.settled, placements)
+        smooth, rough = (
+            iter(
+                self._known_or_settled(
+                    self.settled_scans if of else self.settled,
+                    [each for each, scan in zip(placements, scanned, strict=True) if scan == of],
                 )
-        return SettledHand(
-            hand=self,
-            hold=hold,
-            grasp=grasp,
-            surface=surface,
-            closing_tension=closing,
-            seating=seating,
-            fingers=tuple(finger for finger, _, _, _ in closed),
-            tiles=tuple(tiles),
-            finger_of=np.array([FINGERS.index(tile.finger) for tile in tiles]),
-            positions=np.concatenate(positions),
-            axes=np.concatenate(axes),
-            loads=np.concatenate(loads),
-            nail_angles=nail_angles,
-            nail_normals=nail_normals,
-            nail_rows=tuple(nail_rows),
-            stops=tuple(stops),
-            palm=palm,
+            )
+            for of in (False, True)
         )
+        return [next(rough if scan else smooth) for scan in scanned]
 
-    def _close(
-        self,
-        name: str,
-        section: Section | None,
-        surface: Surface,
-        grasp: Grasp,
-        closing_tension: float,
-    ) -> ClosedFinger:
-        if grasp.fingernail:
-            closed = cling(self.finger, section)
-            how = "straight, to cling with its nail"
-        else:
-            outer = name.startswith("outer")
-            closed = close(self.finger, section, surface, closing_tension, outer)
-            how = "even with its joints fully open"
-        if closed is None:
-            assert section is not None
-            depth = 1e3 * intrusion(self.finger, section, straight=grasp.fingernail)
-            raise InvalidInputError(
-                f"the hold stands {depth:.1f} mm inside {name} {how}; "
-                "move the hand away from the rock",
-                field="hold",
-            )
-        return closed
-
-    def _cling(
-        self, name: str, section: Section | None, finger: SettledFinger, closing_tension: float
-    ) -> Cling | None:
-        if self.nail.stuck(section, finger.pin):
-            raise InvalidInputError(
-                f"the hold is in the way of the nail of {name}, straight ahead; "
-                "move the hand away from the rock",
-                field="hold",
-            )
-        return self.nail.cling(section, finger, closing_tension, name.startswith("outer"))
-
-    def _settle_palm(self, hold: Hold, surface: Surface, grasp: Grasp, hand_in_hold: Pose) -> Palm:
-        into_rock = hand_in_hold.rotation[:, 2]
-        places = hand_in_hold.apply(self.palm_tiles)
-        gaps = np.array([hold.entry(place, into_rock) for place in places])
-        deepest = float(gaps.min())
-        if deepest < -self.spine_travel:
-            raise InvalidInputError(
-                f"the hold stands {-1e3 * deepest:.1f} mm inside the palm; "
-                f"at most {1e3 * self.spine_travel:g} mm (the spines' travel) is possible",
-                field="hold",
-            )
-        engaged = tuple(int(i) for i in np.flatnonzero(gaps <= self.spine_travel))
-        if not (grasp.palm and engaged):
-            return Palm(gaps, engaged if grasp.palm else (), np.zeros(3), 0.0, 0.0)
-        chosen = list(engaged)
-        return Palm(
-            gaps=gaps,
-            engaged=engaged,
-            centre=np.append(self.palm_tiles[chosen, :2].mean(axis=0), gaps[chosen].mean()),
-            shear_limit=shear_capacity(
-                tuple(self.palm_contact[i] for i in engaged),
-                self.palm_spring,
-                self.palm_friction,
-                surface.shear_limit,
-                self.palm_own_friction,
-            ),
-            pressing_limit=self.palm_pressing * len(engaged),
+    def _known_or_settled(
+        self, store: Recent[Hashable, SettledHand], placements: Sequence[Placement]
+    ) -> list[SettledHand | InvalidInputError]:
+        keys = [_key(each) for each in placements]
+        known = store.find(keys)
+        if None not in known:
+            return [settled for settled in known if settled is not None]
+        new = {
+            key: each
+            for key, each, settled in zip(keys, placements, known, strict=True)
+            if settled is None
+        }
+        outcomes = dict(zip(new, settle_hands(self, list(new.values())), strict=True))
+        store.keep(
+            (key, outcome) for key, outcome in outcomes.items() if isinstance(outcome, SettledHand)
         )
+        return [
+            outcomes[key] if settled is None else settled
+            for key, settled in zip(keys, known, strict=True)
+        ]
 
 
-@lru_cache(maxsize=32)
+def _key(placement: Placement) -> Hashable:
+    """Return what a settled hand depends on, as a key; the place by its digits."""
+    hold, surface, grasp, pose = placement
+    if pose is None:
+        return hold, surface, grasp
+    place = np.asarray(pose.position, dtype=float), np.asarray(pose.rotation, dtype=float)
+    return hold, surface, grasp, place[0].tobytes(), place[1].tobytes()
+
+
 def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
     """Return the SpinyHand of a table, built once; of the bundled one by default.
 
@@ -566,4 +291,8 @@ def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
     InvalidInputError
         If a number is missing or impossible.
     """
-    return SpinyHand(table)
+    return _built(table or hand_table())
+
+
+_built = lru_cache(maxsize=32)(SpinyHand)
+"""Hands by their tables, those asked for last."""

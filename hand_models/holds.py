@@ -9,23 +9,20 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
-from hand_models.sections import (
-    FlatSection,
-    ProfileSection,
-    RoundSection,
-    Section,
-    Vector2,
-    outward,
-)
+from hand_models.profile_section import ProfileSection
+from hand_models.sections import FlatSection, RoundSection, Section, Vector2
+from hand_models.swept import Swept
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
+
+Angle = TypeVar("Angle", float, Array)
 
 PARALLEL: Final = 1e-3
 """Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
@@ -38,6 +35,11 @@ class Hold(ABC):
     """A piece of rock that a hand may take."""
 
     shape: str
+
+    @property
+    def swept(self) -> Swept | None:
+        """The hold as a ball that is swept along faces, if it is one."""
+        return None
 
     @abstractmethod
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
@@ -71,10 +73,10 @@ class Hold(ABC):
         """
         return None
 
-    def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
+    def tangent_point(self, offset: float, angle: Angle) -> tuple[Angle, Angle] | None:
         """Return the point (x, z) at y = ``offset`` where rock runs at an angle from x toward z.
 
-        Only of a hold that is smooth but not round there; None elsewhere.
+        Or points at angles. Only of a hold that is smooth but not round there; None elsewhere.
         """
         return None
 
@@ -91,6 +93,10 @@ class Plane(Hold):
     """A flat wall: the rock is z ≥ 0."""
 
     shape = "plane"
+
+    @property
+    def swept(self) -> Swept:
+        return Swept(0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, PARALLEL)
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         s, t = float(np.asarray(s_axis)[2]), float(np.asarray(t_axis)[2])
@@ -113,6 +119,11 @@ class _Extruded(Hold):
         """Radius of the profile's disc [m]."""
 
     @property
+    def half_angle(self) -> float | None:
+        """Half the angle of the rock between the flat faces; None without any [rad]."""
+        return None
+
+    @property
     def faces(self) -> Array:
         """Directions of the flat faces in the profile, shape (k, 2)."""
         return np.zeros((0, 2))
@@ -124,10 +135,10 @@ class _Extruded(Hold):
         determinant = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
         if abs(determinant) < PARALLEL:
             return self._along_axis(o, s, t)
-        if not len(self.faces) and abs(abs(determinant) - 1.0) < 1e-12:
+        if self.half_angle is None and abs(abs(determinant) - 1.0) < 1e-12:
             centre = M.T @ (np.array([0.0, self.profile_radius]) - m)
             return RoundSection((float(centre[0]), float(centre[1])), self.profile_radius)
-        return ProfileSection(M, m, self.profile_radius, self.faces)
+        return ProfileSection(M, m, self.profile_radius, self.half_angle)
 
     def _along_axis(self, o: Array, s: Array, t: Array) -> Section | None:
         """Return the straight rock in a plane that holds the axis of the extrusion."""
@@ -160,7 +171,7 @@ def _profile_entry(p: Vector2, d: Vector2, radius: float, faces: Array) -> float
     if a > 0.0 and discriminant >= 0.0:
         candidates.append((-b - math.sqrt(discriminant)) / a)
     if len(faces):
-        for direction, normal in zip(faces, outward(faces), strict=True):
+        for direction, normal in zip(faces, _outward(faces), strict=True):
             closing = float(normal @ np.asarray(d))
             if closing < 0.0:
                 hit = (radius - float(normal @ np.asarray(p))) / closing
@@ -168,6 +179,12 @@ def _profile_entry(p: Vector2, d: Vector2, radius: float, faces: Array) -> float
                 if float(direction @ where) >= 0.0:
                     candidates.append(hit)
     return min(candidates, default=math.inf)
+
+
+def _outward(faces: Array) -> Array:
+    """Return the unit normals, out of the rock, of the two faces of a cone, shape (2, 2)."""
+    turned = np.column_stack([faces[:, 1], -faces[:, 0]])
+    return np.asarray(np.sign(faces[:, :1]) * turned)
 
 
 @dataclass(frozen=True)
@@ -185,6 +202,11 @@ class Cylinder(_Extruded):
 
     def __post_init__(self) -> None:
         _positive(self.diameter, "diameter")
+
+    @property
+    def swept(self) -> Swept:
+        radius = self.profile_radius
+        return Swept(1.0, 0.0, 1.0, radius, radius)
 
     @property
     def profile_radius(self) -> float:
@@ -213,12 +235,21 @@ class Edge(_Extruded):
             raise InvalidInputError(f"must be in (0, pi) rad, got {self.angle:g}", field="angle")
 
     @property
+    def swept(self) -> Swept:
+        radius, half = self.fillet_radius, self.angle / 2.0
+        return Swept(1.0, 0.0, 1.0, radius, radius, math.sin(half), math.cos(half))
+
+    @property
     def profile_radius(self) -> float:
         return self.fillet_radius
 
     @property
+    def half_angle(self) -> float:
+        return self.angle / 2.0
+
+    @property
     def faces(self) -> Array:
-        half = self.angle / 2.0
+        half = self.half_angle
         return np.array([[math.sin(half), math.cos(half)], [-math.sin(half), math.cos(half)]])
 
 
@@ -237,6 +268,11 @@ class Sphere(Hold):
 
     def __post_init__(self) -> None:
         _positive(self.diameter, "diameter")
+
+    @property
+    def swept(self) -> Swept:
+        radius = self.diameter / 2.0
+        return Swept(1.0, 1.0, 1.0, radius, radius)
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
@@ -280,6 +316,11 @@ class Ellipsoid(Hold):
         for i, value in enumerate(self.semi_axes):
             _positive(value, f"semi_axes[{i}]")
 
+    @property
+    def swept(self) -> Swept:
+        a, b, c = self.semi_axes
+        return Swept(1.0 / a, 1.0 / b, 1.0 / c, c, 1.0)
+
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         scale = 1.0 / np.asarray(self.semi_axes)
         start = scale * (np.asarray(origin, dtype=float) - np.array([0.0, 0.0, self.semi_axes[2]]))
@@ -294,7 +335,7 @@ class Ellipsoid(Hold):
         # in metres again, so that the profile's disc is as large as the section
         size = 1.0 / math.sqrt(float(np.linalg.det(R)))
         M = R * size
-        return ProfileSection(M, np.array([0.0, rho * size]) - M @ q0, rho * size, np.zeros((0, 2)))
+        return ProfileSection(M, np.array([0.0, rho * size]) - M @ q0, rho * size)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         scale = 1.0 / np.asarray(self.semi_axes)
@@ -304,11 +345,11 @@ class Ellipsoid(Hold):
         discriminant = b**2 - a * (float(p @ p) - 1.0)
         return (-b - math.sqrt(discriminant)) / a if discriminant >= 0.0 else math.inf
 
-    def tangent_point(self, offset: float, angle: float) -> Vector2 | None:
+    def tangent_point(self, offset: float, angle: Angle) -> tuple[Angle, Angle] | None:
         a, b, c = self.semi_axes
         if abs(offset) >= b:
             return None
         shrink = math.sqrt(1.0 - (offset / b) ** 2)
-        x, z = a * shrink * math.sin(angle), -c * shrink * math.cos(angle)
-        length = math.hypot(x, z)
+        x, z = a * shrink * np.sin(angle), -c * shrink * np.cos(angle)
+        length = np.hypot(x, z)
         return a * shrink * x / length, c + c * shrink * z / length

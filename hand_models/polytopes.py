@@ -17,12 +17,13 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, hstack, vstack
 from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
+from hand_models.cross_products import Expansion, cross_products, expansion
 from hand_models.errors import SolverError
 from hand_models.frames import Array, Indices
+from hand_models.half_spaces import Faces
 
 __all__ = [
     "TOLERANCE",
-    "Faces",
     "Summand",
     "clipped",
     "extreme_points",
@@ -48,13 +49,6 @@ TOLERANCES: Final = ("primal_feasibility_tolerance", "dual_feasibility_tolerance
 
 SPANNING: Final = 1e-13
 """Squares of unit normals that span a direction sum to more than this in it."""
-
-
-class Faces(NamedTuple):
-    """Facets of a polytope: unit outward normals (k, r), and offsets (k,)."""
-
-    normals: Array
-    offsets: Array
 
 
 class Summand(NamedTuple):
@@ -264,8 +258,11 @@ def _incidence(points: Array, faces: Faces, slack: float) -> csr_array:
 def extreme_points(image: Array) -> Summand:
     """Return the extreme points of a few points (n, 6), in order around a polygon."""
     centred = image - image.mean(axis=0)
-    _, values, basis = np.linalg.svd(centred, full_matrices=False)
     size = 1.0 + float(np.abs(image).max())
+    if len(image) == 2:
+        apart = float(np.linalg.norm(centred)) > TOLERANCE * size
+        return Summand(image, 1) if apart else Summand(image[:1], 0)
+    _, values, basis = np.linalg.svd(centred, full_matrices=False)
     rank = int((values > TOLERANCE * size).sum())
     if rank == 0:
         return Summand(image[:1], 0)
@@ -288,10 +285,10 @@ def sum_normals(parts: list[Summand], r: int, rounding: float) -> Array:
         around = np.diff(np.vstack([part.points, part.points[:1]]), axis=0)
         edges.append(around[:1] if part.dimension == 1 else around)
     shapes = tuple((len(e), part.dimension) for e, part in zip(edges, parts, strict=True))
-    spanning, chosen = _choices(shapes, r - 1)
+    spanning, chosen = _choices(shapes, r)
     directions = np.vstack(edges)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    normals = _cross(directions[spanning])
+    normals = cross_products(directions, spanning)
     lengths = np.linalg.norm(normals, axis=1)
     independent = lengths > 1e-8
     normals = normals[independent] / lengths[independent, None]
@@ -312,20 +309,20 @@ def sum_normals(parts: list[Summand], r: int, rounding: float) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _choices(shapes: tuple[tuple[int, int], ...], total: int) -> tuple[Indices, Indices]:
-    """List every choice of ``total`` edges from parts of given (edges, dimension).
+def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Expansion, Indices]:
+    """List every choice of r − 1 edges from parts of given (edges, dimension).
 
     Returns
     -------
-    spanning : ndarray of int, shape (n, total)
-        Into all parts' edges, one after another.
+    spanning : Expansion
+        Of the cross products of all parts' edges, one after another.
     chosen : ndarray of int, shape (n, parts)
         Which edge of a part is used alone; −1 where none, or its whole plane, is.
     """
     firsts = np.cumsum([0, *(count for count, _ in shapes)])
     spanning, chosen = [], []
     for use in itertools.product(*(range(dimension + 1) for _, dimension in shapes)):
-        if sum(use) != total:
+        if sum(use) != r - 1:
             continue
         options = [
             range(count) if u == 1 else (-1,) for u, (count, _) in zip(use, shapes, strict=True)
@@ -339,25 +336,7 @@ def _choices(shapes: tuple[tuple[int, int], ...], total: int) -> tuple[Indices, 
                 columns += [np.full(len(picks), firsts[k] + i) for i in range(2)]
         spanning.append(np.column_stack(columns))
         chosen.append(picks)
-    return np.vstack(spanning), np.vstack(chosen)
-
-
-def _cross(spans: Array) -> Array:
-    """Return the vectors (n, r) orthogonal to stacks (n, r − 1, r), by Laplace expansion."""
-    count, rows, r = spans.shape
-    minors: dict[tuple[int, ...], Array] = {(j,): spans[:, 0, j] for j in range(r)}
-    for row in range(1, rows):
-        grown: dict[tuple[int, ...], Array] = {}
-        for columns in itertools.combinations(range(r), row + 1):
-            total = np.zeros(count)
-            for place, j in enumerate(columns):
-                rest = columns[:place] + columns[place + 1 :]
-                total += (-1.0) ** (row + place) * spans[:, row, j] * minors[rest]
-            grown[columns] = total
-        minors = grown
-    return np.column_stack(
-        [(-1.0) ** j * minors[tuple(i for i in range(r) if i != j)] for j in range(r)]
-    )
+    return expansion(np.vstack(spanning), r), np.vstack(chosen)
 
 
 def sums(parts: list[Summand]) -> Array:

@@ -20,12 +20,11 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 
-from hand_models.finger import Contact
 from hand_models.frames import Array, Pose
 from hand_models.holds import Hold, Plane
 from hand_models.polyline import PolylineSection
@@ -34,7 +33,9 @@ from hand_models.settling import settle
 if TYPE_CHECKING:
     from hand_models.hand import Grasp, SpinyHand
 
-__all__ = ["Seating", "seat"]
+__all__ = ["CENTRED", "Seating", "propose", "seat", "touches_seat"]
+
+Angle = TypeVar("Angle", float, Array)
 
 Place = tuple[float, float]
 """(x, z) of a hold's frame in H [m]."""
@@ -71,6 +72,17 @@ class Seating:
     rule: str
 
 
+LIKE_HAND: Final = np.eye(3)
+"""Axes of a hold that is seated."""
+
+LIKE_HAND.setflags(write=False)
+
+CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
+"""The palm on the rock, with the crest under its centre."""
+
+CENTRED.pose.position.setflags(write=False)
+
+
 def seat(hand: SpinyHand, hold: Hold, grasp: Grasp) -> Seating:
     """Seat a hand on a hold that was given no place; see the module's text.
 
@@ -80,30 +92,45 @@ def seat(hand: SpinyHand, hold: Hold, grasp: Grasp) -> Seating:
     hold : Hold
     grasp : Grasp
     """
-    x, y, z = (float(v) for v in hand.inner_joint)
+    seating, meant = propose(hand, hold, grasp)
+    return seating if not meant or _holds(hand, hold, seating) else CENTRED
+
+
+def propose(hand: SpinyHand, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
+    """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
+
+    If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
+    """
+    x, y, z = hand.inner_joint.tolist()
     if isinstance(hold, Plane):
-        return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat")
-    crest = 0.5 * (x + float(hand.outer_axis[0]) - hand.outer_reach) if grasp.pinch else None
-    section = hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
-    if isinstance(section, PolylineSection):
-        return _on_outline(hand, section, _Top(hand, hold), crest)
-    centred = Seating(Pose.identity(), "palm_on_rock_centred")
+        return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
+    crest = 0.5 * (x + hand.outer_axis.item(0) - hand.outer_reach) if grasp.pinch else None
+    if hold.swept is None:
+        section = hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
+        if isinstance(section, PolylineSection):
+            return _on_outline(hand, section, _Top(hand, hold), crest), False
     circle = hold.crest_circle(y)
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
-        return centred
+        return CENTRED, False
     possible = place[1] >= 0.0 if grasp.pinch else abs(place[0]) <= 0.5 * hand.palm_length
-    seating = Seating(_shifted(*place), "pinch" if grasp.pinch else "palm_on_rock")
-    return seating if possible and _holds(hand, hold, seating) else centred
+    if not possible:
+        return CENTRED, False
+    return Seating(_shifted(*place), "pinch" if grasp.pinch else "palm_on_rock"), True
+
+
+def touches_seat(hand: SpinyHand, kind: str, along: float) -> bool:
+    """Whether an inner finger's proximal contact is where a seat meant it to be."""
+    return kind == "face" and abs(along - hand.seated_contact) < PLACED
 
 
 def _shifted(x: float, z: float) -> Pose:
-    return Pose(np.array([x, 0.0, z]), np.eye(3))
+    return Pose(np.array([x, 0.0, z]), LIKE_HAND)
 
 
 def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) -> Place | None:
     """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
-    x, _, z = (float(v) for v in hand.inner_joint)
+    x, _, z = hand.inner_joint.tolist()
     reach = (radius + hand.finger.tile_height) ** 2 + hand.seated_contact**2
     if crest is not None:
         rise = reach - (x - crest) ** 2
@@ -114,16 +141,18 @@ def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) ->
 
 def _smooth(hand: SpinyHand, hold: Hold, crest: float | None) -> Place | None:
     """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
-    x, y, z = (float(v) for v in hand.inner_joint)
+    x, y, z = hand.inner_joint.tolist()
 
-    def place(angle: float) -> Place | None:
+    def place(angle: Angle) -> tuple[Angle, Angle] | None:
         point = hold.tangent_point(y, angle)
         if point is None:
             return None
-        tile = Contact(angle, (x, z), hand.seated_contact, "face").point(hand.finger.tile_height)
-        return tile[0] - point[0], tile[1] - point[1]
+        # the tile's contact at that angle of the phalanx
+        u, v = np.cos(angle), np.sin(angle)
+        along, height = hand.seated_contact, hand.finger.tile_height
+        return x + along * u - height * v - point[0], z + along * v + height * u - point[1]
 
-    def miss(angle: float) -> float:
+    def miss(angle: Angle) -> Angle:
         there = place(angle)
         assert there is not None
         return there[0] - crest if crest is not None else there[1]
@@ -131,7 +160,7 @@ def _smooth(hand: SpinyHand, hold: Hold, crest: float | None) -> Place | None:
     if place(0.0) is None:
         return None
     angles = np.linspace(0.0, hand.finger.joint_upper[0], 64)
-    misses = np.array([miss(float(angle)) for angle in angles])
+    misses = miss(angles)
     turns = np.flatnonzero(np.sign(misses[:-1]) * np.sign(misses[1:]) <= 0.0)
     if not len(turns):
         return None
@@ -149,7 +178,7 @@ def _holds(hand: SpinyHand, hold: Hold, seating: Seating) -> bool:
         hand_in_hold.rotation[:, 2],
     )
     contact = settle(hand.finger, section, (0.0, 0.0)).contacts[0]
-    return contact.kind == "face" and abs(contact.along - hand.seated_contact) < PLACED
+    return touches_seat(hand, contact.kind, contact.along)
 
 
 # Rock that is known by its outline only -----------------------------------------------------------
@@ -177,7 +206,7 @@ def _on_outline(
     hand: SpinyHand, section: PolylineSection, top: _Top, crest: float | None
 ) -> Seating:
     """Seat a hand on a hold whose section under ``inner_left`` is a polyline."""
-    x, _, z = (float(v) for v in hand.inner_joint)
+    x, _, z = hand.inner_joint.tolist()
     model = hand.finger
     face = model.tile_range[0], model.joint_spacing, model.tile_height
     limits = model.joint_lower[0], model.joint_upper[0]
@@ -198,7 +227,7 @@ def _on_outline(
 
     level = resting(0.0, z + model.tile_height)
     if level is None:
-        return Seating(Pose.identity(), "palm_on_rock_centred")
+        return CENTRED
     lying = section.rest((x, z - level[1]), *face, *limits)
     if lying is not None and lying.flat and abs(lying.angle) < LEVEL:
         return Seating(_shifted(*level), "flat")

@@ -31,7 +31,7 @@ from hand_models.frames import Array
 from hand_models.limit_pieces import HalfPlane, inner_pieces, outer_pieces
 from hand_models.parameters import surface_table
 
-__all__ = ["HalfPlane", "Surface", "surface_names"]
+__all__ = ["HalfPlane", "Surface", "pull_strength", "surface_names"]
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Surface:
         """
         phi = np.asarray(angle, dtype=float)
         ratio = np.clip(phi / self.pull_off_angle, 0.0, 1.0)
-        pulling = self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
+        pulling = pull_strength(self.shear_limit, self.pull_off_limit, self.pull_off_angle, phi)
         kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
         share = self.lateral_limit / self.shear_limit * kept
         sideways = 1.0 - np.maximum(np.cos(azimuth), 0.0)
@@ -170,6 +170,11 @@ class Surface:
             pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
         return np.where(phi >= 0.0, pulling, pressing)
 
+    def pulled(self, angle: float) -> float:
+        """Return f_s(φ) of Eq. 21 under pull-off, φ ≥ 0 [N]."""
+        ratio = min(angle / self.pull_off_angle, 1.0)
+        return self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
+
     def pieces(self) -> tuple[HalfPlane, ...]:
         """Return half-planes inside the limit surface, for shear T ≥ 0."""
         return inner_pieces(self)
@@ -177,6 +182,25 @@ class Surface:
     def outer_pieces(self) -> tuple[HalfPlane, ...]:
         """Return half-planes around the limit surface, for shear T ≥ 0."""
         return outer_pieces(self)
+
+
+def pull_strength(
+    shear_limit: ArrayLike, pull_off_limit: ArrayLike, pull_off_angle: ArrayLike, angle: ArrayLike
+) -> Array:
+    """Return f_s(φ) of Eq. 21 for tiles of many surfaces [N]; f_max under pressing.
+
+    Parameters
+    ----------
+    shear_limit, pull_off_limit : array_like
+        f_max and f_min [N].
+    pull_off_angle : array_like
+        φ_max [rad].
+    angle : array_like
+        φ [rad]; broadcast with the others.
+    """
+    most = np.asarray(shear_limit)
+    ratio = np.clip(np.asarray(angle) / np.asarray(pull_off_angle), 0.0, 1.0)
+    return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio)
 
 
 def _from_ratios(shear_limit: float, section: str) -> Surface:

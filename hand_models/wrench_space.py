@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,12 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from hand_models import zonotope
 from hand_models.errors import EmptySetError, InvalidInputError, SolverError, UnsupportedError
 from hand_models.frames import Array, Indices, finite_vector
+from hand_models.half_spaces import FLATNESS, Faces, HalfSpaces, affine_hull, lifted
 from hand_models.polytopes import (
     TOLERANCE,
-    Faces,
     Summand,
     clipped,
     extreme_points,
@@ -48,9 +49,6 @@ MOMENT_ARM: Final = 0.1
 
 SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
 """From a wrench to a scaled wrench [N]."""
-
-FLATNESS: Final = 1e-9
-"""A set is flat in a direction in which it reaches less than this times its longest reach."""
 
 MOST_CANDIDATES: Final = 500_000
 """How many sums of the blocks' vertices are looked through; that many take some 20 s."""
@@ -82,18 +80,6 @@ class Row(NamedTuple):
     kind: Literal["limit", "hard"]
     label: str
     joint: str | None = None
-
-
-class HalfSpaces(NamedTuple):
-    """``normals @ w ≤ offsets`` and, for a flat set, ``equation_normals @ w = equation_offsets``.
-
-    Normals have unit length as functions of the scaled wrench, so a violation is a distance [N].
-    """
-
-    normals: Array
-    offsets: Array
-    equation_normals: Array
-    equation_offsets: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +137,37 @@ class WrenchSpace:
             raise InvalidInputError("one name for each row is needed", field="rows")
         if not (self.s > 0.0).all():
             raise InvalidInputError("every capacity must be above zero", field="s")
+
+    @classmethod
+    def assembled(
+        cls,
+        *,
+        origin: Array,
+        generators: Array,
+        columns: tuple[str, ...],
+        rows: tuple[Row, ...],
+        L: Array,
+        l0: Array,
+        s: Array,
+        H: Array,
+        h: Array,
+        D: Array,
+    ) -> Self:
+        """Return a set of arrays that are known to fit each other: nothing is checked."""
+        space = cls.__new__(cls)
+        space.__dict__.update(
+            origin=origin,
+            generators=generators,
+            columns=columns,
+            rows=rows,
+            L=L,
+            l0=l0,
+            s=s,
+            H=H,
+            h=h,
+            D=D,
+        )
+        return space
 
     @property
     def A(self) -> Array:
@@ -225,15 +242,10 @@ class WrenchSpace:
     def _axes(self) -> tuple[Array, Array]:
         """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
 
-        Facets and vertices are found in coordinates along these, divided by the reach: there a
-        thin set is as round as any other, and the normals of its facets are well apart.
+        Facets and vertices are found in coordinates along these, divided by the reach.
         """
         edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
-        if not edges:
-            return np.zeros((0, 6)), np.zeros(0)
-        _, reach, directions = np.linalg.svd(np.vstack(edges), full_matrices=False)
-        rank = int((reach > FLATNESS * reach[0]).sum())
-        return directions[:rank], reach[:rank]
+        return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
 
     @cached_property
     def _parts(self) -> list[Summand]:
@@ -336,6 +348,8 @@ class WrenchSpace:
         parts, r = self._parts, len(self._axes[1])
         if r == 0:
             return Faces(np.zeros((0, 0)), np.zeros(0))
+        if all(part.dimension == 1 for part in parts):
+            return zonotope.facets(np.array([part.points[1] for part in parts]))
         if all(part.dimension <= 2 for part in parts):
             normals = sum_normals(parts, r, self._rounding)
             offsets = sum(
@@ -353,18 +367,9 @@ class WrenchSpace:
         EmptySetError
             If nothing is left at u = 1.
         """
-        normals, offsets = self._facets
-        directions, reach = self._axes
-        lifted = (normals / reach) @ directions
-        lengths = np.linalg.norm(lifted, axis=1)
-        lifted, offsets = lifted / lengths[:, None], offsets / lengths
-        _, _, full = np.linalg.svd(np.vstack([directions, np.zeros((1, 6))]))
-        flat = full[len(directions) :]
-        return HalfSpaces(
-            normals=lifted * SCALE,
-            offsets=offsets + lifted @ self._base,
-            equation_normals=flat * SCALE,
-            equation_offsets=flat @ self._base,
+        scaled = lifted(self._facets, *self._axes, self._base)
+        return scaled._replace(
+            normals=scaled.normals * SCALE, equation_normals=scaled.equation_normals * SCALE
         )
 
     def vertices(self) -> Array:

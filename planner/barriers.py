@@ -11,6 +11,7 @@ beyond any strength, always counts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -22,6 +23,7 @@ from scipy.optimize import OptimizeResult, linprog
 
 from hand_models.frames import Array
 from hand_models.wrench_space import WrenchSpace
+from planner import deadline
 from planner.binding import limit_name
 from planner.plan import LimitName
 from planner.program import UNLIMITED
@@ -180,7 +182,7 @@ class System:
         Returns
         -------
         Violation or None
-            None if the solver does not say.
+            None if the solver does not say, or the time is over.
         """
         chosen = frozenset(barriers)
         rows = np.flatnonzero(among(self.names, chosen))
@@ -218,7 +220,13 @@ def vertex(
     E: Array | None = None,
     e: Array | None = None,
 ) -> OptimizeResult | None:
-    """Return a vertex of least cost · x with A x ≤ b, E x = e within bounds; None if not found."""
+    """Return a vertex of least cost · x with A x ≤ b, E x = e within bounds.
+
+    None if it is not found, or not in time.
+    """
+    left = deadline.left()
+    if left == 0.0:
+        return None
     result = linprog(
         cost,
         A_ub=A,
@@ -227,7 +235,11 @@ def vertex(
         b_eq=e,
         bounds=list(zip(*(ends.tolist() for ends in bounds), strict=True)),
         method="highs-ds",
-        options={"primal_feasibility_tolerance": EXACT, "dual_feasibility_tolerance": EXACT},
+        options={
+            "primal_feasibility_tolerance": EXACT,
+            "dual_feasibility_tolerance": EXACT,
+            "time_limit": math.inf if left is None else left,
+        },
     )
     return result if result.status == 0 and result.x is not None else None
 

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import accumulate, chain
 from typing import Final, NamedTuple
 
-from hand_models.frames import Array
+import numpy as np
+
+from hand_models.frames import Array, Indices
 from hand_models.wrench_space import Row, WrenchSpace
 from planner.plan import LimitName, Price
 from planner.program import SLACK
+from planner.stacked import KEPT_NAMES, Same, joined
 from planner.stance_data import JOINT_TORQUE
 
-__all__ = ["Used", "joint_name", "limit_name", "limiting_limit", "prices", "unit_of", "used_limits"]
+__all__ = ["Binding", "Used", "close_to", "joint_name", "limit_name", "unit_of", "used_limits"]
 
 BINDING: Final = 1e-6
 """Multipliers below this do not count as binding."""
 
 ALIKE: Final = 5
 """Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
+
+NO_WORTH: Final = (-math.inf, 0)
+"""Of limits that do not bind: less than any that does, and its place."""
 
 UNITS: Final = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
 """Of limits that are not in newtons."""
@@ -52,39 +62,37 @@ class Used(NamedTuple):
 
 
 def used_limits(
-    limbs: Sequence[str], spaces: Sequence[WrenchSpace], loads: Sequence[Array]
+    limbs: Sequence[str], spaces: Sequence[WrenchSpace], used: Array, least: float
 ) -> Iterator[Used]:
-    """Yield how much of every limit row is used."""
-    for limb, space, y in zip(limbs, spaces, loads, strict=True):
-        for row, used, capacity in zip(space.rows, space.utilisations(y), space.s, strict=False):
-            yield Used(limit_name(limb, row), float(used * capacity), float(capacity))
+    """Yield how much is used of every limit row of which that is at least so much.
 
-
-def limiting_limit(used: Sequence[Used], utilisation: float, dear: Sequence[Price]) -> Used | None:
-    """Return the limit with the largest utilisation; of those that tie, the dearest.
-
-    The others only follow it.
+    Parameters
+    ----------
+    limbs : sequence of str
+    spaces : sequence of WrenchSpace
+    used : ndarray, shape (sum of nl,)
+        Utilisation of every limit row, hand by hand.
+    least : float
     """
-    close = utilisation - 2.0 * SLACK * max(1.0, utilisation)
-    rank_of = {price.name: len(dear) - i for i, price in enumerate(dear)}
+    first = 0
+    for limb, space in zip(limbs, spaces, strict=True):
+        mine = used[first : first + len(space.s)]
+        first += len(space.s)
+        for i in np.flatnonzero(mine >= least).tolist():
+            capacity = float(space.s[i])
+            yield Used(limit_name(limb, space.rows[i]), float(mine[i]) * capacity, capacity)
 
-    def rank(each: Used) -> tuple[bool, int, float]:
-        return each.utilisation >= close, rank_of.get(each.name, 0), each.utilisation
 
-    return max(used, key=rank, default=None)
+def close_to(utilisation: float) -> float:
+    """Return from which utilisation on a limit ties with those of which most is used."""
+    return utilisation - 2.0 * SLACK * max(1.0, utilisation)
 
 
-def prices(
-    limbs: Sequence[str],
-    spaces: Sequence[WrenchSpace],
-    multipliers: Sequence[Array],
-    utilisation: float,
-) -> tuple[Price, ...]:
-    """Return the price of each limit that binds; rows of one name are one limit.
+class Binding:
+    """What binds a plan, by the multipliers of its program; rows of one name are one limit.
 
-    A limit ``L y + l0 ≤ u s`` with multiplier λ, in units of its capacity, takes λ u / s off the
-    objective for each unit more of s. The dearest come first: of which one per cent more would
-    take most off, so that newtons compare with amperes.
+    The dearest come first: of which one per cent more would take most off, so that newtons compare
+    with amperes.
 
     Parameters
     ----------
@@ -92,19 +100,107 @@ def prices(
     spaces : sequence of WrenchSpace
     multipliers : sequence of ndarray
         Of each hand's limit rows.
-    utilisation : float
-        At which the rows stand.
     """
-    found: dict[LimitName, float] = {}
-    worth: dict[LimitName, float] = {}
-    for limb, space, duals in zip(limbs, spaces, multipliers, strict=True):
-        for row, multiplier, capacity in zip(space.rows, duals, space.s, strict=False):
-            if multiplier > BINDING:
-                name = limit_name(limb, row)
-                price = float(multiplier * utilisation / capacity)
-                found[name] = found.get(name, 0.0) + price
-                worth[name] = worth.get(name, 0.0) + float(multiplier)
-    return tuple(
-        Price(name, found[name], unit_of(name.limit))
-        for name in sorted(worth, key=lambda name: -round(worth[name], ALIKE))
+
+    def __init__(
+        self,
+        limbs: Sequence[str],
+        spaces: Sequence[WrenchSpace],
+        multipliers: Sequence[Array],
+    ) -> None:
+        self._spaces = spaces
+        self._named = named = _named(Same(*[space.rows for space in spaces]), tuple(limbs))
+        duals = joined(multipliers)
+        self._rows = rows = (duals > BINDING).nonzero()[0]
+        self._weights, ids = duals[rows], named.of_row[rows]
+        worth = np.bincount(ids, self._weights, len(named.names)).tolist()
+        # of limits that are worth alike, the one whose row comes first
+        first = {limit: place for place, limit in enumerate(dict.fromkeys(ids.tolist()))}
+        self._worth = {limit: (round(worth[limit], ALIKE), -first[limit]) for limit in first}
+
+    def prices(self, utilisation: float) -> tuple[Price, ...]:
+        """Return the price of each limit that binds.
+
+        A limit ``L y + l0 ≤ u s`` with multiplier λ, in units of its capacity, takes λ u / s off
+        the objective for each unit more of s.
+
+        Parameters
+        ----------
+        utilisation : float
+            At which the rows stand.
+        """
+        names, capacities = self._named.names, joined([space.s for space in self._spaces])
+        dear = sorted(self._worth, key=self._worth.__getitem__, reverse=True)
+        each = self._weights * utilisation / capacities[self._rows]
+        price = np.bincount(self._named.of_row[self._rows], each, len(names)).tolist()
+        return tuple(Price(names[i], price[i], unit_of(names[i].limit)) for i in dear)
+
+    def limiting(self, used: Array, utilisation: float, idle: Sequence[Used]) -> Used | None:
+        """Return the limit with the largest utilisation; of those that tie, the dearest.
+
+        The others only follow it.
+
+        Parameters
+        ----------
+        used : ndarray, shape (sum of nl,)
+            Utilisation of every limit row, hand by hand.
+        utilisation : float
+            The largest of these and the idle ones.
+        idle : sequence of Used
+            Limits of limbs without a hand, which have no price.
+        """
+        named = self._named
+        rows = (used >= close_to(utilisation)).nonzero()[0]
+        best, found = (NO_WORTH, -math.inf), None
+        for row, limit, share in zip(
+            rows.tolist(), named.of_row[rows].tolist(), used[rows].tolist(), strict=True
+        ):
+            own = self._worth.get(limit, NO_WORTH), share
+            if own > best:
+                best, found = own, row
+        most = max(idle, key=lambda each: each.utilisation, default=None)
+        if most is not None and (NO_WORTH, most.utilisation) > best:
+            return most
+        if found is None:
+            return None
+        h = bisect_right(named.first_row, found) - 1
+        capacity = float(self._spaces[h].s[found - named.first_row[h]])
+        return Used(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
+
+
+class _Named(NamedTuple):
+    """The limits of some hands, each name once.
+
+    Attributes
+    ----------
+    names : tuple of LimitName
+    of_row : ndarray of int, shape (sum of nl,)
+        Which of them each limit row is.
+    first_row : tuple of int
+        Each hand's first row.
+    """
+
+    names: tuple[LimitName, ...]
+    of_row: Indices
+    first_row: tuple[int, ...]
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _named(key: Same, limbs: tuple[str, ...]) -> _Named:
+    """Return the limits of hands of limbs; ``key``: the rows of the set of each."""
+    hands = [_named_alone(Same(rows), limb) for rows, limb in zip(key.each, limbs, strict=True)]
+    offsets = accumulate((len(hand.names) for hand in hands), initial=0)
+    return _Named(
+        tuple(chain.from_iterable(hand.names for hand in hands)),
+        joined([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
+        tuple(accumulate((len(hand.of_row) for hand in hands[:-1]), initial=0)),
     )
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _named_alone(key: Same, limb: str) -> _Named:
+    rows: tuple[Row, ...] = key.each[0]  # type: ignore[assignment]
+    names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
+    index = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    of_row = np.array([index[name] for name in names], dtype=np.intp)
+    return _Named(tuple(index), of_row, (0,))

@@ -44,7 +44,7 @@ class BodyPrograms:
     Attributes
     ----------
     question : Question
-        Without extras, and for the least utilisation.
+        Without extras and deadline, and for the least utilisation.
     plan : Plan
         Its answer.
     data : StanceData
@@ -56,7 +56,7 @@ class BodyPrograms:
     """
 
     def __init__(self, question: Question) -> None:
-        self.question = replace(question, want=frozenset(), objective="max_margin")
+        self.question = replace(question, want=frozenset(), objective="max_margin", deadline=None)
         self.plan = plan(self.question)
         where = None if self.plan.joints is None else posture_at(question, self.plan.joints)
         _, hands = gather(self.question, where, self.plan.body_wrench)

@@ -85,12 +85,13 @@ class BodySpace:
     Parameters
     ----------
     question : Question
-        Its limits, joints, caps and given hand wrenches count as in a plan; its objective does not.
+        Its limits, joints, caps and given hand wrenches count as in a plan; its objective and its
+        deadline do not.
 
     Attributes
     ----------
     question : Question
-        Without extras, and for the least utilisation.
+        Without extras and deadline, and for the least utilisation.
     plan : Plan
         Of least utilisation for the body wrench asked for.
     exact : bool

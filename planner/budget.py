@@ -1,6 +1,11 @@
-"""How much a search may still compute: a count of programs, the same on every machine."""
+"""How much a search may still compute: a count of programs, the same on every machine.
+
+A deadline, where there is one, ends every budget.
+"""
 
 from __future__ import annotations
+
+from planner import deadline
 
 __all__ = ["Budget"]
 
@@ -23,8 +28,10 @@ class Budget:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is left, here or of the whole."""
-        return self._left <= 0 or (self._whole is not None and self._whole.ended)
+        """Whether nothing is left, here or of the whole, or the time is over."""
+        if self._left <= 0 or deadline.expired():
+            return True
+        return self._whole is not None and self._whole.ended
 
     def spend(self, programs: int = 1) -> None:
         """Take some programs off."""

@@ -15,7 +15,7 @@ import numpy as np
 from hand_models.frames import Array
 from hand_models.row_layout import TENDON_TENSION
 from hand_models.wrench_space import WrenchSpace
-from planner import program, stance_data
+from planner import deadline, program, stance_data
 from planner.barriers import HELD_WRENCH, System, ranked, vertex
 from planner.binding import Used
 from planner.hand_rows import FORCE_CAP, TENSION_CHANGE
@@ -66,7 +66,9 @@ class Hindered(NamedTuple):
     limits: Limits = Limits()
 
 
-def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | None:
+def certify(
+    stance: Hindered, nearest: Outcome | None = None, known: Outcome | None = None
+) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
     With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
@@ -78,6 +80,8 @@ def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | N
     nearest : Outcome, optional
         The loads that come nearest to the body wrench, with given wrenches of hands as they are
         given; found here by default.
+    known : Outcome, optional
+        Of the program without a plan. Where the time is over, its multipliers are the proof.
 
     Returns
     -------
@@ -92,14 +96,16 @@ def certify(stance: Hindered, nearest: Outcome | None = None) -> Certificate | N
     if nearest.solved:
         missing = data.wrench - stance_data.body_wrench(data, nearest.loads)
         missing[6:] = 0.0
-        direction, multipliers = _polished(system, missing)
+        found: tuple[Array, Array] | None = _polished(system, missing)
     else:
         found = _contradiction(system, limbs)
-        if found is None:
-            return None
-        direction, multipliers = found
-    if not system.proves(direction, multipliers):
+    proven = found is not None and system.proves(*found)
+    if not proven and known is not None and deadline.expired():
+        found = _multipliers(system, known, capped=cap is not None)
+        proven = found is not None and system.proves(*found)
+    if found is None or not proven:
         return None
+    direction, multipliers = found
     weights = system.weights(direction, multipliers)
     irreducible = irreducible_set(system, weights)
     if irreducible is not None:
@@ -187,6 +193,26 @@ def _contradiction(system: System, limbs: Sequence[str]) -> tuple[Array, Array] 
         if found is not None and found.size > CONTRADICTS:
             return found.direction, found.multipliers
     return None
+
+
+def _multipliers(system: System, outcome: Outcome, *, capped: bool) -> tuple[Array, Array] | None:
+    """Return a unit d and λ as the multipliers of a program without a plan tell them.
+
+    Where d is next to none, rows contradict each other whatever the body needs.
+    """
+    if outcome.balance_dual is None:
+        return None
+    parts = [
+        part
+        for limit, hard in zip(outcome.limit_duals, outcome.hard_duals, strict=True)
+        for part in ((limit, hard) if capped else (hard,))
+    ]
+    direction, multipliers = -outcome.balance_dual, np.maximum(np.concatenate(parts), 0.0)
+    length, weight = float(np.linalg.norm(direction[:6])), float(multipliers.sum())
+    if length > BLOCKING * weight:
+        return direction / length, multipliers / length
+    direction[:6] = 0.0
+    return (direction / weight, multipliers / weight) if weight > 0.0 else None
 
 
 def _polished(system: System, missing: Array) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planner import deadline
 from planner.budget import Budget
 from planner.floating import Settled, settle_wrists
 from planner.hand_sets import Hands
@@ -99,6 +100,8 @@ def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | No
     """
     choices = starts(hands, 1.0, budget)
     plan = first_plan(hands, 1.0, choices, budget.part(FIRST))
+    if deadline.expired():
+        return plan, None
     most: LargestFactor | None = None
     if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
         along = budget.part(ALONG)
@@ -164,6 +167,8 @@ def _as_good(found: Settled, plan: Settled) -> bool:
 def _ways(hands: Hands, plan: Settled, budget: Budget) -> Iterator[_Way]:
     """Yield searches along the factor: up from a small one, and down from a plan."""
     for fraction in FRACTIONS:
+        if deadline.expired():
+            return
         part = budget.part(FIRST)
         start = first_plan(hands, fraction, starts(hands, fraction, part), part)
         if start.exact:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import Final
 
 import numpy as np
 
 from hand_models.frames import Array
 from planner.program import TIE, Outcome, tie_weight
+from planner.stacked import joined
 from planner.stance_data import StanceData
 
 __all__ = ["least_bound", "least_effort_bound", "unique_bound"]
@@ -23,9 +24,7 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
     With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
     u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
     """
-    slopes = [np.zeros(len(hand.unit)) for hand in data.hands]
-    leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
-    return _dual_bound(data, outcome, slopes, 0.0, leak)
+    return _dual_bound(data, outcome, None, 0.0, _missing(outcome))
 
 
 def unique_bound(data: StanceData, outcome: Outcome) -> float:
@@ -38,15 +37,12 @@ def unique_bound(data: StanceData, outcome: Outcome) -> float:
     the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
     `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
     """
-    slopes, value = [], 0.0
-    leak = abs(1.0 - sum(float(limit.sum()) for limit in outcome.limit_duals))
-    weight = tie_weight(data.shape)
-    for hand, y in zip(data.hands, outcome.loads, strict=True):
-        small = hand.tie * y / hand.unit
-        slopes.append(2.0 * weight * hand.tie * small)
-        value -= weight * float(small @ small)
-    value -= TIE * outcome.value**2
-    return _dual_bound(data, outcome, slopes, 0.0, leak) + value
+    weight, hands = tie_weight(data.shape), data.hands
+    tie = joined([hand.tie for hand in hands])
+    small = tie * joined(outcome.loads) / joined([hand.unit for hand in hands])
+    value = -weight * float(small @ small) - TIE * outcome.value**2
+    slopes = 2.0 * weight * tie * small
+    return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
 
 
 def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
@@ -61,22 +57,34 @@ def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
         effort, small = hand.E @ z + hand.e0, hand.rest**2 * z
         slopes.append(2.0 * (hand.E.T @ effort + small))
         value += float(effort @ effort + small @ z - slopes[-1] @ z)
-    return _dual_bound(data, outcome, slopes, cap, 0.0) + value
+    return _dual_bound(data, outcome, joined(slopes), cap, 0.0) + value
+
+
+def _missing(outcome: Outcome) -> float:
+    """Return how far the multipliers of limits are from a sum of one."""
+    return abs(1.0 - float(joined(outcome.limit_duals).sum()))
 
 
 def _dual_bound(
-    data: StanceData, outcome: Outcome, slopes: Sequence[Array], cap: float, leak: float
+    data: StanceData, outcome: Outcome, slopes: Array | None, cap: float, leak: float
 ) -> float:
-    """Return a lower bound of Σ slope · z over plans, with limits at a cap, from multipliers."""
+    """Return a lower bound of slopes · z over plans, with limits at a cap, from multipliers.
+
+    ``leak``: how far multipliers are from stationary besides.
+    """
     assert outcome.balance_dual is not None
-    nu = outcome.balance_dual
+    hands, nu = data.hands, outcome.balance_dual
+    limits, hards = joined(outcome.limit_duals), joined(outcome.hard_duals)
     scale = max(1.0, abs(outcome.value))
-    bound = -float(nu @ (data.wrench - sum(hand.g for hand in data.hands)))
-    for hand, limit, hard, slope in zip(
-        data.hands, outcome.limit_duals, outcome.hard_duals, slopes, strict=True
-    ):
-        bound += float(limit @ (hand.l0 - cap) - hard @ hand.h)
-        leak += float(np.abs(slope + hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ nu).sum())
-        if min(limit.min(initial=0.0), hard.min(initial=0.0)) < -STATIONARY * scale:
-            return -np.inf
-    return bound if leak <= STATIONARY * scale else -np.inf
+    if min(limits.min(initial=0.0), hards.min(initial=0.0)) < -STATIONARY * scale:
+        return -math.inf
+    pairs = zip(hands, outcome.limit_duals, outcome.hard_duals, strict=True)
+    stationary = joined([hand.L.T @ own + hand.H.T @ hard for hand, own, hard in pairs])
+    stationary += joined([nu @ hand.G for hand in hands])
+    if slopes is not None:
+        stationary += slopes
+    if leak + float(np.abs(stationary).sum()) > STATIONARY * scale:
+        return -math.inf
+    given = data.wrench - np.add.reduce([hand.g for hand in hands])
+    at_rest, hard = joined([hand.l0 for hand in hands]), joined([hand.h for hand in hands])
+    return float(limits @ at_rest - hards @ hard - nu @ given) - cap * float(limits.sum())

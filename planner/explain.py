@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,8 +13,10 @@ from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.row_layout import HAND_LOAD
 from planner.barriers import HELD_WRENCH
 from planner.binding import Used
+from planner.hand_plan import HandPlan
 from planner.hand_rows import FORCE_CAP, TENSION_CHANGE
-from planner.plan import Certificate, HandPlan, LimitName
+from planner.plan import Certificate, LimitName
+from planner.stacked import stacked
 from planner.stance import Stance
 from planner.stance_data import JOINT_TORQUE, WRENCH_UNIT
 
@@ -180,10 +182,8 @@ def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
         fx, fy, fz = hand.wrench[:3]
         force = math.hypot(fx, fy, min(fz, 0.0))
     elif name.limit in ("shear", "pull_off") and hand is not None:
-        finger = next(f for f in hand.fingers if f.name == name.finger)
-        tile = next(t for t in finger.tiles if t.phalanx == name.phalanx)
-        pull = tile.normal if name.limit == "pull_off" else 0.0
-        force = math.hypot(tile.shear, pull, tile.lateral)
+        shear, normal, lateral = hand.loads[hand.tile(name.finger, name.phalanx)].tolist()
+        force = math.hypot(shear, normal if name.limit == "pull_off" else 0.0, lateral)
     if force > 0.0 and load > 0.0:
         load, capacity = force, force * capacity / load
     carried, most = (_spoken_load(name.limit, value) for value in (load, capacity))
@@ -215,10 +215,11 @@ def shortfall_sentence(
     note = ""
     if _floats(certificate, floating):
         note = "; floating hands as they give way where the search for a plan ended"
-    if certificate.shortfall is None:
+    if not certificate.direction.any():
         return f"no loads at any utilisation, whatever the body needs: {barriers}{note}"
-    missing = _missing(certificate.shortfall)
-    sentence = f"no loads balance the body at any utilisation: missing {missing} (in B)"
+    sentence = "no loads balance the body at any utilisation"
+    if certificate.shortfall is not None:
+        sentence += f": missing {_missing(certificate.shortfall)} (in B)"
     if not touching:
         return f"{sentence}; no hand touches rock"
     if names == ():
@@ -240,9 +241,11 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
         return ""
     if not certificate.spaces:
         return "; it holds nothing on, so no plan changes that"
-    if certificate.shortfall is None:
+    if not certificate.direction.any():
         barriers = barriers_sentence(_blamed(certificate))
         sentence = f"; whatever the body needs, no loads keep within all limits: {barriers}"
+    elif certificate.shortfall is None:
+        sentence = f"; no loads keep within all limits: {barriers_sentence(_blamed(certificate))}"
     else:
         cap = certificate.utilisation
         within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
@@ -287,28 +290,33 @@ def barriers_sentence(names: Sequence[LimitName]) -> str:
 
 def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
     """Return what is odd about a stance that can be planned all the same."""
-    found = []
-    body = stance.body.inverse()
-    for place, hand in zip(stance.hands, settled, strict=True):
-        stretch = stance.robot.stretch(place.limb, body @ place.pose)
+    found: list[str] = []
+    limbs = [place.limb for place in stance.hands]
+    stretches = stance.robot.stretches(stance.body, limbs, [place.pose for place in stance.hands])
+    holding, count = stacked(tuple(settled)).touch.holding, len(FINGERS)
+    for h, (place, hand, stretch) in enumerate(zip(stance.hands, settled, stretches, strict=True)):
         if stretch > 1.0:
             found.append(
                 f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes; "
                 "positions in metres, quaternions as [x, y, z, w]?"
             )
-        tiles = int(hand.holding.sum())
-        if not tiles and not hand.palm.engaged:
-            found.append(f"{place.limb}: touches nothing, so it carries nothing")
-        elif not tiles:
-            found.append(f"{place.limb}: no finger touches rock, only the palm does")
-        idle = [
-            name for i, name in enumerate(FINGERS) if not hand.holding[hand.finger_of == i].any()
-        ]
-        if tiles and idle and not place.grasp.fingernail:
-            found.append(f"{place.limb}: {', '.join(idle)} touch no rock")
-        nails = int(hand.nails.sum())
-        if place.grasp.fingernail and 0 < nails < len(FINGERS):
-            found.append(f"{place.limb}: {nails} of {len(FINGERS)} nails hook")
-        if place.grasp.palm and not hand.palm.engaged and tiles:
-            found.append(f"{place.limb}: no palm tile is within its spines' travel of the rock")
+        by_finger = holding[count * h : count * (h + 1)]
+        if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
+            found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
     return tuple(found)
+
+
+def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
+    """Yield what of a hand touches no rock; ``by_finger``: how many tiles and nails hold it."""
+    tiles = sum(by_finger)
+    if not tiles and not hand.palm.engaged:
+        yield "touches nothing, so it carries nothing"
+    elif not tiles:
+        yield "no finger touches rock, only the palm does"
+    idle = [name for name, holds in zip(FINGERS, by_finger, strict=True) if not holds]
+    if tiles and idle and not hand.grasp.fingernail:
+        yield f"{', '.join(idle)} touch no rock"
+    if hand.grasp.fingernail and 0 < tiles < len(FINGERS):
+        yield f"{tiles} of {len(FINGERS)} nails hook"
+    if hand.grasp.palm and not hand.palm.engaged and tiles:
+        yield "no palm tile is within its spines' travel of the rock"

@@ -29,7 +29,7 @@ from scipy.linalg import block_diag
 
 from hand_models.frames import Array
 from hand_models.wrench_space import SCALE
-from planner import stance_data
+from planner import deadline, stance_data
 from planner.budget import Budget
 from planner.floating_goals import RANK, Goal, LeastUse
 from planner.hand_sets import Hands, Measure, Point, Sets
@@ -153,10 +153,12 @@ def settle_wrists(
     """Find the best point for a goal, from a start and with the start's palm modes.
 
     The goal is the least utilisation if none is given. Where the search ends without proof, or its
-    budget does, the point is made exact there.
+    budget does, the point is made exact there. At a deadline the best exact point on the way is
+    what was found.
     """
     goal = LeastUse() if goal is None else goal
     now = _State.of(hands, goal, start, START)
+    passed: Settled | None = None
     within, penalty, stalled = START, goal.least_penalty, 0
     weights, root, rounds = UNSOLVED, None, 0
     for rounds in range(1, most + 1):
@@ -165,8 +167,11 @@ def settle_wrists(
         outcome = goal.solve(now.sets.data)
         budget.spend(2)
         if outcome.solved:
-            if goal.exact(now.measure, hands) and _gap(goal, now, outcome) <= CLOSE:
-                return Settled("least", now.point, now.sets, outcome, rounds, now.error)
+            if goal.exact(now.measure, hands):
+                here = Settled("least", now.point, now.sets, outcome, rounds, now.error)
+                if _gap(goal, now, outcome) <= CLOSE:
+                    return here
+                passed = replace(here, found="unproven")
             penalty = max(penalty, 2.0 * goal.dearest(outcome))
             step, stalled = outcome, 0
             if rounds <= EARLY:
@@ -204,6 +209,8 @@ def settle_wrists(
             if within < KINK:
                 break
             now = _State.of(hands, goal, now.point, within)._replace(error=now.error)
+    if passed is not None and deadline.expired():
+        return replace(passed, rounds=rounds)
     return _made_exact(hands, goal, now, rounds, budget)
 
 
@@ -239,6 +246,8 @@ def _made_exact(hands: Hands, goal: Goal, start: _State, rounds: int, budget: Bu
     """Make the point exact at which a search ended without proof."""
     now = start = _State.of(hands, goal, start.point, START)._replace(error=start.error)
     for _ in range(REPAIRS):
+        if deadline.expired():
+            break
         outcome = goal.solve(now.sets.data)
         budget.spend()
         if goal.exact(now.measure, hands) and outcome.solved:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hand_models.floating_wrist import FloatingWrist
 from hand_models.hand import FINGERS, SettledHand
-from planner.plan import HandPlan
+from planner.hand_plan import HandPlan
 
 __all__ = ["far_wrists", "idle_preloads", "strained_preloads"]
 

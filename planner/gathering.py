@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
-from hand_models.fixed_wrist import wrench_space
-from hand_models.frames import Array, wrench_transport
+from hand_models.fixed_wrist import wrench_spaces
+from hand_models.frames import Array, wrench_transports
 from hand_models.hand import SettledHand
-from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR, TENDON_TENSION
-from hand_models.wrench_space import WrenchSpace
-from planner.hand_rows import AddedRows
+from planner.hand_rows import NOTHING, AddedRows
 from planner.hand_sets import Hands
 from planner.posture import Posture
 from planner.question import Question
-from planner.settling import settle_at, wrist_at
-from planner.stance_data import LOAD_UNIT, WRENCH_UNIT
+from planner.settling import settle_stance, wrist_at
+from planner.stance_data import WRENCH_UNIT
 
 __all__ = ["gather"]
+
+FREE: Final = np.zeros((0, 6))
+"""What is given of a hand's wrench where nothing is given of any."""
 
 
 def gather(
@@ -34,23 +36,20 @@ def gather(
         The body wrench that is needed, in B [N, N·m].
     """
     stance, cap = question.stance, question.limits.tendon_tension
-    settled = [settle_at(stance, i) for i in range(len(stance.hands))]
+    settled = settle_stance(stance)
     wrists = [wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)]
     added = [_added_rows(question, where, i) for i in range(len(stance.hands))]
+    fixed = [hand for hand, wrist in zip(settled, wrists, strict=True) if wrist is None]
+    of_fixed = iter(wrench_spaces(fixed, cap))
     spaces = [
-        rows.on(wrench_space(hand, cap) if wrist is None else wrist.linearised())
-        for hand, wrist, rows in zip(settled, wrists, added, strict=True)
+        rows.on(next(of_fixed) if wrist is None else wrist.linearised())
+        for wrist, rows in zip(wrists, added, strict=True)
     ]
-    body = stance.body.inverse()
     held, aims = _held(question)
     hands = Hands(
         spaces=tuple(spaces),
         wrists=tuple(wrists),
-        transports=tuple(wrench_transport(body @ hand.pose) for hand in stance.hands),
-        reaches=tuple(
-            _reach(space) if wrist is None else None
-            for space, wrist in zip(spaces, wrists, strict=True)
-        ),
+        transports=wrench_transports(stance.body, [hand.pose for hand in stance.hands]),
         wrench=np.concatenate([wrench / WRENCH_UNIT, aims]),
         held=held,
         added=tuple(added),
@@ -61,17 +60,21 @@ def gather(
 def _added_rows(question: Question, where: Posture | None, index: int) -> AddedRows:
     """Return what joints, caps and present tensions add to the set of the hand of that index."""
     hand, limits = question.stance.hands[index], question.limits
-    cap = limits.per_hand.get(hand.limb)
-    axes = {
-        "hand": np.eye(3),
-        "body": hand.pose.rotation.T @ question.stance.body.rotation,
-        "world": hand.pose.rotation.T,
-    }
-    change = limits.tension_change
+    cap, change = limits.per_hand.get(hand.limb), limits.tension_change
+    if where is None and cap is None and change is None:
+        return NOTHING
+    frame = None
+    if cap is not None:
+        axes = {
+            "hand": np.eye(3),
+            "body": hand.pose.rotation.T @ question.stance.body.rotation,
+            "world": hand.pose.rotation.T,
+        }
+        frame = axes[cap.frame]
     return AddedRows(
         joints=None if where is None else where.joints[hand.limb],
         cap=None if cap is None else cap.largest_force,
-        frame=None if cap is None else axes[cap.frame],
+        frame=frame,
         present=question.present.get(hand.limb),
         change=math.inf if change is None else change,
     )
@@ -86,19 +89,9 @@ def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
         for j, value in enumerate(hand.wrench or ())
         if value is not None
     ]
+    if not given:
+        return (FREE,) * len(hands), np.zeros(0)
     held = [np.zeros((len(given), 6)) for _ in hands]
     for row, (i, j, _) in enumerate(given):
         held[i][row, j] = 1.0
     return tuple(held), np.array([value / WRENCH_UNIT[j] for _, j, value in given])
-
-
-def _reach(space: WrenchSpace) -> Array:
-    """Return what each column's load is measured by in the tie-break [N].
-
-    Its own capacity where it has one (tendons, the palm); `LOAD_UNIT` for lateral reactions.
-    """
-    reach = np.full(len(space.columns), LOAD_UNIT)
-    for coefficients, row, capacity in zip(space.L, space.rows, space.s, strict=False):
-        if row.limit in (TENDON_TENSION, PALM_SHEAR, PALM_PRESSING):
-            reach[np.flatnonzero(coefficients)[0]] = capacity
-    return reach

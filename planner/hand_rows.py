@@ -10,7 +10,9 @@ any other:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,9 +21,9 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS
 from hand_models.structure import HELD
 from hand_models.wrench_space import Row, WrenchSpace
-from planner.stance_data import JOINT_TORQUE
+from planner.scaled_rows import JOINT_TORQUE, Names
 
-__all__ = ["FORCE_CAP", "TENSION_CHANGE", "AddedRows", "JointLoads"]
+__all__ = ["FORCE_CAP", "NOTHING", "TENSION_CHANGE", "AddedRows", "JointLoads"]
 
 FORCE_CAP: Final = "force_cap"
 """Name of the limit rows of a cap on a hand's force."""
@@ -29,11 +31,19 @@ FORCE_CAP: Final = "force_cap"
 TENSION_CHANGE: Final = "tension_change"
 """Name of the hard rows that keep tensions near the present ones."""
 
+KEPT: Final = 1024
+"""Lists of names that are kept."""
+
 AXES: Final = ("fx", "fy", "fz")
 
 BALL: Final = np.vstack([HELD, HELD[8:] * [1.0, 1.0, -1.0]])
 """Directions (26, 3) whose largest product with a force is at least its size: `HELD` and, toward
 the rock, its mirror image."""
+
+BALL_ROWS: Final = tuple(
+    Row(None, None, FORCE_CAP, "limit", f"{FORCE_CAP}/{k + 1}") for k in range(len(BALL))
+)
+"""Names of the limit rows of a cap whatever the direction."""
 
 
 class JointLoads(NamedTuple):
@@ -97,47 +107,43 @@ class AddedRows:
 
     def on(self, space: WrenchSpace) -> WrenchSpace:
         """Return a hand's set with these rows."""
+        if self.joints is None and self.cap is None and not self._keeps_tensions:
+            return space
         blocks = [block for block in (self._joint_rows(), self._cap_rows()) if block is not None]
         hard, H, h = self._change_rows(space)
-        if not blocks and not hard:
-            return space
         # wrench rows stay last among the limit rows
         apart = len(space.s) - len(space.D)
-        D = np.vstack([np.zeros((0, 6)), *(block.D for block in blocks)])
+        D = np.concatenate([np.zeros((0, 6)), *(block.D for block in blocks)])
         d0 = np.concatenate([np.zeros(0), *(block.d0 for block in blocks)])
         s = np.concatenate([np.zeros(0), *(block.s for block in blocks)])
-        C = np.vstack([np.zeros((0, 6)), *(block.C for block in blocks)])
+        C = np.concatenate([np.zeros((0, 6)), *(block.C for block in blocks)])
         limits = tuple(row for block in blocks for row in block.rows)
         barriers = tuple(row for block in blocks for row in block.hard)
-        return replace(
-            space,
-            rows=(
-                *space.rows[:apart],
-                *limits,
-                *space.rows[apart:],
-                *barriers,
-                *hard,
-            ),
-            L=np.insert(space.L, [apart] * len(s), D @ space.generators, axis=0),
-            l0=np.insert(space.l0, [apart] * len(s), D @ space.origin + d0),
-            s=np.insert(space.s, [apart] * len(s), s),
-            H=np.vstack([space.H, C @ space.generators, H]),
+        return WrenchSpace.assembled(
+            origin=space.origin,
+            generators=space.generators,
+            columns=space.columns,
+            rows=_joined(Names(space), apart, limits, barriers + hard),
+            L=np.concatenate([space.L[:apart], D @ space.generators, space.L[apart:]]),
+            l0=np.concatenate([space.l0[:apart], D @ space.origin + d0, space.l0[apart:]]),
+            s=np.concatenate([space.s[:apart], s, space.s[apart:]]),
+            H=np.concatenate([space.H, C @ space.generators, H]),
             h=np.concatenate([space.h, -(C @ space.origin), h]),
+            D=space.D,
         )
+
+    @property
+    def _keeps_tensions(self) -> bool:
+        return self.present is not None and math.isfinite(self.change)
 
     def _joint_rows(self) -> _Block | None:
         joints = self.joints
         if joints is None:
             return None
-        rows = tuple(
-            Row(None, None, JOINT_TORQUE, "limit", f"{JOINT_TORQUE}/{name}{sign}", name)
-            for sign in "+-"
-            for name in joints.names
-        )
         turned = joints.jacobian.T
         return _Block(
-            rows=rows,
-            D=np.vstack([turned, -turned]),
+            rows=_joint_names(joints.names),
+            D=np.concatenate([turned, -turned]),
             d0=np.concatenate([joints.gravity, -joints.gravity]),
             s=np.concatenate([joints.limits, joints.limits]),
         )
@@ -146,11 +152,8 @@ class AddedRows:
         if self.cap is None:
             return None
         if not isinstance(self.cap, tuple):
-            rows = tuple(
-                Row(None, None, FORCE_CAP, "limit", f"{FORCE_CAP}/{k + 1}")
-                for k in range(len(BALL))
-            )
-            return _Block(rows, _of_force(BALL), np.zeros(len(BALL)), np.full(len(BALL), self.cap))
+            sizes = np.full(len(BALL), float(self.cap))
+            return _Block(BALL_ROWS, _of_force(BALL), np.zeros(len(BALL)), sizes)
         assert self.frame is not None
         limits: list[tuple[Row, Array, float]] = []
         hard: list[tuple[Row, Array]] = []
@@ -172,21 +175,47 @@ class AddedRows:
 
     def _change_rows(self, space: WrenchSpace) -> tuple[tuple[Row, ...], Array, Array]:
         rows: list[Row] = []
-        H = np.zeros((0, len(space.columns)))
-        h = np.zeros(0)
-        if self.present is not None and np.isfinite(self.change):
+        entries: list[tuple[int, float]] = []
+        most: list[float] = []
+        if self.present is not None and self._keeps_tensions:
             for i, finger in enumerate(FINGERS):
                 if f"{finger}/tension" not in space.columns:
                     continue
-                unit = np.eye(len(space.columns))[space.columns.index(f"{finger}/tension")]
+                column = space.columns.index(f"{finger}/tension")
                 for kind, sign in (("up", 1.0), ("down", -1.0)):
                     label = f"{finger}/{TENSION_CHANGE}/{kind}"
                     rows.append(Row(finger, None, TENSION_CHANGE, "hard", label))
-                    H = np.vstack([H, sign * unit])
-                    h = np.append(h, self.change + sign * self.present[i])
-        return tuple(rows), H, h
+                    entries.append((column, sign))
+                    most.append(self.change + sign * float(self.present[i]))
+        H = np.zeros((len(rows), len(space.columns)))
+        for row, (column, sign) in enumerate(entries):
+            H[row, column] = sign
+        return tuple(rows), H, np.array(most)
+
+
+NOTHING: Final = AddedRows()
+"""No rows."""
+
+
+@lru_cache(maxsize=KEPT)
+def _joined(
+    names: Names, apart: int, limits: tuple[Row, ...], hard: tuple[Row, ...]
+) -> tuple[Row, ...]:
+    """Return the names of a set's rows with further limit rows, after so many, and hard rows."""
+    return (*names.rows[:apart], *limits, *names.rows[apart:], *hard)
+
+
+@lru_cache(maxsize=KEPT)
+def _joint_names(joints: tuple[str, ...]) -> tuple[Row, ...]:
+    return tuple(
+        Row(None, None, JOINT_TORQUE, "limit", f"{JOINT_TORQUE}/{name}{sign}", name)
+        for sign in "+-"
+        for name in joints
+    )
 
 
 def _of_force(directions: Array) -> Array:
     """Return rows (n, 6) of a wrench that take directions (n, 3) of its force."""
-    return np.hstack([directions, np.zeros((len(directions), 3))])
+    rows = np.zeros((len(directions), 6))
+    rows[:, :3] = directions
+    return rows

@@ -21,7 +21,15 @@ from hand_models.wrench_space import SCALE, WrenchSpace
 from planner import stance_data
 from planner.hand_rows import AddedRows
 from planner.program import Outcome
-from planner.stance_data import TWIST_UNIT, WRIST_RANGE, HandData, StanceData
+from planner.scaled_rows import scaled_rows
+from planner.stance_data import (
+    TWIST_UNIT,
+    WRIST_RANGE,
+    HandData,
+    StanceData,
+    scaled_transports,
+    with_held,
+)
 
 __all__ = ["Hands", "Measure", "Point", "Sets", "slopes_of", "widest_at_rest"]
 
@@ -122,10 +130,8 @@ class Hands:
         Of floating hands, at rest with idle palms.
     wrists : tuple of FloatingWrist or None
         None for hands with a fixed wrist.
-    transports : tuple of ndarray, shape (6, 6)
+    transports : ndarray, shape (hands, 6, 6)
         Ad(B←H).
-    reaches : tuple of ndarray or None
-        Of `HandData.of`.
     wrench : ndarray, shape (nb,)
         What the balance is to give: the body wrench, in `WRENCH_UNIT`, and components of hands'
         wrenches that are given.
@@ -139,8 +145,7 @@ class Hands:
 
     spaces: tuple[WrenchSpace, ...]
     wrists: tuple[FloatingWrist | None, ...]
-    transports: tuple[Array, ...]
-    reaches: tuple[Array | None, ...]
+    transports: Array
     wrench: Array
     held: tuple[Array, ...]
     added: tuple[AddedRows, ...]
@@ -154,11 +159,19 @@ class Hands:
     def _fixed(self) -> tuple[HandData, ...]:
         """Data of hands with a fixed wrist; of floating ones a place to fill."""
         return tuple(
-            HandData.of(space, transport, reach, held)
-            for space, transport, reach, held in zip(
-                self.spaces, self.transports, self.reaches, self.held, strict=True
+            HandData.carried(scaled_rows(space), with_held(carried, held))
+            for space, carried, held in zip(
+                self.spaces, scaled_transports(self.transports), self.held, strict=True
             )
         )
+
+    def turned(self, wrench: Array) -> Hands:
+        """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
+        aims = self.wrench[len(wrench) :]
+        other = replace(self, wrench=np.concatenate([wrench / stance_data.WRENCH_UNIT, aims]))
+        # the same data, too, so that a solver sees what is new
+        other.__dict__["_fixed"] = self._fixed
+        return other
 
     @property
     def idle(self) -> tuple[PalmMode | None, ...]:
@@ -186,6 +199,8 @@ class Hands:
         farthest : sequence of ndarray, shape (6,), optional
             With a range, how far from rest each wrist's twist may be [m, rad].
         """
+        if not self.floating:
+            return Sets(self.spaces, StanceData(self._fixed, self.goal(point.factor)))
         reach = None if within is None else within * TWIST_UNIT
         spaces, data = list(self.spaces), list(self._fixed)
         for i, (wrist, y, palm) in enumerate(
@@ -196,13 +211,15 @@ class Hands:
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
                 spaces[i] = self.added[i].on(space)
-                part = HandData.of(spaces[i], self.transports[i], held=self.held[i])
+                part = HandData.of(spaces[i], self.transports[i], self.held[i])
                 # where a wrist is costs nothing by itself
                 data[i] = part._replace(rest=np.zeros(len(part.rest)))
         return Sets(tuple(spaces), StanceData(tuple(data), self.goal(point.factor)))
 
     def goal(self, factor: float) -> Array:
         """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
+        if factor == 1.0:
+            return self.wrench
         return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])
 
     def curvature(

@@ -10,6 +10,7 @@ import numpy as np
 
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, Pose, finite_vector
+from planner import deadline
 from planner.limb_batch import Efforts, LimbBatch
 from planner.out_of_reach import PLACED, TURNED, lack
 from planner.pose_search import TOLERANCE, find_angles, starts_near
@@ -137,6 +138,8 @@ def solve_limbs(
     InvalidInputError
         If a limb is unknown, a pose is not finite, or a seed or a load has not its shape or is not
         finite.
+    DeadlineError
+        If the time is over before.
     """
     seeds, loads = seeds or {}, loads or {}
     for field, given in (("poses", poses), ("seeds", seeds), ("loads", loads)):
@@ -166,6 +169,7 @@ def solve_limbs(
         values = angles[i, : batch.joints[i]].copy()
         missing, turned = 0.0, None
         if not solved[i]:
+            deadline.check("it was known how far a hand is out of reach")
             missing, turned = _lacking(batch, i, values)
         found[limb] = IkSolution(
             angles=values,

@@ -14,7 +14,7 @@ from typing import Final
 
 from hand_models.floating_wrist import PALM_MODES, PalmMode
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
-from planner import program
+from planner import deadline, program
 from planner.budget import Budget
 from planner.floating import ROUNDS, Settled, settle_wrists
 from planner.floating_goals import Goal, LeastUse
@@ -80,6 +80,8 @@ def starts(hands: Hands, factor: float, budget: Budget) -> Iterator[Palms]:
 
 def _rank(hands: Hands, palms: Palms, factor: float, budget: Budget) -> float:
     """Return the least utilisation with the sets at rest; more where they have no balance."""
+    if deadline.expired():
+        return float("inf")
     data = hands.sets(replace(hands.at_rest(palms), factor=factor)).data
     outcome = program.margin(data)
     budget.spend()

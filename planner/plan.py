@@ -4,37 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hand_models.floating_wrist import PalmMode
 from hand_models.frames import Array
-from hand_models.hand import Seating
-from hand_models.spines import HalfPlane
 from hand_models.wrench_space import WrenchSpace
+from planner.hand_plan import HandPlan
+from planner.unfinished import Unfinished
 
 __all__ = [
     "Certificate",
-    "FingerPlan",
-    "HandPlan",
     "LimitName",
-    "PalmPlan",
     "Plan",
     "Price",
     "SolverInfo",
     "Status",
     "TensionPath",
-    "TileLoad",
     "Times",
-    "WristPlan",
 ]
 
 Status = Literal["optimal", "overloaded", "infeasible", "failed"]
 
 
-@dataclass(frozen=True)
-class LimitName:
+class LimitName(NamedTuple):
     """A limit of one hand, by name.
 
     Attributes
@@ -58,8 +51,7 @@ class LimitName:
     joint: str | None = None
 
 
-@dataclass(frozen=True)
-class Price:
+class Price(NamedTuple):
     """A limit that binds, and what one more unit of it would take off the utilisation.
 
     Attributes
@@ -74,137 +66,6 @@ class Price:
     name: LimitName
     price: float
     unit: str
-
-
-@dataclass(frozen=True, eq=False)
-class TileLoad:
-    """One finger tile of a plan. Vectors in H, forces on the rock, SI units.
-
-    Attributes
-    ----------
-    phalanx : str
-        ``base``, ``proximal``, ``middle`` or ``distal``.
-    contact : str
-        ``face``, ``edge``, ``frame`` where its phalanx only presses beside it, or ``none`` where
-        it touches nothing and carries nothing.
-    position : ndarray, shape (3,)
-    force : ndarray, shape (3,)
-        shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
-    shear, normal, lateral : float
-    shear_axis, normal_axis, lateral_axis : ndarray, shape (3,)
-    utilisation : float
-        Largest load over capacity of its half-planes; never below zero.
-    load_at_zero : ndarray, shape (2,), or None
-        Shear and normal load at zero tension [N]; None where the wrist floats.
-    load_per_newton : ndarray, shape (2,), or None
-        The same per newton of tension.
-    half_planes : tuple of HalfPlane
-    """
-
-    phalanx: str
-    contact: str
-    position: Array
-    force: Array
-    shear: float
-    normal: float
-    lateral: float
-    shear_axis: Array
-    normal_axis: Array
-    lateral_axis: Array
-    utilisation: float
-    load_at_zero: Array | None
-    load_per_newton: Array | None
-    half_planes: tuple[HalfPlane, ...]
-
-
-@dataclass(frozen=True)
-class FingerPlan:
-    """One finger of a plan.
-
-    Attributes
-    ----------
-    name : str
-    tendon_tension : float
-        [N]
-    motor_torque, motor_current : float
-        Of its motor while it tightens the tendon to that [N·m], [A].
-    winch_angle : float
-        From the open finger to that tension, of a floating hand to the preload at which the motor
-        stands still [rad].
-    tiles : tuple of TileLoad
-        From the base outward.
-    """
-
-    name: str
-    tendon_tension: float
-    motor_torque: float
-    motor_current: float
-    winch_angle: float
-    tiles: tuple[TileLoad, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class PalmPlan:
-    """The palm of a plan: where it acts and its force and moment on the rock, in H."""
-
-    position: Array
-    force: Array
-    moment: Array
-    engaged: tuple[int, ...]
-    utilisation: float
-
-
-@dataclass(frozen=True, eq=False)
-class WristPlan:
-    """Where the wrist of a floating hand goes.
-
-    Attributes
-    ----------
-    twist : ndarray, shape (6,)
-        ξ of H about its origin at rest [m, rad].
-    palm : PalmMode
-        How the palm carries: of the hand's sets, one for each, that which the plan is in.
-    rounds : int
-        How often all hands' sets were linearised.
-    error : float
-        How far the set before the last was off where the wrist went: forces, and moments over
-        0.1 m [N]. The plan itself is exact.
-    """
-
-    twist: Array
-    palm: PalmMode
-    rounds: int
-    error: float
-
-
-@dataclass(frozen=True, eq=False)
-class HandPlan:
-    """One hand of a plan.
-
-    Attributes
-    ----------
-    limb : str
-    wrench : ndarray, shape (6,)
-        On the rock, in H.
-    fingers : tuple of FingerPlan
-    palm : PalmPlan
-    utilisation : float
-    seating : Seating
-        Where the hold is in H.
-    space : WrenchSpace
-        The set that the program used; of a floating hand linearised where its wrist goes.
-    wrist : WristPlan or None
-        None for a hand with a fixed wrist.
-    """
-
-    limb: str
-    wrench: Array
-    fingers: tuple[FingerPlan, ...]
-    palm: PalmPlan
-    utilisation: float
-    seating: Seating
-    space: WrenchSpace
-    wrist: WristPlan | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +96,8 @@ class Certificate:
         Larger than ``supremum``.
     shortfall : ndarray, shape (6,), or None
         What is missing in B: the body wrench asked for minus the nearest that can be had. None
-        where nothing can: the hands' own rows, or the wrenches they are given, leave no loads.
+        where nothing can: the hands' own rows, or the wrenches they are given, leave no loads. None
+        also where a deadline came before it was found; the direction is not zero then.
     nearest : ndarray, shape (6,), or None
         That nearest body wrench.
     blocking : tuple of LimitName
@@ -353,9 +215,13 @@ class Plan:
     reason : str
         One sentence that a climber understands.
     warnings : tuple of str
-        What is odd about the stance: hands that touch nothing, or are out of reach.
+        What is odd about the stance: hands that touch nothing, or are out of reach. What a deadline
+        has left unfinished.
     solver : SolverInfo
     time : Times
+    unfinished : tuple of str
+        What a deadline has left unfinished, by name: see `planner.unfinished`. Values that are
+        missing for it are None.
     """
 
     status: Status
@@ -379,6 +245,7 @@ class Plan:
     warnings: tuple[str, ...]
     solver: SolverInfo
     time: Times
+    unfinished: tuple[Unfinished, ...] = ()
 
     @property
     def joint_utilisation(self) -> float | None:

@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from hand_models.frames import Array, Pose
 from hand_models.hand import SettledHand
-from planner.plan import HandPlan, Plan
+from planner.hand_plan import HandPlan
+from planner.plan import Plan
 from planner.question import Question
 from planner.rock_patches import rock_patch
 from planner.settling import settle

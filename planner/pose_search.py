@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hand_models.frames import Array, Indices, Pose, finite_vector
+from planner import deadline
 from planner.limb_batch import Efforts, LimbBatch
 from planner.robot_model import RobotModel
 
@@ -74,6 +75,8 @@ def find_angles(
     ------
     InvalidInputError
         If a seed is not as many finite numbers as its limb has joints.
+    DeadlineError
+        If the time is over before.
     """
     best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
     seeded = np.flatnonzero([limb in seeds for limb in batch.limbs])
@@ -117,6 +120,7 @@ def _follow(
     size = np.full(angles.shape[:2], np.inf)
     slow = np.zeros(angles.shape[:2], dtype=bool)
     for k in range(STEPS + MORE_STEPS):
+        deadline.check("the joint angles were found")
         errors, jacobians = part.errors(angles)
         last, size = size, np.abs(errors).max(axis=2)
         done = size <= TOLERANCE

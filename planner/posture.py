@@ -64,6 +64,8 @@ def posture(question: Question) -> Posture | None:
         If a hand's pose is out of its limb's reach; the field is relative to the question.
     InvalidInputError
         If given joints are impossible, or not where the hands' poses are.
+    DeadlineError
+        If the time is over before they are found.
     """
     stance = question.stance
     if stance.joints is None:

@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Final, NamedTuple, Self
@@ -41,7 +42,8 @@ import numpy as np
 
 from hand_models.frames import Array
 from hand_models.hand import FINGERS
-from planner.compiled import Compiled
+from planner import deadline
+from planner.compiled import OUT_OF_TIME, Compiled
 from planner.stance_data import Shape, StanceData
 
 __all__ = [
@@ -95,6 +97,10 @@ CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
 
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
+BUILDER: Final = ThreadPoolExecutor(1, "program-builder")
+"""The one thread that builds programs: CVXPY counts its variables for all threads, and loses count
+where two build at a time. Who cannot wait for it goes on without."""
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -126,6 +132,10 @@ class Outcome:
     limit_duals: tuple[Array, ...] = ()
     hard_duals: tuple[Array, ...] = ()
     balance_dual: Array | None = None
+
+
+LATE: Final = Outcome(False, OUT_OF_TIME, 0, math.nan)
+"""Of a program that is not built in time."""
 
 
 class _Program(ABC):
@@ -165,9 +175,15 @@ class _Program(ABC):
         """Return the problem, with `limits`, `balance`, `own` and `further` set."""
 
     @classmethod
-    def built(cls, shape: Shape, *further: int) -> Self:
-        """Return the program for a shape, built on first use and kept."""
-        program = _built(cls, shape, *further)
+    def built(cls, shape: Shape, *further: int) -> Self | None:
+        """Return the program for a shape, built on first use and kept.
+
+        None if the deadline comes before: it will be there for a later question.
+        """
+        try:
+            program = _built(cls, shape, *further).result(deadline.left())
+        except TimeoutError:
+            return None
         assert isinstance(program, cls)
         return program
 
@@ -424,52 +440,62 @@ class Nearest(_Program):
 
 
 @lru_cache(maxsize=256)
-def _built(kind: type[_Program], shape: Shape, *further: int) -> _Program:
-    return kind(shape, *further)
+def _built(kind: type[_Program], shape: Shape, *further: int) -> Future[_Program]:
+    return BUILDER.submit(kind, shape, *further)
+
+
+def _ask(kind: Any, data: StanceData, *question: Any, further: Sequence[int] = ()) -> Outcome:
+    """Solve a program of that kind, if it is there in time."""
+    program = kind.built(data.shape, *further)
+    outcome: Outcome = LATE if program is None else program.solve(data, *question)
+    return outcome
 
 
 def margin(data: StanceData) -> Outcome:
     """Solve `Margin`, built once for each shape."""
-    return Margin.built(data.shape).solve(data)
+    return _ask(Margin, data)
 
 
 def unique(data: StanceData) -> Outcome:
     """Solve `Unique`, built once for each shape."""
-    return Unique.built(data.shape).solve(data)
+    return _ask(Unique, data)
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     """Solve `Curved`, built once for each shape."""
-    return Curved.built(data.shape).solve(data, root, near)
+    return _ask(Curved, data, root, near)
 
 
 def tie_break(data: StanceData, cap: float) -> Outcome:
     """Solve `TieBreak`, built once for each shape."""
-    return TieBreak.built(data.shape).solve(data, cap)
+    return _ask(TieBreak, data, cap)
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
     """Solve `Effort`, built once for each shape."""
-    return Effort.built(data.shape).solve(data, cap)
+    return _ask(Effort, data, cap)
 
 
 def load_factor(data: StanceData) -> Outcome:
     """Solve `LoadFactor`, built once for each shape."""
-    return LoadFactor.built(data.shape).solve(data)
+    return _ask(LoadFactor, data)
 
 
 def reach(
     data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
 ) -> Reached:
     """Solve `Reach`, built once for each shape."""
-    return Reach.built(data.shape, len(goal)).solve(data, goal, B, cap, K)
+    program = Reach.built(data.shape, len(goal))
+    if program is None:
+        return Reached(LATE, np.full(len(goal), np.nan))
+    return program.solve(data, goal, B, cap, K)
 
 
 def nearest(data: StanceData) -> Outcome:
     """Solve `Nearest`, built once for each shape."""
-    return Nearest.built(data.shape).solve(data)
+    return _ask(Nearest, data)
 
 
 def nearest_body(data: StanceData) -> Outcome:
     """Solve `Nearest` with all given wrenches of hands kept, built once for each shape."""
-    return Nearest.built(data.shape, len(data.wrench) - 6).solve(data)
+    return _ask(Nearest, data, further=(len(data.wrench) - 6,))

@@ -12,6 +12,7 @@ import numpy as np
 from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, finite_vector
 from hand_models.hand import FINGERS
+from planner import deadline
 from planner.stance import Stance, known_limbs, moderate
 
 __all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
@@ -194,6 +195,8 @@ class Question:
         utilisation within the limits.
     present : mapping of str to ndarray, shape (4,)
         Tensions of tendons now, by limb [N].
+    deadline : float, optional
+        How long the answer may take [s]; as long as it takes by default.
     """
 
     stance: Stance
@@ -203,6 +206,7 @@ class Question:
     want: frozenset[Want] = frozenset()
     objective: Objective = "max_margin"
     present: Mapping[str, Array] = field(default_factory=dict)
+    deadline: float | None = None
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:
@@ -214,6 +218,7 @@ class Question:
                 f"unknown objective {self.objective!r}; known are {', '.join(OBJECTIVES)}",
                 field="objective",
             )
+        deadline.possible(self.deadline)
         self._check_limits()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         present = {}

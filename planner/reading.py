@@ -1,186 +1,393 @@
-"""From a hand's loads y to what each tile, tendon, motor and the palm carry."""
+"""From loads y of hands with fixed wrists to what each tile, tendon, motor and palm carries."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import accumulate
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.compliant_hand import CompliantHand
 from hand_models.finger import PHALANGES
-from hand_models.frames import Array
-from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.frames import Array, Indices
+from hand_models.hand import FINGERS, NAIL, SettledHand, SpinyHand, Tile
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
-from hand_models.wrench_space import WrenchSpace
-from planner.plan import FingerPlan, HandPlan, PalmPlan, TileLoad, WristPlan
+from hand_models.spines import HalfPlane
+from hand_models.wrench_space import Row, WrenchSpace
+from planner.carried import Carried
+from planner.hand_plan import HandPlan, PalmPlan
+from planner.scaled_rows import LOAD_UNIT, is_effort, scaled_rows
+from planner.stacked import (
+    CONTACTS,
+    KEPT,
+    KEPT_NAMES,
+    TOUCHING,
+    Places,
+    Same,
+    Stacked,
+    joined,
+    places_of,
+    stacked,
+    touch_of,
+)
 
-__all__ = ["read_floating_hand", "read_hand"]
+__all__ = ["Reader", "Reading", "drawn_tendons", "reader_of"]
+
+COUNT: Final = len(FINGERS)
+
+OWN: Final = (
+    *(f"{finger}/{kind}" for kind in ("tension", "lateral", NAIL) for finger in FINGERS),
+    PALM_SHEAR,
+    PALM_PRESSING,
+)
+"""Every column that a hand with a fixed wrist may have."""
+
+PALM_SIGNS: Final = np.array([-1.0, 1.0])
+"""Which way a palm shears and presses along x and z."""
+
+SIGNED: Final = ("/lateral", f"/{NAIL}")
+"""Loads that may be negative."""
 
 
-def read_hand(limb: str, settled: SettledHand, space: WrenchSpace, y: Array) -> HandPlan:
-    """Turn one hand's loads y into tile loads and forces.
+class Reading(NamedTuple):
+    """What loads say.
 
-    What may not be negative and is, by rounding, counts as zero.
+    Attributes
+    ----------
+    carried : Carried
+    used : ndarray, shape (sum of nl,)
+        Utilisation of every limit row, hand by hand.
+    effort : float
+        Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
+    """
+
+    carried: Carried
+    used: Array
+    effort: float
+
+
+def reader_of(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> Reader:
+    """Return what reads loads of hands, made once for the same hands and sets; see `Reader`."""
+    return _reader_of(Same(*settled), Same(*spaces))
+
+
+@lru_cache(maxsize=KEPT)
+def _reader_of(settled: Same, spaces: Same) -> Reader:
+    return Reader(settled.each, spaces.each)  # type: ignore[arg-type]
+
+
+class Reader:
+    """Reads loads of hands with fixed wrists, all hands at once; made once for their rows.
 
     Parameters
     ----------
-    limb : str
-    settled : SettledHand
-    space : WrenchSpace
-        Its set.
-    y : ndarray, shape (m,)
-        A load for each of the set's columns [N].
+    settled : sequence of SettledHand
+    spaces : sequence of WrenchSpace
+        Their sets.
     """
-    column = {name: i for i, name in enumerate(space.columns)}
-    signed = np.array([name.endswith(("/lateral", "/nail")) for name in space.columns])
-    y = np.where(signed, y, np.maximum(y, 0.0))
 
-    def load(name: str) -> float:
-        return float(y[column[name]]) if name in column else 0.0
+    def __init__(self, settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> None:
+        self._spaces = spaces
+        scaled = [scaled_rows(space) for space in spaces]
+        self._limits = [rows.L for rows in scaled]
+        self._known = known = stacked(tuple(settled))
+        names = [name for space in spaces for name in (space.columns, space.rows)]
+        pieces = tuple([hand.surface.pieces() for hand in settled])
+        signs = [2 if hand.grasp.lateral else 1 for hand in settled]
+        limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
+        tiles = [hand.tiles for hand in settled]
+        self._layout = layout = _layout_of(Same(*tiles, *names), tuple(limits))
 
-    tensions = np.array([load(f"{finger}/tension") for finger in FINGERS])
-    laterals = np.array([load(f"{finger}/lateral") for finger in FINGERS])
-    axials = np.array([load(f"{finger}/nail") for finger in FINGERS])
-    carried = _Carried(
-        tiles=settled.tile_loads(tensions, laterals, axials),
-        positions=settled.positions,
-        axes=settled.axes,
+        laws = joined([hand.loads for hand in settled])
+        self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
+        self._at_zero[:, :2], self._slope[:, :2] = laws[..., 0], laws[..., 1]
+        self._slope[:, 2] = known.touch.shares
+        if len(layout.hooked):
+            self._slope[layout.hooked, 0] = 1.0
+        self._used_at_rest = np.concatenate([rows.l0 for rows in scaled])
+        self._origins = np.array([space.origin for space in spaces])
+        self._drive, self._drawn = settled[0].hand.drive, drawn_tendons(known)
+        self._fixed = (
+            tuple(tiles),
+            pieces,
+            tuple([hand.palm.engaged for hand in settled]),
+            (None,) * len(settled),
+        )
+
+    def read(self, loads: Sequence[Array]) -> Reading:
+        """Return what loads y of all hands say [N].
+
+        What may not be negative and is, by rounding, counts as zero.
+        """
+        known, layout = self._known, self._layout
+        y = np.concatenate([ZERO, *loads])
+        np.maximum(y, layout.least, out=y)
+        scaled = y / LOAD_UNIT
+        limits = zip(self._limits, layout.parts, strict=True)
+        used = np.concatenate([L @ scaled[part] for L, part in limits])
+        used += self._used_at_rest
+        efforts = used.take(layout.efforts)
+        parts = zip(self._spaces, layout.parts, strict=True)
+        wrenches = np.array([space.generators @ y[part] for space, part in parts])
+        wrenches += self._origins
+
+        tensions, palms = y.take(layout.tensions), y.take(layout.palms)
+        of_tiles = y.take(layout.of_tile)
+        of_tiles *= self._slope
+        of_tiles += self._at_zero
+        tile_used = np.zeros(len(of_tiles))
+        tile_used[known.touch.touching] = np.maximum.reduceat(used, layout.begins)[layout.kept]
+        shears = of_tiles[:, 0]
+        if len(layout.hooked):
+            tile_used[layout.hooked] = used[layout.nail_limits].max(axis=1)
+            shears = shears.copy()
+            shears[layout.hooked] = 0.0
+        drawn = np.add.reduceat(shears, known.places.first_of_finger)
+        drives = np.empty((3, len(tensions)))
+        drives[0] = self._drive.torque(tensions)
+        drives[1] = self._drive.current(tensions)
+        joints, losses, nails = self._drawn
+        drives[2] = self._drive.winch_angle(joints, tensions, drawn, losses, nails)
+        forces = np.zeros((len(known.points), 3))
+        np.einsum("tk,tkx->tx", of_tiles, known.axes, out=forces[: len(of_tiles)])
+        forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
+        palm_used = palms / known.palm_limits
+        carried = Carried(
+            tensions,
+            drives,
+            of_tiles,
+            forces,
+            known.points,
+            known.axes,
+            np.maximum(tile_used, 0.0),
+            np.zeros((len(palms), 3)),
+            np.maximum(palm_used[:, 0], palm_used[:, 1]),
+            wrenches,
+            np.maximum(np.maximum.reduceat(used, layout.first_row), 0.0),
+            *self._fixed,
+        )
+        return Reading(carried, used, float(efforts @ efforts))
+
+    def hands(self, limbs: Sequence[str], carried: Carried) -> tuple[HandPlan, ...]:
+        """Return what was read, hand by hand; its arrays are parts of those."""
+        known, nails = self._known, self._nail_planes()
+        firsts = known.places.first.tolist()
+        palm_used, used = carried.palm_utilisations.tolist(), carried.utilisations.tolist()
+        found, tiles, moments = [], len(carried.loads), carried.palm_moments
+        for h, (limb, hand, space) in enumerate(zip(limbs, known.hands, self._spaces, strict=True)):
+            own = slice(firsts[h], firsts[h] + len(hand.tiles))
+            fingers = slice(COUNT * h, COUNT * (h + 1))
+            place, force = carried.points[tiles + h], carried.forces[tiles + h]
+            found.append(
+                HandPlan(
+                    limb=limb,
+                    wrench=carried.wrenches[h],
+                    tensions=carried.tensions[fingers],
+                    drives=carried.drives[:, fingers],
+                    loads=carried.loads[own],
+                    forces=carried.forces[own],
+                    positions=carried.points[own],
+                    axes=carried.axes[own],
+                    tile_utilisations=carried.tile_utilisations[own],
+                    tiles=carried.tiles[h],
+                    half_planes=carried.half_planes[h],
+                    palm=PalmPlan(place, force, moments[h], carried.engaged[h], palm_used[h]),
+                    utilisation=used[h],
+                    seating=hand.seating,
+                    space=space,
+                    laws=hand.loads,
+                    nail_planes=nails.get(h, {}),
+                )
+            )
+        return tuple(found)
+
+    def _nail_planes(self) -> dict[int, dict[int, tuple[HalfPlane, ...]]]:
+        """Return the limits of nails that hook, by hand and tile."""
+        places = self._known.places
+        found: dict[int, dict[int, tuple[HalfPlane, ...]]] = {}
+        for t in self._layout.hooked.tolist():
+            h = int(places.hand[t])
+            tile = t - int(places.first[h])
+            found.setdefault(h, {})[tile] = self._known.hands[h].nail_limits(tile)
+        return found
+
+
+def drawn_tendons(known: Stacked) -> tuple[Array, Array, Array]:
+    """Return what winches draw in besides travel of the tiles, of each finger.
+
+    Returns
+    -------
+    joints : ndarray, shape (F,)
+        [m]
+    losses : ndarray, shape (F,)
+        Sum of the diagonal of M (Eq. 8).
+    nails : ndarray, shape (F,)
+        [m]
+    """
+    hand = known.hands[0].hand
+    radii, losses = _losses(known.places, Same(hand))
+    nails = hand.nail.pulley_radius * joined([each.nail_angles for each in known.hands])
+    return known.bends @ radii, losses, nails
+
+
+@lru_cache(maxsize=KEPT)
+def _losses(places: Places, key: Same) -> tuple[Array, Array]:
+    """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
+    (hand,) = key.each
+    assert isinstance(hand, SpinyHand)
+    sums = np.add.accumulate((1.0 - hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0))
+    losses = np.full(len(places.phalanges), sums[-2])
+    losses[places.base_fingers] = sums[-1]
+    return np.array(hand.finger.pulley_radii), losses
+
+
+# Layouts ------------------------------------------------------------------------------------------
+
+
+ZERO: Final = np.zeros(1)
+"""A load that a hand does not have, before all others."""
+
+
+class _HandLayout(NamedTuple):
+    """Where everything is in one hand's loads and limit rows.
+
+    Attributes
+    ----------
+    places : ndarray of int, shape (14,)
+        Of each of `OWN` among its m loads, counted from one; zero where there is none.
+    has : ndarray of int, shape (14,)
+        One where there is one, zero elsewhere.
+    least : ndarray, shape (m,)
+        What each load may be at least [N].
+    rows : int
+        How many limit rows it has.
+    begins : ndarray of int
+        Where the limit rows of each tile on rock begin, and where those of the last end.
+    nails : ndarray of int
+        Limit rows of its nails, two of each.
+    efforts : ndarray of int
+        Limit rows whose utilisation counts as effort.
+    """
+
+    places: Indices
+    has: Indices
+    least: Array
+    rows: int
+    begins: Indices
+    nails: Indices
+    efforts: Indices
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _hand_layout(key: Same, limits: int) -> _HandLayout:
+    """Return the layout of a hand.
+
+    Parameters
+    ----------
+    key : Same
+        Its tiles; columns and rows of its set.
+    limits : int
+        Limit rows of each tile, of which a hand has the first, tile by tile.
+    """
+    tiles: tuple[Tile, ...]
+    columns: tuple[str, ...]
+    names: tuple[Row, ...]
+    tiles, columns, names = key.each  # type: ignore[assignment]
+    rows = [row for row in names if row.kind == "limit"]
+    touching = sum(CONTACTS[tile.contact] == TOUCHING for tile in tiles)
+    place = {name: i for i, name in enumerate(columns, start=1)}
+    places = np.array([place.get(name, 0) for name in OWN])
+    return _HandLayout(
+        places=places,
+        has=np.sign(places),
+        least=np.array([-np.inf if name.endswith(SIGNED) else 0.0 for name in columns]),
+        rows=len(rows),
+        begins=limits * np.arange(touching + 1),
+        nails=np.flatnonzero([row.phalanx == NAIL for row in rows]),
+        efforts=np.flatnonzero([is_effort(row) for row in rows]),
+    )
+
+
+class _Layout(NamedTuple):
+    """Where everything is in the loads and in the limit rows of all hands.
+
+    Attributes
+    ----------
+    parts : tuple of slice
+        Of the loads, by hand; before all of them is one that is zero.
+    least : ndarray, shape (1 + m,)
+        What each load may be at least [N].
+    tensions : ndarray of int, shape (F,)
+    palms : ndarray of int, shape (H, 2)
+    of_tile : ndarray of int, shape (T, 3)
+        Loads that shear, normal and lateral load of each tile follow.
+    first_row : ndarray of int, shape (H,)
+        Of the limit rows, by hand.
+    begins : ndarray of int
+        Where the limit rows of each tile on rock begin, and where those of a hand's last one end.
+    kept : ndarray of int
+        Those of them where a tile's begin.
+    hooked : ndarray of int
+        Nails that hook.
+    nail_limits : ndarray of int, shape (number of them, 2)
+        Their limit rows.
+    efforts : ndarray of int
+        Limit rows whose utilisation counts as effort.
+    """
+
+    parts: tuple[slice, ...]
+    least: Array
+    tensions: Indices
+    palms: Indices
+    of_tile: Indices
+    first_row: Indices
+    begins: Indices
+    kept: Indices
+    hooked: Indices
+    nail_limits: Indices
+    efforts: Indices
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
+    """Return the layout of all hands.
+
+    Parameters
+    ----------
+    key : Same
+        The tiles of each hand; then columns and rows of the set of each.
+    limits : tuple of int
+        Of `_hand_layout`, for each.
+    """
+    count = len(limits)
+    tiles: tuple[tuple[Tile, ...], ...] = key.each[:count]  # type: ignore[assignment]
+    names = zip(tiles, key.each[count::2], key.each[count + 1 :: 2], strict=True)
+    hands = [_hand_layout(Same(*own), rows) for own, rows in zip(names, limits, strict=True)]
+    places, touch = places_of(tuple(map(len, tiles))), touch_of(Same(*tiles))
+    ends = list(accumulate((len(hand.least) for hand in hands), initial=1))
+    found = np.array([hand.places + at * hand.has for hand, at in zip(hands, ends, strict=False)])
+    found -= np.sign(found)
+    first_row = list(accumulate((hand.rows for hand in hands), initial=0))[:-1]
+    tensions, laterals, axials = (
+        found[:, i : i + COUNT].ravel() for i in range(0, 3 * COUNT, COUNT)
+    )
+    of_tile = np.empty((len(places.hand), 3), dtype=np.intp)
+    of_tile[:, :2] = tensions[places.finger, None]
+    of_tile[:, 2] = laterals[places.finger]
+    hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
+    of_tile[hooked, 0] = axials[places.finger[hooked]]
+    pairs = list(zip(first_row, hands, strict=True))
+    return _Layout(
+        parts=tuple(map(slice, ends, ends[1:])),
+        least=np.concatenate([ZERO, *[hand.least for hand in hands]]),
         tensions=tensions,
-        wound=tensions,
-        palm=(load(PALM_SHEAR), load(PALM_PRESSING)),
-    )
-    return _read(limb, settled, space, y, carried, None)
-
-
-def read_floating_hand(
-    limb: str, settled: SettledHand, hand: CompliantHand, space: WrenchSpace, wrist: WristPlan
-) -> HandPlan:
-    """Turn the pose of a floating hand's wrist into tile loads and forces, by the model itself.
-
-    Parameters
-    ----------
-    limb : str
-    settled : SettledHand
-        At rest.
-    hand : CompliantHand
-    space : WrenchSpace
-        Its set, linearised at that pose.
-    wrist : WristPlan
-    """
-    loads = hand.loads(wrist.twist[None])
-    shear, pressing = (max(float(load), 0.0) for load in loads.palm[0])
-    carried = _Carried(
-        tiles=loads.tile_loads[0],
-        positions=loads.positions[0],
-        axes=loads.axes[0],
-        tensions=loads.tensions[0],
-        wound=hand.preload,
-        palm=(shear, pressing),
-    )
-    return _read(limb, settled, space, wrist.twist, carried, wrist)
-
-
-class _Carried(NamedTuple):
-    """What tiles (n, 3), tendons (4,) and the palm carry, and where the tiles are [N, m].
-
-    ``wound``: the tension to which each motor tightened its tendon, whose winch stands still from
-    there on if the wrist floats.
-    """
-
-    tiles: Array
-    positions: Array
-    axes: Array
-    tensions: Array
-    wound: Array
-    palm: tuple[float, float]
-
-
-def _read(
-    limb: str,
-    settled: SettledHand,
-    space: WrenchSpace,
-    y: Array,
-    carried: _Carried,
-    wrist: WristPlan | None,
-) -> HandPlan:
-    loads, positions, tensions = carried.tiles, carried.positions, carried.tensions
-    forces = np.einsum("tk,tkx->tx", loads, carried.axes)
-    pieces = settled.surface.pieces()
-    planes = np.array([(p.a_shear, p.a_normal, p.a_lateral) for p in pieces])
-    capacities = np.array([p.capacity for p in pieces])
-    magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
-    used = np.where(settled.touching, (magnitudes @ planes.T / capacities).max(axis=1), 0.0)
-    limits = {int(t): settled.nail_limits(int(t)) for t in np.flatnonzero(settled.nails)}
-    for t, own_limits in limits.items():
-        used[t] = max(
-            (limit.a_shear * loads[t, 0] + limit.a_normal * loads[t, 1]) / limit.capacity
-            for limit in own_limits
-        )
-    used = np.maximum(used, 0.0)
-    drive = settled.hand.drive
-    losses = (1.0 - settled.hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0)
-    fingers = []
-    for i, finger in enumerate(FINGERS):
-        own = np.flatnonzero(settled.finger_of == i)
-        dragged = [t for t in own if settled.tiles[t].phalanx != NAIL]
-        tension, wound = float(tensions[i]), float(carried.wound[i])
-        at_rest = settled.loads[:, 0] @ np.array([1.0, wound])
-        tiles = tuple(
-            TileLoad(
-                phalanx=settled.tiles[t].phalanx,
-                contact=settled.tiles[t].contact,
-                position=positions[t],
-                force=forces[t],
-                shear=float(loads[t, 0]),
-                normal=float(loads[t, 1]),
-                lateral=float(loads[t, 2]),
-                shear_axis=carried.axes[t, 0],
-                normal_axis=carried.axes[t, 1],
-                lateral_axis=carried.axes[t, 2],
-                utilisation=float(used[t]),
-                load_at_zero=settled.loads[t, :, 0] if wrist is None else None,
-                load_per_newton=settled.loads[t, :, 1] if wrist is None else None,
-                half_planes=limits.get(int(t), pieces),
-            )
-            for t in own
-        )
-        fingers.append(
-            FingerPlan(
-                name=finger,
-                tendon_tension=tension,
-                motor_torque=drive.torque(tension),
-                motor_current=drive.current(tension),
-                winch_angle=drive.winch_angle(
-                    settled.fingers[i],
-                    wound,
-                    at_rest[dragged] if wrist is not None else loads[dragged, 0],
-                    losses[: len(dragged)],
-                    settled.hand.nail.pulley_radius * float(settled.nail_angles[i]),
-                ),
-                tiles=tiles,
-            )
-        )
-    shear, pressing = carried.palm
-    palm = PalmPlan(
-        position=settled.palm.centre,
-        force=np.array([-shear, 0.0, pressing]),
-        moment=np.zeros(3),
-        engaged=settled.palm.engaged,
-        utilisation=(
-            max(shear / settled.palm.shear_limit, pressing / settled.palm.pressing_limit)
-            if settled.palm.engaged
-            else 0.0
-        ),
-    )
-    wrench = np.concatenate([palm.force, np.cross(palm.position, palm.force)])
-    wrench = wrench + np.concatenate([forces.sum(axis=0), np.cross(positions, forces).sum(axis=0)])
-    return HandPlan(
-        limb=limb,
-        wrench=wrench,
-        fingers=tuple(fingers),
-        palm=palm,
-        utilisation=max(0.0, float(space.utilisations(y).max())),
-        seating=settled.seating,
-        space=space,
-        wrist=wrist,
+        palms=found[:, 3 * COUNT :],
+        of_tile=of_tile,
+        first_row=np.array(first_row),
+        begins=joined([at + hand.begins for at, hand in pairs]),
+        kept=places.hand[touch.touching] + np.arange(len(touch.touching)),
+        hooked=hooked,
+        nail_limits=joined([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
+        efforts=joined([at + hand.efforts for at, hand in pairs]),
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 
@@ -71,13 +71,31 @@ class Robot:
 
         Above zero the pose is out of reach, and this is the distance that is missing.
         """
-        link = hand_in_body @ self.hand_in_link[limb].inverse()
-        away = float(np.linalg.norm(link.position - self.shoulders[limb]))
-        return away - self.reaches[limb]
+        return (self.stretch(limb, hand_in_body) - 1.0) * self.reaches[limb]
 
     def stretch(self, limb: str, hand_in_body: Pose) -> float:
         """Return how much of a limb's reach a hand's pose asks for; above 1 is out of reach."""
-        return 1.0 + self.beyond(limb, hand_in_body) / self.reaches[limb]
+        return self.stretches(Pose.identity(), (limb,), (hand_in_body,))[0]
+
+    def stretches(self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]) -> list[float]:
+        """Return how much of their limbs' reaches hands ask for, with their poses and B's in W."""
+        ends = np.array([self._ends[limb] for limb in limbs])
+        links = np.einsum("nxy,ny->nx", np.array([hand.rotation for hand in hands]), ends[:, :3])
+        links += np.array([hand.position for hand in hands]) - body.position
+        away = links @ body.rotation - ends[:, 3:6]
+        return (np.sqrt(np.einsum("nx,nx->n", away, away)) / ends[:, 6]).tolist()  # type: ignore[no-any-return]
+
+    @cached_property
+    def _ends(self) -> dict[str, tuple[float, ...]]:
+        """By limb: its link's origin in H, its shoulder in B, its reach [m]."""
+        return {
+            limb: (
+                *self.hand_in_link[limb].inverse().position.tolist(),
+                *shoulder.tolist(),
+                self.reaches[limb],
+            )
+            for limb, shoulder in self.shoulders.items()
+        }
 
 
 def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:

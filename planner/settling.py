@@ -8,7 +8,7 @@ from hand_models.compliant_hand import CompliantHand
 from hand_models.errors import InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import wrench_space
 from hand_models.floating_wrist import FloatingWrist, PalmMode
-from hand_models.hand import SettledHand
+from hand_models.hand import Placement, SettledHand
 from hand_models.wrench_space import WrenchSpace
 from planner.hand_sets import widest_at_rest
 from planner.stance import HandOnHold, Stance
@@ -20,6 +20,7 @@ __all__ = [
     "resting_hand",
     "settle",
     "settle_at",
+    "settle_stance",
     "wrist_at",
 ]
 
@@ -29,12 +30,32 @@ def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
     return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
 
 
+def settle_stance(stance: Stance) -> list[SettledHand]:
+    """Close all hands of a stance on their holds, at once.
+
+    Raises
+    ------
+    InvalidInputError
+        If a hand cannot be where it is; of the first one, its field relative to the question.
+    """
+    outcomes = stance.robot.hand.settle_each([_placement(hand) for hand in stance.hands])
+    return [_or_raise(outcome, i) for i, outcome in enumerate(outcomes)]
+
+
 def settle_at(stance: Stance, index: int) -> SettledHand:
     """Close the hand of that index; an error's field is relative to the question."""
-    try:
-        return settle(stance.hands[index], stance)
-    except InvalidInputError as error:
-        raise error.within(f"stance.hands[{index}]") from None
+    (outcome,) = stance.robot.hand.settle_each([_placement(stance.hands[index])])
+    return _or_raise(outcome, index)
+
+
+def _placement(hand: HandOnHold) -> Placement:
+    return Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+
+
+def _or_raise(outcome: SettledHand | InvalidInputError, index: int) -> SettledHand:
+    if isinstance(outcome, InvalidInputError):
+        raise outcome.within(f"stance.hands[{index}]")
+    return outcome
 
 
 def wrist_at(

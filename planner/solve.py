@@ -6,16 +6,18 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from functools import cached_property
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.errors import InvalidInputError
-from hand_models.frames import Array, wrench_transport
+from hand_models.frames import Array
 from hand_models.hand import SettledHand
-from planner import dual_bounds, program, stance_data
-from planner.binding import Used, joint_name, limiting_limit, prices, unit_of, used_limits
+from planner import deadline, dual_bounds, program, stance_data
+from planner.binding import Binding, Used, joint_name, unit_of
 from planner.budget import Budget
+from planner.carried import Carried
 from planner.certificate import Hindered, certify, certify_idle
 from planner.continuation import NO_WRENCH, PROGRAMS, LargestFactor, least_use, most_load
 from planner.explain import (
@@ -31,10 +33,10 @@ from planner.floating import Settled
 from planner.floating_effort import least_effort, with_room
 from planner.floating_warnings import far_wrists, idle_preloads, strained_preloads
 from planner.gathering import gather
+from planner.hand_plan import HandPlan, WristPlan
 from planner.hand_sets import Hands
 from planner.plan import (
     Certificate,
-    HandPlan,
     LimitName,
     Plan,
     Price,
@@ -42,19 +44,24 @@ from planner.plan import (
     Status,
     TensionPath,
     Times,
-    WristPlan,
 )
+from planner.polish import polished
 from planner.posture import Posture, posture
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
-from planner.reading import read_floating_hand, read_hand
+from planner.reading import Reader, reader_of
+from planner.reading_floating import read_floating_hand
 from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
-from planner.verify import problems
+from planner.unfinished import Unfinished, late_sentence
+from planner.verify import Check
 
-__all__ = ["plan"]
+__all__ = ["Ground", "ground_of", "plan", "plan_on"]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
+
+SHARP: Final = 1e-9
+"""What the tie-break may give away of a utilisation that has all its digits."""
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
@@ -75,19 +82,69 @@ def plan(question: Question) -> Plan:
     ------
     InvalidInputError
         If the question cannot be understood; its ``field`` is relative to the question.
+    DeadlineError
+        If its deadline comes before anything is found that passes the checks.
     """
     start = time.perf_counter()
+    with deadline.within(question.deadline, started=start):
+        return plan_on(ground_of(question), start)
+
+
+def ground_of(question: Question) -> Ground:
+    """Return what is known of a question before a solver is asked; raises as `plan`."""
     where = posture(question)
     try:
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
     except InvalidInputError as error:
         raise error.within("load") from None
     settled, hands = gather(question, where, wrench)
-    modelled = time.perf_counter()
-    answer = _Answer(question, where, settled, hands, wrench)
-    answer.solve()
-    solved = time.perf_counter()
-    return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
+    return Ground(question, where, settled, hands, wrench)
+
+
+class Ground(NamedTuple):
+    """All that is known of a question before a solver is asked.
+
+    Attributes
+    ----------
+    question : Question
+    where : Posture or None
+        The joints; None if the question says nothing of them.
+    settled : sequence of SettledHand
+        The hands on their holds.
+    hands : Hands
+        What the programs need of them.
+    wrench : ndarray, shape (6,)
+        The body wrench that is planned for, in B [N, N·m].
+    """
+
+    question: Question
+    where: Posture | None
+    settled: Sequence[SettledHand]
+    hands: Hands
+    wrench: Array
+
+
+def plan_on(ground: Ground, start: float) -> Plan:
+    """Answer a question of which the ground is known.
+
+    Parameters
+    ----------
+    ground : Ground
+    start : float
+        When it began, on the clock of `time.perf_counter`.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline comes before anything is found that passes the checks.
+    """
+    with deadline.within(ground.question.deadline, started=start):
+        modelled = time.perf_counter()
+        deadline.check("a plan was found")
+        answer = _Answer(*ground)
+        answer.solve()
+        solved = time.perf_counter()
+        return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
 
 
 class _Answer:
@@ -118,6 +175,9 @@ class _Answer:
         self.bound: float | None = None
         """Of the least utilisation, from below, where it is known already."""
         self.loads: tuple[Array, ...] = ()
+        self.carried: Carried
+        self.used: Array
+        self.effort = math.inf
         self.hands: tuple[HandPlan, ...] = ()
         self.least_effort: Outcome | None = None
         self.utilisation = math.inf
@@ -129,6 +189,7 @@ class _Answer:
         self.unbounded = False
         self.path: TensionPath | None = None
         self.path_unknown = False
+        self.unfinished: list[Unfinished] = []
 
     # Solving ------------------------------------------------------------------------------------
 
@@ -140,7 +201,11 @@ class _Answer:
             self._settle_fixed()
         self._settle_effort()
         if not self.outcome.solved or self.wrong:
+            if self.outcome.balance_dual is None:
+                deadline.check("a plan was found")
             self._look_again()
+        if self.certificate is None and (not self.outcome.solved or self.wrong):
+            deadline.check("a plan was found, or proven away")
         if "load_factor" in self.question.want:
             self._find_load_factor()
 
@@ -148,6 +213,7 @@ class _Answer:
         """Find where floating wrists go, and take the plan there."""
         self.search, self.known_factor = least_use(self.parts, self.budget)
         self.least_used = self.search
+        self._mind_time("wrists")
         self.outcome = self.search.outcome
         if self.search.exact:
             self._take_search(self.search)
@@ -161,30 +227,44 @@ class _Answer:
         self._take(found.point.loads)
 
     def _settle_fixed(self) -> None:
-        """Take the plan of least utilisation: in one solve, if it proves to be as good as two."""
+        """Take the plan of least utilisation, of these that of least tensions.
+
+        One solve has its utilisation, and mostly its active rows, which give its last digits; else
+        a second solve has these.
+        """
         self.outcome = program.unique(self.data)
         if self.outcome.solved:
-            self._take(self.outcome.loads)
-            if not self.wrong:
-                self.bound = dual_bounds.unique_bound(self.data, self.outcome)
-                used = self.outcome.value
-                if used - self.bound <= OPTIMAL * max(1.0, used):
+            used, self.bound = self.outcome.value, dual_bounds.unique_bound(self.data, self.outcome)
+            if used - self.bound <= OPTIMAL * max(1.0, used):
+                exact = polished(self.data, self.outcome)
+                if exact is None:
+                    self._settle_tie(SHARP)
+                else:
+                    self._take(exact.loads)
+                if not self.wrong:
                     return
+        one, bound = self.outcome, self.bound
         self._settle_in_two()
+        if one.solved and not self.outcome.solved and deadline.expired():
+            self.outcome, self.bound = one, bound
+            self._take(one.loads)
+            self._mind_time("least_utilisation")
 
     def _settle_in_two(self) -> None:
         """Take the plan of least effort among those of the very least utilisation."""
         self.outcome, self.bound = program.margin(self.data), None
-        self._settle_tie()
+        self._settle_tie(SLACK)
 
-    def _settle_tie(self) -> None:
-        """Take the plan of least effort among those of least utilisation."""
+    def _settle_tie(self, slack: float) -> None:
+        """Take the plan of least tensions among those of least utilisation, or so little more."""
         if not self.outcome.solved:
             return
-        cap = self.outcome.value + SLACK * max(1.0, abs(self.outcome.value))
+        cap = self.outcome.value + slack * max(1.0, abs(self.outcome.value))
         tidy = program.tie_break(self.data, cap)
         if tidy.solved:
             self._take(tidy.loads)
+        else:
+            self._mind_time("tie_break")
         if not tidy.solved or self.wrong:
             self._take(self.outcome.loads)
 
@@ -200,7 +280,11 @@ class _Answer:
             return
         # where the least utilisation is the cap itself, rounding must not empty the set
         self.cap = max(cap, self.outcome.value + SLACK)
-        self.least_effort = program.effort(self.data, self.cap)
+        found = program.effort(self.data, self.cap)
+        if not found.solved and deadline.expired():
+            self._mind_time("least_effort")
+            return
+        self.least_effort = found
         if self.least_effort.solved:
             self._take(self.least_effort.loads)
         else:
@@ -213,29 +297,45 @@ class _Answer:
             return
         self.cap = with_room(cap, used)
         found = least_effort(self.parts, plan, self.cap, self.budget)
+        self._mind_time("least_effort")
+        if not found.outcome.solved and deadline.expired():
+            return
         self.least_effort = found.outcome if found.outcome.solved else None
         self._take_search(found)
 
     def _take(self, loads: tuple[Array, ...]) -> None:
         """Read these loads, and check them."""
         self.loads = loads
-        self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
-        self.utilisation = max(hand.utilisation for hand in self.hands)
-        self.wrong = problems(
-            self.question,
-            self.settled,
-            self.hands,
-            self._whole_utilisation,
-            self.wrench,
-            self.where,
-            stance_data.used_effort(self.data, loads),
+        if self.parts.floating:
+            self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
+            self.carried = Carried.of(self.hands)
+            self.used = stance_data.used(self.data, loads)
+            self.effort = stance_data.used_effort(self.data, loads)
+        else:
+            self.hands = ()
+            self.carried, self.used, self.effort = self._reader.read(loads)
+        self.utilisation = float(self.carried.utilisations.max())
+        self.wrong = self._check.problems(
+            self.carried, self._whole_utilisation, self.wrench, self.effort
         )
 
+    @cached_property
+    def _reader(self) -> Reader:
+        """Reads loads of fixed hands."""
+        return reader_of(self.settled, self.spaces)
+
+    @cached_property
+    def _check(self) -> Check:
+        """What every plan must pass."""
+        return Check(self.question, self.settled, self.where)
+
     def _read_hand(self, index: int, y: Array) -> HandPlan:
-        limb, settled = self.question.stance.hands[index].limb, self.settled[index]
+        """Read one hand of a stance of which some float."""
+        limb, settled = self.limbs[index], self.settled[index]
         space, wrist, search = self.spaces[index], self.parts.wrists[index], self.search
         if wrist is None or search is None:
-            return read_hand(limb, settled, space, y)
+            reader = reader_of((settled,), (space,))
+            return reader.hands((limb,), reader.read((y,)).carried)[0]
         pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
         return read_floating_hand(limb, settled, wrist.hand, space, pose)
 
@@ -246,8 +346,11 @@ class _Answer:
         if not nearest.solved or nearest.value > far:
             given = len(self.data.wrench) > len(self.wrench)
             if not self._held_floating:
-                self.certificate = certify(self._hindered(None), None if given else nearest)
+                self.certificate = certify(
+                    self._hindered(None), None if given else nearest, self.outcome
+                )
             if self.certificate is not None:
+                self._mind_explained(self.certificate)
                 self.outcome = replace(self.outcome, solved=False)
         elif not self.outcome.solved and not self.parts.floating:
             # rounding put the wrench a hair outside: plan for the nearest that can be had
@@ -284,7 +387,7 @@ class _Answer:
             return certify_idle(most, cap, alone)
         if self._unproven:
             return None
-        proof = certify(self._hindered(cap))
+        proof = certify(self._hindered(cap), known=self.outcome)
         # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
         return replace(proof, sufficient=()) if proof is not None and beyond else proof
 
@@ -296,13 +399,20 @@ class _Answer:
             # nothing is asked of the hands: any multiple of it can be held, or none
             self.unbounded = self.outcome.solved and self.outcome.value <= 1.0 + SLACK
             return
+        if deadline.expired():
+            self._mind_time("load_factor")
+            return
         if self.least_used is not None:
             most = most_load(self.parts, self.least_used, self.known_factor, self.budget)
             if most is not None:
                 self.load_factor, self.least_factor = most.factor, not most.sure
+            else:
+                self._mind_time("load_factor")
             return
         result = program.load_factor(self.data)
-        if result.solved:
+        if not result.solved:
+            self._mind_time("load_factor")
+        else:
             scaled = self.data.turned(self.parts.goal(result.value))
             error = stance_data.body_wrench(scaled, result.loads) - scaled.wrench
             used = max(
@@ -312,6 +422,18 @@ class _Answer:
             if np.abs(error).max() <= SLACK and used <= 1.0 + SLACK:
                 self.load_factor = max(result.value, 0.0)
 
+    # Time ---------------------------------------------------------------------------------------
+
+    def _mind_time(self, name: Unfinished) -> None:
+        """Note what is not finished, if it is for the time."""
+        if deadline.expired():
+            self.unfinished.append(name)
+
+    def _mind_explained(self, proof: Certificate) -> None:
+        """Note that a proof is not explained, if it is for the time."""
+        if proof.irreducible is None or proof.sufficient is None:
+            self._mind_time("explanation")
+
     # Reading ------------------------------------------------------------------------------------
 
     def read(self, times: Times, start: float) -> Plan:
@@ -320,7 +442,6 @@ class _Answer:
         utilisation: float | None = None
         limiting: LimitName | None = None
         residual: Array | None = None
-        dear: tuple[Price, ...] = ()
         verified = False
         status: Status = "failed"
         if self.outcome.solved:
@@ -328,16 +449,21 @@ class _Answer:
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
             else:
+                if not self.hands:
+                    self.hands = self._reader.hands(self.limbs, self.carried)
                 verified, hands = True, self.hands
                 utilisation = self._whole_utilisation
                 cap = self.question.limits.utilisation
                 status = "optimal" if utilisation <= cap + SLACK else "overloaded"
-                residual = self._residual(hands)
-                dear = self._prices()
-                limiting, reason = self._explain(utilisation, dear)
+                residual = self._residual()
+                limiting, reason = self._explain(utilisation)
                 self._find_path()
                 if status == "overloaded":
                     self.certificate = self._overload()
+                    if self.certificate is None:
+                        self._mind_time("certificate")
+                    else:
+                        self._mind_explained(self.certificate)
                     reason += overload_sentence(self.certificate, floating=self._floating)
         elif self.certificate is not None:
             status = "infeasible"
@@ -356,12 +482,12 @@ class _Answer:
             status=status,
             body_wrench=self.wrench,
             utilisation=utilisation,
-            effort=stance_data.used_effort(self.data, self.loads) if verified and hands else None,
+            effort=self.effort if hands else None,
             load_factor=self.load_factor,
             load_factor_unbounded=self.unbounded,
             limiting=limiting,
             hands=hands,
-            prices=dear if hands and "prices" in self.question.want else None,
+            prices=self._prices() if hands and "prices" in self.question.want else None,
             effort_prices=self._effort_prices() if hands else None,
             certificate=self.certificate,
             residual=residual,
@@ -376,6 +502,7 @@ class _Answer:
             warnings=self._warnings(),
             solver=SolverInfo(SOLVER, self.outcome.status, self.outcome.iterations),
             time=Times(times.model, times.solve, time.perf_counter() - start),
+            unfinished=tuple(self.unfinished),
         )
 
     def _find_path(self) -> None:
@@ -391,10 +518,15 @@ class _Answer:
             self.question.limits.utilisation,
             self.idle,
         )
-        self.path_unknown = self.path is None
+        if self.path is None:
+            self._mind_time("path")
+            self.path_unknown = "path" not in self.unfinished
 
     def _warnings(self) -> tuple[str, ...]:
         found = warnings(self.question.stance, self.settled)
+        seconds = deadline.seconds()
+        if self.unfinished and seconds is not None:
+            found += (late_sentence(seconds, self.unfinished),)
         cap = self.question.limits.tendon_tension
         found += (*self.idle_preloads, *strained_preloads(self.limbs, self.parts.wrists, cap))
         if self.outcome.solved:
@@ -406,6 +538,7 @@ class _Answer:
         if self.path_unknown:
             found += (UNKNOWN,)
         asked = "load_factor" in self.question.want and not self.unbounded
+        asked = asked and "load_factor" not in self.unfinished
         if self.search is not None and asked and self.load_factor is None:
             found += (NO_FACTOR,)
         if self.least_factor:
@@ -417,7 +550,7 @@ class _Answer:
 
         With floating hands, the best of their sets about the plan.
         """
-        if self._unproven:
+        if self._unproven or "least_utilisation" in self.unfinished:
             return []
         data = self.data
         if self.least_used is not None and self.least_effort is not None:
@@ -438,12 +571,10 @@ class _Answer:
                 return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
         return []
 
-    def _residual(self, hands: Sequence[HandPlan]) -> Array:
-        body = self.question.stance.body.inverse()
-        total = -self.wrench
-        for place, hand in zip(self.question.stance.hands, hands, strict=True):
-            total = total - wrench_transport(body @ place.pose) @ hand.wrench
-        return np.asarray(total)
+    def _residual(self) -> Array:
+        """Return the body wrench of the hands' wrenches less the one planned for."""
+        carried = np.einsum("hij,hj->i", self.parts.transports, self.carried.wrenches)
+        return np.asarray(-self.wrench - carried)
 
     @property
     def _floating(self) -> list[str]:
@@ -470,10 +601,9 @@ class _Answer:
             for limb, joints in self.where.joints.items()
         }
 
-    def _explain(self, utilisation: float, dear: Sequence[Price]) -> tuple[LimitName | None, str]:
+    def _explain(self, utilisation: float) -> tuple[LimitName | None, str]:
         """Return the limit with the largest utilisation, and a sentence about it."""
-        used = [*used_limits(self.limbs, self.spaces, self.loads), *self.idle]
-        most = limiting_limit(used, utilisation, dear)
+        most = self._binding.limiting(self.used, utilisation, self.idle)
         if most is None:
             return None, "nothing limits this stance"
         cap, held = self.question.limits.utilisation, utilisation <= 1.0 + SLACK
@@ -483,6 +613,11 @@ class _Answer:
             sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
         return most.name, sentence
 
+    @cached_property
+    def _binding(self) -> Binding:
+        """What binds the plan."""
+        return Binding(self.limbs, self.spaces, self.outcome.limit_duals)
+
     def _prices(self) -> tuple[Price, ...]:
         """Return what more of each limit that binds would take off the utilisation."""
         most = max(self.idle, key=lambda used: used.utilisation, default=None)
@@ -490,14 +625,13 @@ class _Answer:
             # a limb without a hand bears the most: nothing else counts
             price = most.utilisation / most.capacity
             return (Price(most.name, price, unit_of(most.name.limit)),)
-        duals, value = self.outcome.limit_duals, self.outcome.value
-        return prices(self.limbs, self.spaces, duals, value)
+        return self._binding.prices(self.outcome.value)
 
     def _effort_prices(self) -> tuple[Price, ...] | None:
         """Return what more of each limit that binds would take off the effort."""
         if self.least_effort is None:
             return None
-        return prices(self.limbs, self.spaces, self.least_effort.limit_duals, self.cap)
+        return Binding(self.limbs, self.spaces, self.least_effort.limit_duals).prices(self.cap)
 
 
 def _idle_joints(where: Posture | None, limbs: Sequence[str]) -> list[Used]:

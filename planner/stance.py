@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
@@ -59,18 +60,39 @@ def moderate(wrench: Array, field: str | None) -> Array:
 
 def _possible(pose: Pose, field: str) -> None:
     """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
-    position = finite_vector(pose.position, 3, f"{field}.position")
-    if np.abs(position).max() > FARTHEST:
+    position = finite_vector(pose.position, 3, f"{field}.position").tolist()
+    if max(map(abs, position)) > FARTHEST:
         raise InvalidInputError(
-            f"must be within {FARTHEST:g} m, got {position.tolist()}", field=f"{field}.position"
+            f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"
         )
-    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").reshape(3, 3)
-    if np.abs(axes).max() > 2.0 or not (
-        np.abs(axes.T @ axes - np.eye(3)).max() <= ORTHONORMAL and np.linalg.det(axes) > 0.0
-    ):
+    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation")
+    if not _right_handed(axes.reshape(3, 3)):
         raise InvalidInputError(
             "orthonormal right-handed axes are needed", field=f"{field}.orientation"
         )
+
+
+def _right_handed(axes: Array) -> bool:
+    """Whether the columns are orthonormal, and the third is the first times the second."""
+    x, y, z = axes.T.tolist()
+    third = (
+        x[1] * y[2] - x[2] * y[1],
+        x[2] * y[0] - x[0] * y[2],
+        x[0] * y[1] - x[1] * y[0],
+    )
+    products = (
+        (x, x, 1.0),
+        (y, y, 1.0),
+        (z, z, 1.0),
+        (x, y, 0.0),
+        (y, z, 0.0),
+        (z, x, 0.0),
+        (z, third, 1.0),
+    )
+    return all(
+        abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - product) <= ORTHONORMAL
+        for a, b, product in products
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +163,12 @@ class HandOnHold:
 
     def placed_hold(self) -> Pose | None:
         """Return the hold's frame in H, or None if the hand is to be seated."""
-        if self.hold_pose is not None:
-            return self.pose.inverse() @ self.hold_pose
-        return self.hold_in_hand
+        if self.hold_pose is None:
+            return self.hold_in_hand
+        axes = self.pose.rotation.T
+        return Pose(
+            axes @ (self.hold_pose.position - self.pose.position), axes @ self.hold_pose.rotation
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +229,7 @@ class Stance:
                     f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
                 )
             seen.add(hand.limb)
-            away = float(np.linalg.norm(hand.pose.position - self.body.position))
+            away = math.dist(hand.pose.position.tolist(), self.body.position.tolist())
             if away > TOO_FAR * self.robot.reach:
                 raise InvalidInputError(
                     f"the hand is {away:.3g} m from the body; its limb reaches about "

@@ -8,15 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.floating_wrist import WRIST
 from hand_models.frames import Array
-from hand_models.row_layout import TENDON_TENSION
-from hand_models.wrench_space import Row, WrenchSpace
-from hand_models.wrist_limit import pose_units
+from hand_models.wrench_space import WrenchSpace
+from planner.scaled_rows import (
+    JOINT_TORQUE,
+    LOAD_UNIT,
+    TWIST_UNIT,
+    WRIST_RANGE,
+    ScaledRows,
+    scaled_rows,
+)
 
 __all__ = [
     "JOINT_TORQUE",
@@ -29,29 +35,13 @@ __all__ = [
     "StanceData",
     "beyond",
     "body_wrench",
+    "scaled_transports",
     "used_effort",
+    "with_held",
 ]
-
-LOAD_UNIT: Final = 100.0
-"""Scale of a hand's loads y [N]."""
-
-TWIST_UNIT: Final = pose_units(WRIST)
-"""Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
-
-WRIST_RANGE: Final = "wrist_range"
-"""Name of the hard rows within which a floating hand's set is linearised."""
-
-JOINT_TORQUE: Final = "joint_torque"
-"""Name of the limit rows of a limb's joints."""
-
-SECONDARY: Final = 1e-4
-"""Weight in the tie-break of loads that are not tensions: enough to make them unique."""
-
-LIGHT: Final = 0.1
-"""How much less of that weight they have where the effort itself is least."""
 
 
 class HandData(NamedTuple):
@@ -88,13 +78,7 @@ class HandData(NamedTuple):
     unit: Array
 
     @classmethod
-    def of(
-        cls,
-        space: WrenchSpace,
-        transport: Array,
-        reach: Array | None = None,
-        held: Array | None = None,
-    ) -> HandData:
+    def of(cls, space: WrenchSpace, transport: Array, held: Array | None = None) -> HandData:
         """Scale a hand's set.
 
         Parameters
@@ -102,39 +86,19 @@ class HandData(NamedTuple):
         space : WrenchSpace
         transport : ndarray, shape (6, 6)
             Ad(B←H).
-        reach : ndarray, shape (m,), optional
-            The maximum of each column's load [N], for the tie-break; tensions come first. A
-            floating wrist's twist is measured by its unit.
         held : ndarray, shape (nb − 6, 6), optional
             What the further rows of the balance take of this hand's wrench in H.
         """
-        carried = -transport / WRENCH_UNIT[:, None]
+        carried = scaled_transports(transport)
         if held is not None:
-            carried = np.vstack([carried, held / WRENCH_UNIT])
-        weights = np.array(
-            [1.0 if name.endswith("/tension") else SECONDARY**0.5 for name in space.columns]
-        )
-        floats = space.columns == WRIST
-        unit = TWIST_UNIT if floats else np.full(len(space.columns), LOAD_UNIT)
-        # hard rows are in newtons, but for those of a wrist's range
-        ranges = [row.limit == WRIST_RANGE for row in space.rows[len(space.s) :]]
-        over = np.where(ranges, 1.0, 1.0 / LOAD_UNIT)
-        L, l0 = space.L / space.s[:, None] * unit, space.l0 / space.s
-        efforts = [i for i, row in enumerate(space.rows[: len(space.s)]) if _is_effort(row)]
-        tie = weights * (1.0 if reach is None else unit / reach)
-        return cls(
-            G=carried @ space.generators * unit,
-            g=carried @ space.origin,
-            L=L,
-            l0=l0,
-            H=space.H * unit * over[:, None],
-            h=space.h * over,
-            E=L[efforts],
-            e0=l0[efforts],
-            tie=tie,
-            rest=np.where(weights < 1.0, LIGHT**0.5 * tie, 0.0),
-            unit=unit,
-        )
+            carried = with_held(carried, held)
+        return cls.carried(scaled_rows(space), carried)
+
+    @classmethod
+    def carried(cls, rows: ScaledRows, carried: Array) -> HandData:
+        """Return a hand's rows, its wrench on the rock carried to the balance by (nb, 6)."""
+        # all but the wrench is the same wherever the hand is
+        return cls(carried @ rows.generators, carried @ rows.origin, *rows[2:])
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -151,9 +115,14 @@ class HandData(NamedTuple):
         )
 
 
-def _is_effort(row: Row) -> bool:
-    """Whether a limit row's utilisation counts as effort: a torque's with one of its two signs."""
-    return row.limit == TENDON_TENSION or (row.limit == JOINT_TORQUE and row.label.endswith("+"))
+def scaled_transports(transports: Array) -> Array:
+    """Return what carries a hand's wrench to the balance, of one or more Ad(B←H), (…, 6, 6)."""
+    return np.asarray(-transports / WRENCH_UNIT[:, None])
+
+
+def with_held(carried: Array, held: Array) -> Array:
+    """Return what carries a hand's wrench to the balance (nb, 6), with what is held of it below."""
+    return np.vstack([carried, held / WRENCH_UNIT]) if len(held) else carried
 
 
 class Shape(NamedTuple):
@@ -173,12 +142,12 @@ class StanceData:
     hands: tuple[HandData, ...]
     wrench: Array
 
-    @property
+    @cached_property
     def shape(self) -> Shape:
         """What a program is built for."""
         return Shape(len(self.wrench), tuple(hand.shape for hand in self.hands))
 
-    @property
+    @cached_property
     def offset(self) -> Array:
         """What the loads' part of the balance is to give, W − Σ g, shape (nb,)."""
         return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
@@ -206,6 +175,12 @@ def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
         worst = max(worst, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
         worst = max(worst, float((hand.H @ z - hand.h).max(initial=0.0)))
     return worst
+
+
+def used(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the utilisation of every limit row, hand by hand, shape (sum of nl,)."""
+    parts = zip(data.hands, loads, strict=True)
+    return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
 
 
 def used_effort(data: StanceData, loads: Sequence[Array]) -> float:

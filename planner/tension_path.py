@@ -26,7 +26,7 @@ from hand_models.hand import FINGERS
 from hand_models.wrench_space import WrenchSpace
 from planner import program, stance_data
 from planner.barriers import ranked
-from planner.binding import Used, limit_name, used_limits
+from planner.binding import Used, close_to, limit_name, used_limits
 from planner.explain import barriers_sentence
 from planner.plan import LimitName, TensionPath
 from planner.program import SLACK, Outcome
@@ -82,10 +82,8 @@ def tension_path(
         None if the solver's answer does not pass the check.
     """
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
-    used = [
-        float((hand.L @ part + hand.l0).max(initial=0.0))
-        for hand, part in zip(data.hands, z, strict=True)
-    ]
+    rows = [hand.L @ part + hand.l0 for hand, part in zip(data.hands, z, strict=True)]
+    used = [float(row.max(initial=0.0)) for row in rows]
     fixed = [i for i, space in enumerate(spaces) if TENSIONS[0] in space.columns]
     changes = {
         i: present[limbs[i]] / LOAD_UNIT - z[i][_columns(spaces[i])]
@@ -105,7 +103,7 @@ def tension_path(
     here = max(still, *used)
     at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
     if here > cap + SLACK:
-        uses = [*used_limits(limbs, spaces, loads), *idle]
+        uses = [*used_limits(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
         return TensionPath(False, 0.0, at_present, change, _most_used(uses))
     if change <= GIVE:
         return TensionPath(True, 1.0, at_present, change, ())
@@ -134,8 +132,7 @@ def unsafe_sentence(path: TensionPath) -> str:
 
 def _most_used(used: Sequence[Used]) -> tuple[LimitName, ...]:
     """Return the limit of which a plan uses most, and those that tie with it."""
-    most = max(each.utilisation for each in used)
-    close = most - 2.0 * SLACK * max(1.0, most)
+    close = close_to(max(each.utilisation for each in used))
     return tuple(dict.fromkeys(each.name for each in used if each.utilisation >= close))
 
 

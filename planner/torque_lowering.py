@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.frames import Array
+from planner import deadline
 from planner.limb_batch import Efforts, LimbBatch
 from planner.pose_search import TOLERANCE, damped_step
 
@@ -59,6 +60,11 @@ def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
     -------
     ndarray, shape (L, m)
         Σ (τ / τ_max)² of each limb is at most that at ``angles``, and near a local minimum.
+
+    Raises
+    ------
+    DeadlineError
+        If the time is over before.
     """
     errors, jacobians = _one(batch.errors(angles[None]))
     movable = np.abs(errors).max(axis=1) <= TOLERANCE
@@ -69,6 +75,7 @@ def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
     first = cost = (effort * effort).sum(axis=1)
     start, damping, going = angles, np.full(len(angles), DAMPING), movable
     for _ in range(STEPS):
+        deadline.check("the joint angles were found")
         back = damped_step(batch, angles, errors, jacobians) - angles
         along = _along(_idle(jacobians), effort, slopes, damping)
         along *= (LONGEST_STEP / np.maximum(np.abs(along).max(axis=1), LONGEST_STEP))[:, None]

@@ -21,9 +21,9 @@ from hand_models.hand import FINGERS, FingerFrame, SettledHand
 from hand_models.palm import share_load
 from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, TendonState
-from planner.plan import FingerPlan, HandPlan, WristPlan
+from planner.hand_plan import WristPlan
 
-__all__ = ["FingerCheck", "check_finger", "check_palm", "moved"]
+__all__ = ["FingerCheck", "Said", "check_finger", "check_palm", "moved"]
 
 PLACE: Final = 1e-9
 """How far a contact may be from its phalanx, or from the rock [m]."""
@@ -36,6 +36,23 @@ STRAIGHT: Final = 1e-12
 
 ROUND: Final = 1e-11
 """How far from a circle or a line rock may be that counts as one [m]."""
+
+
+class Said(NamedTuple):
+    """What a plan says of one finger.
+
+    Attributes
+    ----------
+    loads, positions : ndarray, shape (n, 3)
+    axes : ndarray, shape (n, 3, 3)
+        As `HandPlan` has them, of its tiles.
+    tension : float
+    """
+
+    loads: Array
+    positions: Array
+    axes: Array
+    tension: float
 
 
 class FingerCheck(NamedTuple):
@@ -74,7 +91,12 @@ def moved(place: Array, wrist: WristPlan) -> Array:
 
 
 def check_finger(
-    hand: SettledHand, planned: FingerPlan, wrist: WristPlan, preload: float, at_rest: Array
+    hand: SettledHand,
+    index: int,
+    planned: Said,
+    wrist: WristPlan,
+    preload: float,
+    at_rest: Array,
 ) -> FingerCheck:
     """Recompute one finger of a floating hand.
 
@@ -82,34 +104,38 @@ def check_finger(
     ----------
     hand : SettledHand
         At rest.
-    planned : FingerPlan
+    index : int
+        Of the finger.
+    planned : Said
     wrist : WristPlan
     preload : float
         Of its tendon at rest [N].
     at_rest : ndarray, shape (n,)
         Shears of its tiles at rest [N].
     """
-    index = FINGERS.index(planned.name)
     finger, model = hand.fingers[index], hand.fingers[index].model
     frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
     own = np.flatnonzero(hand.finger_of == index)
     outer = len(own) > len(PHALANGES)
-    tiles = planned.tiles[-len(PHALANGES) :]
+    loads = planned.loads[-len(PHALANGES) :]
+    positions, axes = planned.positions[-len(PHALANGES) :], planned.axes[-len(PHALANGES) :]
     step = moved(frame.joint, wrist)
     turned = -float(wrist.twist[3:] @ frame.across)
     joint = np.array([step @ frame.along, step[2]])
-    section = hand.hand.section(planned.name, hand.hold, hand.grasp, hand.seating.pose)
+    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
     wrong: list[str] = []
     angles, joints, points, slips = [], [], [], []
     exact = True
-    for tile, contact in zip(tiles, finger.contacts, strict=True):
-        u = np.array([-tile.shear_axis @ frame.along, -tile.shear_axis[2]])
-        point = np.array([(tile.position - frame.joint) @ frame.along, tile.position[2]])
+    for phalanx, position, (drag, _, _), contact in zip(
+        PHALANGES, positions, axes, finger.contacts, strict=True
+    ):
+        u = np.array([-drag @ frame.along, -drag[2]])
+        point = np.array([(position - frame.joint) @ frame.along, position[2]])
         point[1] -= frame.joint[2]
         arm = point - joint
         rise = u[0] * arm[1] - u[1] * arm[0]
         if not abs(rise - model.tile_height) <= PLACE:
-            wrong.append(f"{tile.phalanx} contact is {rise:.6g} m above its joint")
+            wrong.append(f"{phalanx} contact is {rise:.6g} m above its joint")
         angles.append(math.atan2(u[1], u[0]))
         joints.append(joint)
         points.append(point)
@@ -126,9 +152,9 @@ def check_finger(
     change = np.array(angles) - rest
     change = change - math.tau * np.round(change / math.tau)
     turns = np.diff(change, prepend=turned)
-    shear = np.array([tile.shear for tile in planned.tiles])
+    shear = planned.loads[:, 0].copy()
     tendon, state = _tendon(hand, index, preload, at_rest)
-    tension, local = planned.tendon_tension, None
+    tension, local = planned.tension, None
     if exact:
         base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
         held = tendon.held(
@@ -140,7 +166,7 @@ def check_finger(
         tension = float(held.tensions[0])
     normal, stop = _normals(finger, shear, local, np.array(joints), np.array(points), angles, turns)
     if local is None:
-        normal = np.array([tile.normal for tile in tiles])
+        normal = loads[:, 1]
         stop = np.zeros(len(PHALANGES))
     if outer:
         normal = np.append(0.0, normal)
@@ -278,8 +304,10 @@ def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristP
     return found
 
 
-def check_palm(hand: SettledHand, plan: HandPlan, wrist: WristPlan, allowed: float) -> list[str]:
-    """Return what is wrong with how the palm of a floating hand carries."""
+def check_palm(
+    hand: SettledHand, limb: str, force: Array, wrist: WristPlan, allowed: float
+) -> list[str]:
+    """Return what is wrong with the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return []
     body, engaged = hand.hand, hand.palm.engaged
@@ -292,7 +320,7 @@ def check_palm(hand: SettledHand, plan: HandPlan, wrist: WristPlan, allowed: flo
     step = moved(hand.palm.centre, wrist)
     shear = max(-float(sharing.tile_stiffness.sum()) * step[0], 0.0)
     pressing = max(body.palm_pressing_stiffness * len(engaged) * step[2], 0.0)
-    off = np.abs(plan.palm.force - np.array([-shear, 0.0, pressing])).max()
+    off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
     if off <= allowed:
         return []
-    return [f"{plan.limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"]
+    return [f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"]

@@ -6,16 +6,16 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hand_models.frames import Array
+from hand_models.hand import FINGERS
 from planner.hand_rows import BALL
 from planner.link_tree import LimbTorques, LinkTree
-from planner.plan import HandPlan
 from planner.posture import Posture
 from planner.question import Question
 from planner.stance import HandOnHold
@@ -56,7 +56,7 @@ class LimbUse(NamedTuple):
 def check_limbs(
     found: list[str],
     question: Question,
-    hands: Sequence[HandPlan],
+    wrenches: Mapping[str, Array],
     body_wrench: Array,
     where: Posture | None,
 ) -> LimbUse:
@@ -67,7 +67,8 @@ def check_limbs(
     found : list of str
         What is wrong so far; more is appended.
     question : Question
-    hands : sequence of HandPlan
+    wrenches : mapping of str to ndarray, shape (6,)
+        Of the hands on the rock, by limb.
     body_wrench : ndarray, shape (6,)
         The one planned for, in B.
     where : Posture or None
@@ -78,7 +79,6 @@ def check_limbs(
     if where is None:
         return use
     robot = question.stance.robot
-    wrenches = {hand.limb: hand.wrench for hand in hands}
     own = _hold_up(question, wrenches, where)
     _check_places(found, question, where, own)
     if question.body_wrench is None and question.load.own:
@@ -148,16 +148,16 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
 
 
 def force_use(
-    found: list[str], question: Question, place: HandOnHold, plan: HandPlan, allowed: float
+    found: list[str], question: Question, place: HandOnHold, wrench: Array, allowed: float
 ) -> float:
-    """Check the cap on a hand's force; return its utilisation.
+    """Check the cap on a hand's force, by its wrench; return its utilisation.
 
     Without a direction, that of its rows must be no less than that of the force itself.
     """
     cap = question.limits.per_hand.get(place.limb)
     if cap is None:
         return 0.0
-    force = plan.wrench[:3]
+    force = wrench[:3]
     if not isinstance(cap.largest_force, tuple):
         used = float((BALL @ force).max()) / cap.largest_force
         size = float(np.linalg.norm(force))
@@ -182,22 +182,25 @@ def force_use(
 
 
 def check_asked(
-    found: list[str], question: Question, place: HandOnHold, plan: HandPlan, allowed: float
+    found: list[str],
+    question: Question,
+    place: HandOnHold,
+    wrench: Array,
+    tensions: Array,
+    allowed: float,
 ) -> None:
     """Check what is asked of a hand: given components of its wrench, small changes of tensions."""
     for j, value in enumerate(place.wrench or ()):
-        if value is not None and not abs(plan.wrench[j] - value) <= allowed:
+        if value is not None and not abs(wrench[j] - value) <= allowed:
             found.append(
-                f"{place.limb}: component {j + 1} of the wrench is {plan.wrench[j]:.6g}, not "
-                f"{value:.6g}"
+                f"{place.limb}: component {j + 1} of the wrench is {wrench[j]:.6g}, not {value:.6g}"
             )
     most, present = question.limits.tension_change, question.present.get(place.limb)
     if most is None or present is None:
         return
-    for finger, before in zip(plan.fingers, present, strict=True):
-        change = finger.tendon_tension - before
+    for name, tension, before in zip(FINGERS, tensions, present, strict=True):
+        change = tension - before
         if not abs(change) <= most + allowed:
             found.append(
-                f"{place.limb}: tension of {finger.name} changes by {change:.6g} N, more than "
-                f"{most:g}"
+                f"{place.limb}: tension of {name} changes by {change:.6g} N, more than {most:g}"
             )

@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET
 
 from hand_models.closing import closing_sequence
 from hand_models.errors import EmptySetError
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import TensionLimit
 from hand_models.frames import Array
 from hand_models.hand import FINGERS, Seating, SettledHand, Tile
+from hand_models.parallelepiped import TensionLimit
 from hand_models.spines import HalfPlane
 from hand_models.wrench_space import WrenchSpace
-from planner.plan import (
-    HandPlan,
-    LimitName,
-    Plan,
-    Price,
-    TensionPath,
-    TileLoad,
-    WristPlan,
-)
+from planner.hand_plan import HandPlan, WristPlan
+from planner.plan import LimitName, Plan, Price, TensionPath
 from service import replies
 from service.replies import AXES
 
@@ -48,6 +41,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         status=answer.status,
         reason=answer.reason,
         warnings=list(answer.warnings),
+        unfinished=list(answer.unfinished),
         body_wrench=vector(answer.body_wrench),
         utilisation=_number(answer.utilisation),
         effort=_number(answer.effort),
@@ -166,11 +160,11 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
 
 def vector(values: Array) -> list[float]:
     """Return an array as it travels."""
-    return [float(value) for value in values]
+    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]
 
 
 def _vectors(values: Array) -> list[list[float]]:
-    return [vector(row) for row in values]
+    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]
 
 
 def _number(value: float | None) -> float | None:
@@ -251,17 +245,7 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
     return replies.Hand(
         limb=part.limb,
         wrench=vector(part.wrench),
-        fingers=[
-            replies.Finger(
-                name=finger.name,
-                tendon_tension=float(finger.tendon_tension),
-                motor_torque=float(finger.motor_torque),
-                motor_current=float(finger.motor_current),
-                winch_angle=float(finger.winch_angle),
-                tiles=[_tile(tile, model) for tile in finger.tiles],
-            )
-            for finger in part.fingers
-        ],
+        fingers=_fingers(part, model),
         palm=replies.Palm(
             position=vector(palm.position),
             force=vector(palm.force),
@@ -276,29 +260,54 @@ def _hand(part: HandPlan, model: bool) -> replies.Hand:
     )
 
 
-def _tile(tile: TileLoad, model: bool) -> replies.Tile:
-    return replies.Tile(
-        phalanx=tile.phalanx,
-        contact=tile.contact,
-        position=vector(tile.position),
-        force=vector(tile.force),
-        shear=float(tile.shear),
-        normal=float(tile.normal),
-        lateral=float(tile.lateral),
-        shear_axis=vector(tile.shear_axis),
-        normal_axis=vector(tile.normal_axis),
-        lateral_axis=vector(tile.lateral_axis),
-        utilisation=float(tile.utilisation),
-        load_at_zero=_law(tile.load_at_zero, model),
-        load_per_newton=_law(tile.load_per_newton, model),
-        half_planes=[row for plane in tile.half_planes for row in _both_signs(plane)]
-        if model
-        else UNSET,
-    )
+def _fingers(part: HandPlan, model: bool) -> list[replies.Finger]:
+    """Return a hand's fingers, from its arrays as a whole."""
+    numbers = (part.loads, part.positions, part.forces, part.axes, part.tile_utilisations)
+    columns = zip(part.tiles, *(array.tolist() for array in numbers), strict=True)
+    tiles: dict[str, list[replies.Tile]] = {name: [] for name in FINGERS}
+    for (finger, phalanx, contact), load, position, force, axes, used in columns:
+        tiles[finger].append(
+            replies.Tile(
+                phalanx=phalanx,
+                contact=contact,
+                position=position,
+                force=force,
+                shear=load[0],
+                normal=load[1],
+                lateral=load[2],
+                shear_axis=axes[0],
+                normal_axis=axes[1],
+                lateral_axis=axes[2],
+                utilisation=used,
+            )
+        )
+    if model:
+        _add_models(part, [tile for own in tiles.values() for tile in own])
+    drives = zip(FINGERS, part.tensions.tolist(), *part.drives.tolist(), strict=True)
+    return [
+        replies.Finger(
+            name=name,
+            tendon_tension=tension,
+            motor_torque=torque,
+            motor_current=current,
+            winch_angle=angle,
+            tiles=tiles[name],
+        )
+        for name, tension, torque, current, angle in drives
+    ]
 
 
-def _law(loads: Array | None, model: bool) -> list[float] | UnsetType:
-    return vector(loads) if model and loads is not None else UNSET
+def _add_models(part: HandPlan, tiles: Sequence[replies.Tile]) -> None:
+    """Give tiles, in their hand's order, their load laws and half-planes."""
+    own = [row for plane in part.half_planes for row in _both_signs(plane)]
+    laws = None if part.laws is None else part.laws.transpose(0, 2, 1).tolist()
+    for t, tile in enumerate(tiles):
+        if laws is not None:
+            tile.load_at_zero, tile.load_per_newton = laws[t]
+        nail = part.nail_planes.get(t)
+        tile.half_planes = (
+            own if nail is None else [row for plane in nail for row in _both_signs(plane)]
+        )
 
 
 def _wrist(wrist: WristPlan | None) -> replies.Wrist:
@@ -329,14 +338,16 @@ def _seating(seating: Seating) -> replies.Seating:
 
 
 def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
-    coefficients = np.vstack([space.L, space.H])
-    constants = np.concatenate([space.l0, np.zeros(len(space.h))])
-    capacities = np.concatenate([space.s, space.h])
+    numbers = (
+        np.vstack([space.L, space.H]),
+        np.concatenate([space.l0, np.zeros(len(space.h))]),
+        np.concatenate([space.s, space.h]),
+    )
     return replies.WrenchSet(
         origin=vector(space.origin),
         generators=[
-            replies.Generator(name, vector(column))
-            for name, column in zip(space.columns, space.generators.T, strict=True)
+            replies.Generator(name, column)
+            for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[
             replies.Row(
@@ -346,12 +357,12 @@ def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
                 phalanx=row.phalanx,
                 limit=row.limit,
                 joint=row.joint,
-                coefficients=vector(a),
-                constant=float(constant),
-                capacity=float(capacity),
+                coefficients=coefficients,
+                constant=constant,
+                capacity=capacity,
             )
-            for row, a, constant, capacity in zip(
-                space.rows, coefficients, constants, capacities, strict=True
+            for row, coefficients, constant, capacity in zip(
+                space.rows, *(array.tolist() for array in numbers), strict=True
             )
         ],
     )

@@ -32,7 +32,6 @@ LATER: Final[dict[type, dict[str, _Later]]] = {
     requests.PlanRequest: {
         "objective": _OBJECTIVE,
         "confidence": _Later((None,), f"{_OMIT}: tile limits are nominal"),
-        "deadline": _Later((None,), f"{_OMIT}: a plan takes as long as it takes"),
     },
     requests.RouteRequest: {"objective": _OBJECTIVE},
 }

@@ -12,9 +12,18 @@ import zenoh
 from service.codec import Format
 from service.config import open_session
 from service.errors import MalformedError, NoServiceError, ServiceError, ServiceTimeout
-from service.keys import BODY_SPACE, DEFAULT_ROBOT, PLAN, WRENCH_SPACE, service_key
+from service.keys import (
+    BODY_SPACE,
+    DEFAULT_ROBOT,
+    PLAN,
+    SET_POINTS,
+    STREAM,
+    WRENCH_SPACE,
+    service_key,
+)
 from service.replies import BodySpaceReply, ErrorReply, PlanReply, Reply, WrenchSpaceReply
 from service.requests import BodySpaceRequest, PlanRequest, Request, WrenchSpaceRequest
+from service.stream_messages import SetPointsReply, SetPointsRequest, StreamReply, StreamRequest
 
 __all__ = ["TIMEOUT", "CruxClient"]
 
@@ -100,6 +109,14 @@ class CruxClient:
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Return what a stance can hold; raises what `plan` raises."""
         return self._ask(BODY_SPACE, request, BodySpaceReply)
+
+    def stream(self, request: StreamRequest) -> StreamReply:
+        """Declare a stance for set-points; raises what `plan` raises."""
+        return self._ask(STREAM, request, StreamReply)
+
+    def set_points(self, request: SetPointsRequest) -> SetPointsReply:
+        """Return a stream's set-points for a body wrench; raises what `plan` raises."""
+        return self._ask(SET_POINTS, request, SetPointsReply)
 
     def _ask(self, name: str, request: Request, kind: type[R]) -> R:
         key = service_key(self.robot, name)

@@ -19,6 +19,7 @@ from hand_models import studies
 from hand_models.errors import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
 from hand_models.parameters.own import own_hand
+from service.batch import batch
 from service.errors import REQUEST_KINDS
 from service.options import (
     asked,
@@ -28,10 +29,12 @@ from service.options import (
     robot_option,
     with_extras,
 )
+from service.replies import PlanReply
 from service.requests import PlanRequest
 from service.schema import schema as message_schema
 from service.space_commands import body_space, wrench_space
 from service.stances import read_request, read_route
+from service.stream_command import stream
 from service.studies import chosen_study, print_study, sweep_options
 from service.tables import console, print_plan
 from service.terminal import (
@@ -51,6 +54,7 @@ from service.zenoh_commands import demo, query, serve
 
 if TYPE_CHECKING:
     from planner.robot_file import RobotFile
+    from service.own_robot import Robots
 
 __all__ = ["crux", "main", "run"]
 
@@ -127,29 +131,38 @@ def plan(
     as_json: bool,
 ) -> int:
     """Make one plan, without the network."""
+    from planner import deadline
     from service import dispatch
     from service.own_robot import robots_of
 
     request = with_extras(asked(read_request(stance), hand, robot))
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
-        answer = dispatch.planned(request, robots)
+        with deadline.within(request.deadline):
+            answer = dispatch.planned(request, robots)
+            bare = _without_palms(request, robots)
         if picture is not None:
             draw_plan(answer, picture)
-        bare = dispatch.plan(_without_palms(request), robots)
     if as_json:
-        without = {"load_factor_without_palm": bare.load_factor}
+        without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
         say(msgspec.to_builtins(answer.reply) | without)
     else:
         print_plan(answer.reply, console(), without_palm=bare)
     return EXIT_STATUS.get(answer.reply.status, FAILED)
 
 
-def _without_palms(request: PlanRequest) -> PlanRequest:
-    """Return the question how much could be carried if no palm did."""
+def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
+    """Return how much could be carried if no palm did; None if the time is over before."""
+    from planner.deadline import DeadlineError
+    from service import dispatch
+
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
-    return replace(request, stance=replace(request.stance, hands=hands), want=["load_factor"])
+    stance = replace(request.stance, hands=hands)
+    try:
+        return dispatch.plan(replace(request, stance=stance, want=["load_factor"]), robots)
+    except DeadlineError:
+        return None
 
 
 @crux.command()
@@ -226,7 +239,7 @@ def schema(as_json: bool) -> None:
     click.echo(text if as_json else msgspec.json.format(text))
 
 
-for command in (wrench_space, body_space, serve, query, demo):
+for command in (batch, stream, wrench_space, body_space, serve, query, demo):
     crux.add_command(command)
 
 

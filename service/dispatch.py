@@ -3,28 +3,39 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
 
 from hand_models.errors import CruxError, InvalidInputError
-from hand_models.fixed_wrist import tension_limits
+from hand_models.parallelepiped import tension_limits
 from hand_models.parameters import ParameterTable
-from planner import settling, solve
-from planner.plan import Plan, WristPlan
+from planner import deadline, settling, solve
+from planner.deadline import DeadlineError
+from planner.hand_plan import WristPlan
+from planner.plan import Plan
 from planner.question import Question
 from service.answers import plan_reply, wrench_space_reply
 from service.body_space import explore
 from service.codec import Format, decode_request, encode_error
 from service.errors import REQUEST_KINDS
-from service.keys import BODY_SPACE, PLAN, WRENCH_SPACE
+from service.keys import BODY_SPACE, PLAN, SET_POINTS, STREAM, WRENCH_SPACE
 from service.own_hand import over_default
 from service.own_robot import ROBOTS, Robots
 from service.questions import question, stance
 from service.replies import BodySpaceReply, PlanReply, WrenchSpaceReply
 from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
+from service.stream_messages import (
+    SetPointsReply,
+    SetPointsRequest,
+    StreamReply,
+    StreamRequest,
+)
+from service.streams import STREAMS, Streams
 
 __all__ = [
     "SERVICES",
@@ -122,17 +133,59 @@ def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceR
     return explore(request, robots).reply
 
 
+def stream(
+    request: StreamRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
+) -> StreamReply:
+    """Declare a stream; parameters as for `handle`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    return streams.declare(request, robots)
+
+
+def set_points(
+    request: SetPointsRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
+) -> SetPointsReply:
+    """Answer a question to a stream; parameters as for `handle`.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such stream.
+    """
+    return streams.set_points(request)
+
+
 class _Service(NamedTuple):
-    request: type[PlanRequest] | type[WrenchSpaceRequest] | type[BodySpaceRequest]
+    """What is asked at a key, and who answers.
+
+    ``streams``: whether the answer is of one of the streams. ``waits``: whether it waits for its
+    turn; one that does not has to be safe beside any other.
+    """
+
+    request: (
+        type[PlanRequest]
+        | type[WrenchSpaceRequest]
+        | type[BodySpaceRequest]
+        | type[StreamRequest]
+        | type[SetPointsRequest]
+    )
     answer: Callable[..., msgspec.Struct]
+    streams: bool = False
+    waits: bool = True
 
 
 SERVICES: Final[dict[str, _Service]] = {
     PLAN: _Service(PlanRequest, plan),
     WRENCH_SPACE: _Service(WrenchSpaceRequest, wrench_space),
     BODY_SPACE: _Service(BodySpaceRequest, body_space),
+    STREAM: _Service(StreamRequest, stream, streams=True),
+    SET_POINTS: _Service(SetPointsRequest, set_points, streams=True, waits=False),
 }
-"""By the last part of the key: what is asked, and who answers."""
+"""By the last part of the key."""
 
 
 def handle(
@@ -141,6 +194,10 @@ def handle(
     encoding: str = "",
     hand: ParameterTable | None = None,
     robots: Robots = ROBOTS,
+    *,
+    started: float | None = None,
+    turn: threading.Lock | None = None,
+    streams: Streams = STREAMS,
 ) -> Answer:
     """Answer a query.
 
@@ -156,6 +213,12 @@ def handle(
         go on top.
     robots : Robots, optional
         Those that may be asked about.
+    started : float, optional
+        When a request's deadline began, on the clock of `time.perf_counter`; now by default.
+    turn : Lock, optional
+        Held while the request is answered; it is waited for no longer than the deadline.
+    streams : Streams, optional
+        Those that may be asked; by default those of this process that belong to no service.
 
     Returns
     -------
@@ -166,13 +229,35 @@ def handle(
     try:
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
-        request = over_default(decode_request(payload, service.request, form), hand)
-        reply = service.answer(request, robots)
+        request = decode_request(payload, service.request, form)
+        if not isinstance(request, SetPointsRequest):
+            request = over_default(request, hand)
+        seconds = request.deadline if isinstance(request, PlanRequest) else None
+        about = (request, robots, streams) if service.streams else (request, robots)
+        with deadline.within(seconds, started=started), _taking(turn if service.waits else None):
+            reply = service.answer(*about)
         return Answer(form.encode(reply), form.label(reply), True)
     except InvalidInputError as error:
         kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
         return Answer(*encode_error(kind, error, form), False)
+    except DeadlineError as error:
+        return Answer(*encode_error(error.kind, error, form), False)
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
         return Answer(*encode_error("internal", excuse, form), False)
+
+
+@contextmanager
+def _taking(turn: threading.Lock | None) -> Iterator[None]:
+    """Hold a lock, if there is one, and if it can be had before the deadline."""
+    if turn is None:
+        yield
+        return
+    left, seconds = deadline.left(), deadline.seconds()
+    if not turn.acquire(timeout=-1.0 if left is None else left):
+        raise DeadlineError(seconds or 0.0, "other questions were answered")
+    try:
+        yield
+    finally:
+        turn.release()

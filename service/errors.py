@@ -9,6 +9,7 @@ from hand_models.errors import CruxError, InvalidInputError
 __all__ = [
     "REQUEST_KINDS",
     "UNREACHABLE",
+    "LostError",
     "MalformedError",
     "NoServiceError",
     "ServiceError",
@@ -42,6 +43,12 @@ class ServiceError(CruxError):
     def __init__(self, kind: str, message: str, *, field: str | None = None) -> None:
         super().__init__(message, field=field)
         self.kind = kind
+
+
+class LostError(CruxError):
+    """A request of many that no process lived to answer."""
+
+    kind = "lost"
 
 
 class NoServiceError(CruxError):

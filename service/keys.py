@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["ALIVE", "BODY_SPACE", "DEFAULT_ROBOT", "PLAN", "WRENCH_SPACE", "service_key"]
+__all__ = [
+    "ALIVE",
+    "BODY_SPACE",
+    "DEFAULT_ROBOT",
+    "PLAN",
+    "SET_POINTS",
+    "STREAM",
+    "WRENCH_SPACE",
+    "service_key",
+]
 
 PLAN: Final = "plan"
 WRENCH_SPACE: Final = "wrench_space"
 BODY_SPACE: Final = "body_space"
+STREAM: Final = "stream"
+SET_POINTS: Final = "set_points"
 ALIVE: Final = "alive"
 """The liveliness token, which is there while the service is."""
 

@@ -18,10 +18,13 @@ from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable
 from hand_models.parameters.own import load_own_hand, own_hand
 from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
+from service.stream_messages import StreamRequest
 
 __all__ = ["over_default", "read_hand", "with_hand"]
 
-R = TypeVar("R", bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | RouteRequest)
+R = TypeVar(
+    "R", bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | StreamRequest | RouteRequest
+)
 
 
 def read_hand(path: Path) -> ParameterTable:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Literal, cast, get_args, overload
 
 import msgspec
@@ -28,13 +26,17 @@ from service.own_robot import ROBOTS, Robots, builder_of
 __all__ = ["question", "route", "stance"]
 
 
-@contextmanager
-def _within(path: str) -> Iterator[None]:
+class _within:  # noqa: N801 (reads as the statement it makes)
     """Put a path before the field of an error."""
-    try:
-        yield
-    except InvalidInputError as error:
-        raise error.within(path) from None
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if isinstance(error, InvalidInputError):
+            raise error.within(self.path) from None
 
 
 def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
@@ -61,6 +63,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         want=frozenset(request.want),
         objective=_objective(request.objective),
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
+        deadline=request.deadline,
     )
 
 

@@ -224,13 +224,13 @@ class Certificate(Struct, kw_only=True):
     do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for hands that are given a
     wrench); what is asked for has ``needed``, which is more. ``nearest`` can be supplied,
     ``shortfall`` is what is missing; both are null where hands have no loads, whatever the body
-    needs. ``irreducible``: limits, hard rows and given wrenches (``held_wrench``) that by
-    themselves leave no balance, each of them needed for that; others may be in the way, too. Empty
-    where loads of any sign do not balance, null where rounding leaves it undecided. ``sufficient``:
-    those of them of which any one, taken away alone, would let the stance be held; empty if no
-    single one would, null where that is not known. In all of these the caller's own limits come
-    first, then other limits, then hard rows. ``wrench_spaces``, by limb, come with
-    ``"want": ["model"]`` where there is no plan.
+    needs, and where a deadline came before. ``irreducible``: limits, hard rows and given wrenches
+    (``held_wrench``) that by themselves leave no balance, each of them needed for that; others may
+    be in the way, too. Empty where loads of any sign do not balance, null where rounding or a
+    deadline leaves it undecided. ``sufficient``: those of them of which any one, taken away alone,
+    would let the stance be held; empty if no single one would, null where that is not known. In all
+    of these the caller's own limits come first, then other limits, then hard rows.
+    ``wrench_spaces``, by limb, come with ``"want": ["model"]`` where there is no plan.
     """
 
     utilisation: float | None = None
@@ -285,7 +285,10 @@ class PlanReply(Reply, kw_only=True):
     ``effort``: the sum of squared relative tendon tensions and joint torques. ``joints``: the
     angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
     joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
-    would take off the effort, where the objective is ``min_effort``.
+    would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a
+    deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
+    proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
+    ``certificate``, ``explanation``.
     """
 
     id: str | None = None
@@ -311,6 +314,7 @@ class PlanReply(Reply, kw_only=True):
     solver: Solver
     time: Time
     warnings: list[str] = []
+    unfinished: list[str] = []
 
 
 class Contact(Struct, kw_only=True):

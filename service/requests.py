@@ -59,6 +59,7 @@ Wrench = Annotated[
     Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]"),
 ]
 Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
+Duration = Annotated[float, Meta(gt=0.0, le=1e6, description="[s]")]
 Diameter = Annotated[float, Meta(ge=1e-3, le=100.0, description="[m]")]
 SemiAxis = Annotated[float, Meta(ge=5e-4, le=50.0)]
 FilletRadius = Annotated[float, Meta(ge=1e-4, le=100.0, description="[m]")]
@@ -369,7 +370,13 @@ class PlanRequest(Request, frozen=True, kw_only=True):
         Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
     ] = {}
     confidence: Later = None
-    deadline: Later = None
+    deadline: Annotated[
+        Duration | None,
+        Meta(
+            description="how long the answer may take, from where the service takes the question "
+            "on: then what is verified so far is the answer [s]"
+        ),
+    ] = None
     want: list[Want] = []
 
 

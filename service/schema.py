@@ -9,6 +9,7 @@ import msgspec
 from hand_models.parameters import Quantity
 from service.replies import BodySpaceReply, ErrorReply, PlanReply, WrenchSpaceReply
 from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
+from service.stream_messages import SetPointsReply, SetPointsRequest, StreamReply, StreamRequest
 
 __all__ = ["MESSAGES", "schema"]
 
@@ -19,6 +20,10 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     WrenchSpaceReply,
     BodySpaceRequest,
     BodySpaceReply,
+    StreamRequest,
+    StreamReply,
+    SetPointsRequest,
+    SetPointsReply,
     RouteRequest,
     ErrorReply,
 )

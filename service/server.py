@@ -4,7 +4,8 @@ Each key has a small first-in-first-out channel and a thread that answers from i
 small on purpose: zenoh lets a client wait whose query does not fit, so that a flood of questions
 waits in its own client's link, and the next client's question gets its turn. Such a link keeps one
 of zenoh's receiving threads, so there have to be more of those than clients that flood. A lock
-keeps the solver, which is not thread-safe, to one question; nothing of it runs on zenoh's threads.
+keeps the models, which are not thread-safe, to one question; only set-points of streams, which are
+there already, do not wait for it. Nothing of it runs on zenoh's threads.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from planner.robot_file import RobotFile
 from service.dispatch import SERVICES, handle
 from service.keys import ALIVE, service_key
 from service.own_robot import robots_of
+from service.streams import Streams
 
 __all__ = ["PlanService", "prepare_zenoh"]
 
@@ -73,6 +75,7 @@ class PlanService:
         self._alive = service_key(self.robot, ALIVE)
         self._session = session
         self._answering = threading.Lock()
+        self._streams = Streams()
         self._threads: list[threading.Thread] = []
         self._queryables: list[zenoh.Queryable[Handler[zenoh.Query]]] = []
         self._token: zenoh.LivelinessToken | None = None
@@ -107,6 +110,7 @@ class PlanService:
         patient_until = time.monotonic() + PATIENCE
         for thread in self._threads:
             thread.join(max(0.0, patient_until - time.monotonic()))
+        self._streams.close()
 
     def _serve(self, key: str, queries: Handler[zenoh.Query]) -> None:
         while True:
@@ -122,10 +126,19 @@ class PlanService:
                     log.exception("a reply at %s was lost", key)
 
     def _answer(self, key: str, query: zenoh.Query) -> None:
+        started = time.perf_counter()
         payload = b"" if query.payload is None else query.payload.to_bytes()
         encoding = "" if query.encoding is None else str(query.encoding)
-        with self._answering:
-            answer = handle(key, payload, encoding, self._hand, self._robots)
+        answer = handle(
+            key,
+            payload,
+            encoding,
+            self._hand,
+            self._robots,
+            started=started,
+            turn=self._answering,
+            streams=self._streams,
+        )
         if answer.good:
             query.reply(key, answer.payload, encoding=answer.encoding)
         else:

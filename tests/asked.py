@@ -178,7 +178,6 @@ HAND = "stance.hands[0]"
 LATER = (
     (("objective",), "max_reliability", "objective"),
     (("confidence",), 0.99, "confidence"),
-    (("deadline",), 0.1, "deadline"),
 )
 """What the contract knows and this version does not: path, value, and the field to blame."""
 

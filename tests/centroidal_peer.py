@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+import time
 from pathlib import Path
 
 PREFIX = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "lib"
@@ -21,6 +22,13 @@ def margins(cases: list[dict], edges: int) -> list[float | None]:
 
     A case has points and normals (n, 3), one friction coefficient, a mass and a centre of mass.
     """
+    return timed(cases, edges, 1)[0]
+
+
+def timed(
+    cases: list[dict], edges: int, rounds: int
+) -> tuple[list[float | None], list[list[float]]]:
+    """Return the `margins`, and how long each took in each of some rounds [s]."""
     folder = next(PREFIX.glob("python3*/site-packages"))
     environment = os.environ | {
         "LD_LIBRARY_PATH": str(PREFIX),
@@ -28,7 +36,7 @@ def margins(cases: list[dict], edges: int) -> list[float | None]:
     }
     done = subprocess.run(
         [sys.executable, __file__],
-        input=json.dumps({"cases": cases, "edges": edges}),
+        input=json.dumps({"cases": cases, "edges": edges, "rounds": rounds}),
         env=environment,
         capture_output=True,
         text=True,
@@ -36,7 +44,8 @@ def margins(cases: list[dict], edges: int) -> list[float | None]:
         timeout=120,
     )
     # the library itself writes to standard output, too
-    return json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(done.stdout.splitlines()[-1])
+    return found["margins"], found["seconds"]
 
 
 def main() -> None:
@@ -45,19 +54,27 @@ def main() -> None:
 
     asked = json.load(sys.stdin)
     found: list[float | None] = []
-    for case in asked["cases"]:
-        problem = centroidal.Equilibrium(
-            "contacts", case["mass"], asked["edges"], centroidal.SOLVER_LP_QPOASES
-        )
-        assert problem.setNewContacts(
-            np.asfortranarray(case["points"], dtype=float),
-            np.asfortranarray(case["normals"], dtype=float),
-            float(case["friction"]),
-            centroidal.EQUILIBRIUM_ALGORITHM_LP,
-        )
-        status, margin = problem.computeEquilibriumRobustness(np.array(case["com"], dtype=float))
-        found.append(float(margin) if status == centroidal.LP_STATUS_OPTIMAL else None)
-    print(json.dumps(found))
+    seconds: list[list[float]] = []
+    for number in range(asked["rounds"]):
+        seconds.append([])
+        for case in asked["cases"]:
+            points, normals = (
+                np.asfortranarray(case[name], dtype=float) for name in ("points", "normals")
+            )
+            place = np.array(case["com"], dtype=float)
+            start = time.perf_counter()
+            problem = centroidal.Equilibrium(
+                "contacts", case["mass"], asked["edges"], centroidal.SOLVER_LP_QPOASES
+            )
+            assert problem.setNewContacts(
+                points, normals, float(case["friction"]), centroidal.EQUILIBRIUM_ALGORITHM_LP
+            )
+            status, margin = problem.computeEquilibriumRobustness(place)
+            seconds[-1].append(time.perf_counter() - start)
+            if number == 0:
+                optimal = status == centroidal.LP_STATUS_OPTIMAL
+                found.append(float(margin) if optimal else None)
+    print(json.dumps({"margins": found, "seconds": seconds}))
 
 
 if __name__ == "__main__":

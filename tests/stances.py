@@ -190,11 +190,11 @@ def random_answer(seed: int) -> tuple[Question, Plan]:
 
 
 def program_data(question: Question) -> StanceData:
-    """What the programs get of a question, tensions and palm loads weighed alike."""
+    """What the programs get of a question."""
     body = question.stance.body.inverse()
     hands = []
     for hand in question.stance.hands:
         _, space = hand_space(question.stance, hand.limb)
         transport = wrench_transport(body @ hand.pose)
-        hands.append(HandData.of(space, transport, np.full(len(space.columns), 100.0)))
+        hands.append(HandData.of(space, transport))
     return StanceData(tuple(hands), question.needed_wrench() / WRENCH_UNIT)

@@ -17,7 +17,11 @@ DRIVE = HAND.drive
 def winch_angle(settled, i, tension):
     tiles = settled.finger_of == i
     shears = settled.loads[tiles, 0] @ [1.0, tension]
-    return DRIVE.winch_angle(settled.fingers[i], tension, shears, np.ones(tiles.sum()))
+    return DRIVE.winch_angle(drawn_by_joints(settled, i), tension, shears.sum(), tiles.sum())
+
+
+def drawn_by_joints(settled, i):
+    return np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ settled.fingers[i].joint_angles
 
 
 def test_torque_and_current_at_a_hundred_newtons_are_those_worked_by_hand():
@@ -42,8 +46,7 @@ def test_the_winch_angle_of_a_finger_is_that_worked_by_hand():
     """A pinch at 37 N: tiles drag 4.85, 6.95, 8.05 N, so two strands draw in 2 × 202.15/11500 m."""
     settled = pinch()
     i = FINGERS.index("inner_left")
-    joints = np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ settled.fingers[i].joint_angles
-    expected = (joints + 2.0 * (3 * 74.0 - 19.85) / 11500.0) / 0.0067
+    expected = (drawn_by_joints(settled, i) + 2.0 * (3 * 74.0 - 19.85) / 11500.0) / 0.0067
     assert winch_angle(settled, i, 37.0) == pytest.approx(expected, rel=1e-6)
 
 
@@ -78,9 +81,9 @@ def test_tendon_friction_leaves_less_for_the_tiles_farther_out():
     settled = hand.settle(stance.hands[0].hold, stance.hands[0].surface, stance.hands[0].grasp)
     i = FINGERS.index("inner_right")
     shears = settled.loads[settled.finger_of == i, 0] @ [1.0, 50.0]
-    joints = np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ settled.fingers[i].joint_angles
+    joints = drawn_by_joints(settled, i)
     expected = joints + 2.0 * (2.0 * 50.0 * (1.0 + 0.8 + 0.64) - shears.sum()) / 11500.0
-    angle = hand.drive.winch_angle(settled.fingers[i], 50.0, shears, np.array([1.0, 0.8, 0.64]))
+    angle = hand.drive.winch_angle(joints, 50.0, shears.sum(), 1.0 + 0.8 + 0.64)
     assert angle == pytest.approx(expected / 0.0067, rel=1e-9)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import peer
 import pytest
-from stances import CALIBRATION_LOAD, ask, on_wall
+from stances import CALIBRATION_LOAD, ask, on_wall, program_data
 
 from hand_models.holds import Cylinder, Plane
 from planner import program
@@ -81,7 +81,14 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
     monkeypatch, tension, hold, closing_tension, words
 ):
     question, loads = gently(tension, hold, closing_tension)
-    lie = replace(honest_outcome(), value=-1.0, loads=loads)
+    hands = program_data(question).hands
+    lie = replace(
+        honest_outcome(),
+        value=-1.0,
+        loads=loads,
+        limit_duals=tuple(np.zeros(len(hand.l0)) for hand in hands),
+        hard_duals=tuple(np.zeros(len(hand.h)) for hand in hands),
+    )
     for name in ("unique", "margin"):
         monkeypatch.setattr(program, name, lambda data: lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is

@@ -69,15 +69,21 @@ def random_case(rng: np.random.Generator) -> dict:
     }
 
 
-def our_margin(case: dict) -> float | None:
+def stance_of(case: dict) -> StanceData:
+    """A case as the planner's programs take it."""
     hands = []
     for point, normal in zip(case["points"], case["normals"], strict=True):
         edges = pyramid(np.array(normal), case["friction"])
         hands.append(contact(np.array(point), edges))
     weight = np.array([0.0, 0.0, case["mass"] * GRAVITY])
     wrench = np.concatenate([weight, np.cross(case["com"], weight)])
-    outcome = program.margin(StanceData(tuple(hands), wrench / WRENCH_UNIT))
+    return StanceData(tuple(hands), wrench / WRENCH_UNIT)
+
+
+def our_margin(case: dict) -> float | None:
+    outcome = program.margin(stance_of(case))
     # the distance from the sum of the unit generators to the pyramid's faces, per newton of b0
+    edges = pyramid(np.array(case["normals"][-1]), case["friction"])
     per_newton = np.linalg.norm(np.cross(edges.sum(axis=1), edges[:, 0]))
     return -outcome.value * per_newton if outcome.solved else None
 

@@ -159,7 +159,8 @@ def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
         ("{", "crux: not json: Input data was truncated\n"),
         ("{}", "crux: v: missing\n"),
         (json.dumps(wall_request() | {"colour": 1}), "crux: colour: unknown field; known are "),
-        (json.dumps(wall_request() | {"deadline": 1}), "crux: deadline: not supported in this"),
+        (json.dumps(wall_request() | {"confidence": 0.9}), "crux: confidence: not supported in"),
+        (json.dumps(wall_request() | {"deadline": 0}), "crux: deadline: "),
         (
             json.dumps(put(wall_request(), ("stance", "hands", 3, "limb"), "nose")),
             "crux: stance.hands[3].limb: unknown limb 'nose'; known are front_right",

@@ -436,16 +436,33 @@ def test_nails_pull_nothing_off_the_rock():
     assert blocking & {("proximal", "joint_stop"), ("nail", "nail_slips"), ("nail", "nail_lifts")}
 
 
-def spoilt(answer: Plan, **changes) -> Plan:
-    """The plan with other numbers of the nail of inner_left, or of its tendon."""
+NUMBERS = {
+    "shear": ("loads", 0),
+    "normal": ("loads", 1),
+    "force": ("forces", ...),
+    "utilisation": ("tile_utilisations", ...),
+}
+"""Where a plan has the numbers of a tile."""
+
+
+def spoilt(answer: Plan, finger: str = "inner_left", **changes) -> Plan:
+    """The plan with other numbers of a finger's nail, or of its tendon."""
     hand = answer.hands[0]
-    finger = hand.fingers[1]
-    own = {key: changes.pop(key) for key in tuple(changes) if key == "tendon_tension"}
-    nail = replace(finger.tiles[-1], **changes)
-    finger = replace(finger, tiles=(*finger.tiles[:-1], nail), **own)
-    return replace(
-        answer, hands=(replace(hand, fingers=(hand.fingers[0], finger, *hand.fingers[2:])),)
-    )
+    row = hand.tile(finger, "nail")
+    for key, value in changes.items():
+        if key == "tension":
+            name, place = "tensions", FINGERS.index(finger)
+        elif key == "contact":
+            tiles = list(hand.tiles)
+            tiles[row] = tiles[row]._replace(contact=value)
+            hand = replace(hand, tiles=tuple(tiles))
+            continue
+        else:
+            name, place = NUMBERS[key][0], (row, NUMBERS[key][1])
+        numbers = getattr(hand, name).copy()
+        numbers[place] = value
+        hand = replace(hand, **{name: numbers})
+    return replace(answer, hands=(hand,))
 
 
 def complaints(answer: Plan, question: Question) -> str:
@@ -475,7 +492,7 @@ def test_a_tampered_nail_is_caught():
         (pushed(shear=200.0), "lets joint 1 of its finger close"),
         ({"contact": "none"}, "carries a load but touches nothing"),
         ({"utilisation": 0.5 * nail.utilisation}, "utilisation is"),
-        ({"tendon_tension": finger.tendon_tension + 1.0}, "out of balance"),
+        ({"tension": finger.tendon_tension + 1.0}, "out of balance"),
     ):
         assert words in complaints(spoilt(answer, **changes), question), words
 
@@ -499,10 +516,7 @@ def test_a_nail_that_touches_nothing_may_carry_nothing():
     idle = answer.hands[0].fingers[3].tiles[-1]
     assert (idle.contact, idle.utilisation) == ("none", 0.0)
     assert not idle.force.any()
-    fingers = list(answer.hands[0].fingers)
-    pulled = replace(idle, force=-idle.normal_axis, normal=-1.0)
-    fingers[3] = replace(fingers[3], tiles=(*fingers[3].tiles[:-1], pulled))
-    tampered = replace(answer, hands=(replace(answer.hands[0], fingers=tuple(fingers)),))
+    tampered = spoilt(answer, "outer_right", force=-idle.normal_axis, normal=-1.0)
     assert "nail of outer_right carries a load but touches nothing" in complaints(
         tampered, question
     )

@@ -14,7 +14,8 @@ from test_floating_plan import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 
 from hand_models.frames import wrench_transport
 from planner.gathering import gather
-from planner.plan import HandPlan, Plan
+from planner.hand_plan import HandPlan
+from planner.plan import Plan
 from planner.posture import posture
 from planner.program import SLACK
 from planner.question import ForceCap, Limits, Question

@@ -244,7 +244,7 @@ def test_hands_that_cannot_float_are_refused(grasp, preload, error, field):
 def test_check_finds_what_is_wrong(spoilt):
     question, answer = mixed()
     hand = answer.hands[1]
-    finger, palm = hand.fingers[1], hand.palm
+    palm = hand.palm
     if spoilt == "twist":
         aside = hand.wrist.twist + np.array([0.0, 0.0, 1e-6, 0.0, 0.0, 0.0])
         hand = replace(hand, wrist=replace(hand.wrist, twist=aside))
@@ -253,12 +253,11 @@ def test_check_finds_what_is_wrong(spoilt):
     elif spoilt == "wrist":
         hand = replace(hand, wrist=None)
     else:
-        if spoilt == "shear":
-            tile = replace(finger.tiles[0], shear=finger.tiles[0].shear + 0.01)
-            finger = replace(finger, tiles=(tile, *finger.tiles[1:]))
-        else:
-            finger = replace(finger, tendon_tension=finger.tendon_tension + 0.01)
-        hand = replace(hand, fingers=(hand.fingers[0], finger, *hand.fingers[2:]))
+        # the first tile of inner_left, and its tendon
+        name, index = {"shear": ("loads", (4, 0)), "tension": ("tensions", 1)}[spoilt]
+        numbers = getattr(hand, name).copy()
+        numbers[index] += 0.01
+        hand = replace(hand, **{name: numbers})
     settled = [settle(place, question.stance) for place in question.stance.hands]
     hands = (answer.hands[0], hand, *answer.hands[2:])
     assert problems(question, settled, hands, answer.utilisation, answer.body_wrench)

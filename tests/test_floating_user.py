@@ -23,6 +23,7 @@ from planner.settling import settle
 from planner.solve import plan
 from service import command
 from service import terminal as screens
+from service.own_robot import ROBOTS
 from service.questions import question
 from service.requests import PlanRequest
 from service.stances import read_request
@@ -52,9 +53,9 @@ SOLVED: list[int] = []
 @contextmanager
 def counted() -> Iterator[list[int]]:
     """Count the programs that are solved."""
-    run, solved = program._Program._run, []
+    run, solved = program._Program.run, []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program._Program, "_run", lambda self: solved.append(1) or run(self))
+        patch.setattr(program._Program, "run", lambda *given: solved.append(1) or run(*given))
         yield solved
 
 
@@ -143,10 +144,10 @@ def test_preload_that_alone_overloads_is_named():
 
 
 def test_no_raw_warning_leaves():
-    asked = command._without_palms(request(preload=20.0, closing=20.0))
+    asked = request(preload=20.0, closing=20.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        plan(question(asked))
+        assert command._without_palms(asked, ROBOTS) is not None
 
 
 @pytest.mark.parametrize(

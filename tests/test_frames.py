@@ -138,3 +138,19 @@ def test_orientation_agrees_with_scipys_euler_angles():
     rotation = Rotation.from_euler("xyz", [0.2, -0.4, 0.9])
     pose = Pose.from_quaternion(np.zeros(3), rotation.as_quat())
     np.testing.assert_allclose(pose.rotation, rotation.as_matrix(), atol=1e-12)
+
+
+def test_quaternions_are_those_of_scipy():
+    """Of small and large turns about any axis, half turns among them."""
+    rng = np.random.default_rng(7)
+    axes = np.vstack([np.eye(3), -np.eye(3), rng.normal(size=(200, 3))])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    for axis in axes:
+        for angle in (0.0, 1e-9, 0.3, 2.0, math.pi - 1e-6, math.pi, 4.0):
+            turn = Rotation.from_rotvec(angle * axis)
+            got = Pose(np.zeros(3), turn.as_matrix()).quaternion()
+            assert got[3] >= 0.0
+            same = Rotation.from_quat(got).inv() * turn
+            assert same.magnitude() == pytest.approx(0.0, abs=1e-14)
+            if abs(angle - math.pi) > 1e-9:
+                np.testing.assert_allclose(got, turn.as_quat(canonical=True), atol=1e-14)

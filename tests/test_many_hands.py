@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import peer
@@ -37,6 +38,10 @@ torque_limit = {{ value = 150.0, unit = "N·m", source = "assumed" }}
 
 @pytest.fixture(scope="module")
 def crawler(tmp_path_factory) -> Robot:
+    return crawler_in(tmp_path_factory.mktemp("crawler"))
+
+
+def crawler_in(folder: Path) -> Robot:
     """A plate on a wall with sixteen arms of three joints, eight on each side, read from files."""
     parts = [link("plate", 12.0, "0 0 0.02", 0.5)]
     for i, limb in enumerate(LIMBS):
@@ -49,7 +54,6 @@ def crawler(tmp_path_factory) -> Robot:
             joint(f"{limb}_wrist", "revolute", f"{limb}_arm", f"{limb}_hand", "0.25 0 0", "0 1 0"),
             link(f"{limb}_hand", 0.1),
         ]
-    folder = tmp_path_factory.mktemp("crawler")
     toml = 'name = "crawler"\nurdf = "crawler.urdf"\nbody = "plate"\n'
     (folder / "crawler.urdf").write_text(urdf(*parts))
     (folder / "crawler.toml").write_text(toml + "".join(ARM.format(limb=limb) for limb in LIMBS))

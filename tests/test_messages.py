@@ -506,8 +506,8 @@ def test_numbers_of_a_mesh_that_are_none_are_refused_in_messagepack_too() -> Non
         (b"{}", "image/png"),
         (b"{}", "application/jsonp"),
         (b" " * (LARGEST_REQUEST + 1), JSON),
-        (b'{"v":1,"deadline":' + b"[" * 400_000, JSON),
-        (b"\x82\xa1v\x01\xa8deadline" + b"\x91" * 400_000, MSGPACK),
+        (b'{"v":1,"confidence":' + b"[" * 400_000, JSON),
+        (b"\x82\xa1v\x01\xaaconfidence" + b"\x91" * 400_000, MSGPACK),
     ],
 )
 def test_bytes_that_are_no_message(payload: bytes, encoding: str) -> None:
@@ -689,7 +689,7 @@ def test_a_hand_that_is_not_there() -> None:
 
 
 def test_numbers_that_do_not_exist_are_null(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hand_models.fixed_wrist import TensionLimit
+    from hand_models.parallelepiped import TensionLimit
 
     endless = (TensionLimit("inner_left", math.inf, None),)
     monkeypatch.setattr(dispatch, "tension_limits", lambda _: endless)
@@ -752,7 +752,7 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     assert request["additionalProperties"] is False
     assert set(request["required"]) == {"v", "stance"}
     assert request["properties"]["v"]["enum"] == [1]
-    assert "not supported" in request["properties"]["deadline"]["description"]
+    assert "not supported" in request["properties"]["confidence"]["description"]
 
 
 def departures(name: str, document: object) -> list[tuple]:

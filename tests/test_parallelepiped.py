@@ -8,7 +8,7 @@ import pytest
 from hands import HAND, ROCK, pinch, without_hand_load
 
 from hand_models import Cylinder, EmptySetError, Grasp, Surface, tension_limits, wrench_space
-from hand_models.fixed_wrist import parallelepiped
+from hand_models.parallelepiped import parallelepiped
 
 
 def test_its_vertices_are_the_sums_of_each_finger_at_its_least_and_its_largest_tension():

@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
 from hand_models.errors import SolverError, UnsupportedError
-from hand_models.polytopes import Faces, clipped
+from hand_models.half_spaces import Faces
+from hand_models.polytopes import clipped
 from hand_models.wrench_space import SCALE, Row
 
 seeds = st.integers(0, 2**32 - 1)

@@ -36,6 +36,22 @@ def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.Captur
     assert len(json.loads(lines[2])) == 4
 
 
+def test_the_examples_of_a_stance_that_stays_go_on_from_the_first(
+    capsys: pytest.CaptureFixture[str],
+):
+    scope: dict[str, object] = {}
+    for word in ("up_the_wall", "KnownStance", "WrenchStream"):
+        (example,) = (
+            block for block in blocks("python") if f"import {word}" in block or f"{word} =" in block
+        )
+        exec(compile(example, "README.md", "exec"), scope)
+    known, stream, *_ = capsys.readouterr().out.splitlines()[3:]
+    assert 0.5 < float(known) < 1.0
+    status, source, used, gap = stream.split()
+    assert (status, source) == ("optimal", "interpolated")
+    assert 0.0 <= float(gap) < 0.01 < float(used) < 1.0
+
+
 def test_the_example_of_a_floating_hand_prints_stiffness_pose_and_limit(
     capsys: pytest.CaptureFixture[str],
 ):

@@ -47,7 +47,9 @@ ROOT = Path(__file__).parents[1]
 PLAN = service_key("robosimian", "plan")
 WRENCH_SPACE = service_key("robosimian", "wrench_space")
 BODY_SPACE = service_key("robosimian", "body_space")
-KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE]
+STREAM = service_key("robosimian", "stream")
+SET_POINTS = service_key("robosimian", "set_points")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
 
 
 def free_endpoint() -> str:

@@ -9,9 +9,16 @@ import math
 import numpy as np
 import pytest
 from hands import HAND, ROCK, pinch
+from rocks import random_axes
+from scipy.spatial.transform import Rotation
+from stances import SANDPAPER, ask, on_wall
 
-from hand_models import Cylinder, Edge, Grasp, Plane, Sphere, tension_limits, wrench_space
+from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits, wrench_space
+from hand_models.contact_states import Closing, close, close_all
+from hand_models.fixed_wrist import wrench_spaces
+from hand_models.hand import Placement
 from hand_models.palm import share_load
+from planner.gathering import gather
 
 HOLDS = {
     "pinch on 300 mm": (Cylinder(0.3), math.pi),
@@ -33,7 +40,9 @@ def fresh(space):
 @pytest.mark.parametrize(("hold", "rotation"), HOLDS.values(), ids=HOLDS.keys())
 def test_settle_and_wrench_space(benchmark, hold, rotation):
     grasp = Grasp(outer_rotation=rotation)
-    space = benchmark(lambda: wrench_space(HAND.settle(hold, ROCK, grasp)))
+    space = benchmark.pedantic(
+        lambda: wrench_space(HAND.settle(hold, ROCK, grasp)), setup=HAND.settled.clear, rounds=300
+    )
     assert len(space.columns) == 4 + 4 + 2
     assert np.isfinite(space.A).all()
 
@@ -43,6 +52,107 @@ def test_settle_and_wrench_space(benchmark, hold, rotation):
 def test_wrench_space_alone(benchmark, lateral):
     space = benchmark(wrench_space, pinch(lateral=lateral))
     assert len(space.columns) == (10 if lateral else 6)
+
+
+FOUR = (
+    (Cylinder(0.3), ROCK, math.pi),
+    (Sphere(0.4), ROCK, math.pi),
+    (Cylinder(0.5), SANDPAPER, 0.5),
+    (Plane(), SANDPAPER, 0.0),
+)
+"""Holds, surfaces and outer rotations of a stance's hands, all different."""
+
+
+@pytest.mark.benchmark(group="four hands, from holds to settled")
+@pytest.mark.parametrize("askew", [False, True], ids=["seated", "askew"])
+@pytest.mark.parametrize("way", ["one by one", "together", "known"])
+def test_four_hands_settle(benchmark, way, askew):
+    tilted = Rotation.from_rotvec([0.02, 0.0, 0.03]).as_matrix()
+    place = Pose(np.array([0.01, 0.005, 0.003]), tilted) if askew else None
+    placements = [Placement(hold, ROCK, Grasp(rotation), place) for hold, _, rotation in FOUR]
+
+    def forget():
+        if way != "known":
+            HAND.settled.clear()
+
+    def each():
+        return [HAND.settle(*placement) for placement in placements]
+
+    def together():
+        return HAND.settle_each(placements)
+
+    work = each if way == "one by one" else together
+    settled = benchmark.pedantic(work, setup=forget, rounds=300)
+    assert [type(hand.hold) for hand in settled] == [type(hold) for hold, *_ in FOUR]
+
+
+@pytest.mark.benchmark(group="four hands, from settled to o, V, A, b")
+@pytest.mark.parametrize("way", ["one by one", "together", "known"])
+def test_four_wrench_spaces(benchmark, way):
+    hands = [HAND.settle(hold, rock, Grasp(rotation)) for hold, rock, rotation in FOUR]
+
+    def settled():
+        # a copy is a hand of its own, whose set is not known yet
+        return ([hand if way == "known" else dataclasses.replace(hand) for hand in hands],), {}
+
+    def each(those):
+        return [wrench_space(hand) for hand in those]
+
+    work = each if way == "one by one" else wrench_spaces
+    spaces = benchmark.pedantic(work, setup=settled, rounds=300)
+    assert [space.columns[-1] for space in spaces] == ["palm_pressing"] * 4
+
+
+@pytest.mark.benchmark(group="four hands, from a parsed question to the programs' data")
+@pytest.mark.parametrize("known", [False, True], ids=["new holds", "known holds"])
+def test_data_of_four_hands(benchmark, known):
+    stance = on_wall()
+    question = ask(
+        dataclasses.replace(
+            stance,
+            hands=tuple(
+                dataclasses.replace(hand, hold=hold, surface=rock, grasp=Grasp(rotation))
+                for hand, (hold, rock, rotation) in zip(stance.hands, FOUR, strict=True)
+            ),
+        )
+    )
+    wrench = question.needed_wrench()
+
+    def forget():
+        if not known:
+            stance.robot.hand.settled.clear()
+
+    def data():
+        _, hands = gather(question, None, wrench)
+        return hands.sets(hands.at_rest(hands.idle)).data
+
+    found = benchmark.pedantic(data, setup=forget, rounds=100)
+    assert found.shape.balance == 6
+    assert len(found.hands) == 4
+
+
+def giving_way(hold, count):
+    """Fingers over a hold of which some contact gives way as they close."""
+    rng, found = np.random.default_rng(0), []
+    while len(found) < count:
+        axes = random_axes(rng, 0.3)
+        origin = np.array([*rng.uniform(-0.05, 0.0, 2), -rng.uniform(0.005, 0.02)])
+        closing = Closing(hold.section(origin, axes[:, 0], axes[:, 2]), SANDPAPER, 37.0)
+        closed = close(HAND.finger, *closing)
+        if closed is not None and any(contact.stop for contact in closed.finger.contacts):
+            found.append(closing)
+    return found
+
+
+@pytest.mark.benchmark(group="fingers of which a contact gives way")
+@pytest.mark.parametrize("count", [1, 4, 16])
+@pytest.mark.parametrize(
+    "hold", [Edge(0.05, 2.0), Plane(), Sphere(0.4)], ids=["edge", "wall", "ball"]
+)
+def test_fingers_that_do_not_stay(benchmark, hold, count):
+    closings = giving_way(hold, count)
+    closed = benchmark(close_all, HAND.finger, closings)
+    assert all(any(contact.stop for contact in each.finger.contacts) for each in closed)
 
 
 @pytest.mark.benchmark(group="hull of a hand")

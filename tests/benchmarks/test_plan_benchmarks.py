@@ -9,7 +9,14 @@ from stances import PLACES, ask, on_wall, program_data
 
 from hand_models.holds import Cylinder
 from planner import program
+from planner.dual_bounds import unique_bound
+from planner.equilibrium import equilibrium
+from planner.gathering import gather
+from planner.reading import Reader
 from planner.solve import plan
+from planner.stacked import stacked
+from planner.verify import Check
+from service.answers import plan_reply
 
 LIMBS = tuple(PLACES)
 HOLDS = {"held": Cylinder(0.3), "overloaded": Cylinder(0.7)}
@@ -76,3 +83,59 @@ def test_certificate(benchmark):
     """A whole plan that ends as infeasible, the certificate included."""
     answer = benchmark(plan, ask(on_wall(palm=False)))
     assert answer.status == "infeasible"
+
+
+# After the solver ---------------------------------------------------------------------------------
+
+
+def solved_stance():
+    """A question of four hands, its settled hands, sets and data, and the loads of its plan."""
+    question = question_of()
+    wrench = question.needed_wrench()
+    settled, hands = gather(question, None, wrench)
+    spaces, data = hands.sets(hands.at_rest(hands.idle))
+    return question, settled, spaces, data, program.unique(data), wrench
+
+
+def forget():
+    """Let go of what is kept of settled hands."""
+    stacked.cache_clear()
+    equilibrium.cache_clear()
+
+
+@pytest.mark.benchmark(group="after the solver, four hands")
+def test_reading_and_checking_hands_that_are_new(benchmark):
+    question, settled, spaces, _, outcome, wrench = solved_stance()
+
+    def after():
+        forget()
+        carried, _, effort = Reader(settled, spaces).read(outcome.loads)
+        used = float(carried.utilisations.max())
+        return Check(question, settled).problems(carried, used, wrench, effort)
+
+    assert benchmark(after) == []
+
+
+@pytest.mark.benchmark(group="after the solver, four hands")
+def test_reading_and_checking_hands_that_are_known(benchmark):
+    question, settled, spaces, _, outcome, wrench = solved_stance()
+    reader, check = Reader(settled, spaces), Check(question, settled)
+
+    def after():
+        carried, _, effort = reader.read(outcome.loads)
+        return check.problems(carried, float(carried.utilisations.max()), wrench, effort)
+
+    assert benchmark(after) == []
+
+
+@pytest.mark.benchmark(group="after the solver, four hands")
+def test_proving_that_nothing_uses_less(benchmark):
+    _, _, _, data, outcome, _ = solved_stance()
+    assert benchmark(unique_bound, data, outcome) == pytest.approx(outcome.value, rel=1e-5)
+
+
+@pytest.mark.benchmark(group="after the solver, four hands")
+def test_reply(benchmark):
+    answer = plan(question_of())
+    reply = benchmark(plan_reply, answer, None, model=False)
+    assert [hand.utilisation for hand in reply.hands] == [hand.utilisation for hand in answer.hands]

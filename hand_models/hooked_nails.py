@@ -1,0 +1,93 @@
+"""The nails of hands that cling with them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.closed_fingers import ClosedFingers
+from hand_models.errors import InvalidInputError
+from hand_models.finger_frames import AXES, KIND, NORMAL, PARTS, POSITION, UP
+from hand_models.fingernail import Fingernail
+from hand_models.frames import Array
+from hand_models.placed_hands import PlacedHands
+from hand_models.settled_hand import CONTACTS, FINGERS, NAIL
+
+__all__ = ["Nails", "hook_nails", "no_nails"]
+
+
+class Nails(NamedTuple):
+    """The nails of one hand; attributes as of `SettledHand`.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (4,)
+    normals : ndarray, shape (4, 3)
+    rows : tuple of (ndarray, ndarray)
+    """
+
+    angles: Array
+    normals: Array
+    rows: tuple[tuple[Array, Array], ...]
+
+
+def no_nails(nail: Fingernail) -> Nails:
+    """Return nails that are all out of the way; arrays are read-only."""
+    angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
+    angles.setflags(write=False)
+    normals.setflags(write=False)
+    return Nails(angles, normals, ())
+
+
+def hook_nails(
+    placed: PlacedHands, closed: ClosedFingers, parts: Array, index: int, closing: float
+) -> Nails:
+    """Return where the nails of a hand hook whose fingers are straight, and add them to its parts.
+
+    Parameters
+    ----------
+    placed : PlacedHands
+    closed : ClosedFingers
+    parts : ndarray, shape (n, 4, 5, `COLUMNS`)
+        Of all hands; the nails of this one are put there.
+    index : int
+        Of the hand.
+    closing : float
+        Its closing tension [N].
+
+    Raises
+    ------
+    InvalidInputError
+        If the rock is in the way of a nail.
+    """
+    nail = placed.hand.nail
+    angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
+    rows = []
+    frames = placed.frames.hands[index].fingers
+    for i, (name, frame) in enumerate(zip(FINGERS, frames, strict=True)):
+        section = placed.section(index, i)
+        finger = closed.alone[len(FINGERS) * index + i].finger
+        if nail.stuck(section, finger.pin):
+            raise InvalidInputError(
+                f"the hold is in the way of the nail of {name}, straight ahead; "
+                "move the hand away from the rock",
+                field="hold",
+            )
+        tip = parts[index, i, PARTS.index(NAIL)]
+        cling = nail.cling(section, finger, closing, name.startswith("outer"))
+        reach = nail.length
+        if cling is not None:
+            angles[i], reach = cling.hook.angle, cling.hook.distance
+            s, t = cling.hook.normal
+            normals[i] = s * frame.along + t * UP
+            rows.append((cling.H, cling.h))
+            tip[KIND], tip[NORMAL] = CONTACTS.index(NAIL), cling.force
+        cosine, sine = math.cos(angles[i]), math.sin(angles[i])
+        w = cosine * frame.along + sine * UP
+        tip[POSITION] = frame.joint + finger.pin[0] * frame.along + reach * w
+        tip[AXES] = np.concatenate([-w, cosine * UP - sine * frame.along, frame.across])
+    for array in (angles, normals, *(part for pair in rows for part in pair)):
+        array.setflags(write=False)
+    return Nails(angles, normals, tuple(rows))

@@ -1,0 +1,75 @@
+"""Answers to the last questions that were asked: a bounded store that threads may share."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable, Iterable, Sequence
+from threading import Lock
+from typing import Generic, NamedTuple, TypeVar
+
+__all__ = ["Recent", "RecentInfo"]
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+
+
+class RecentInfo(NamedTuple):
+    """How a store has served: answers found and missed since it was cleared, and kept now."""
+
+    hits: int
+    misses: int
+    kept: int
+
+
+class Recent(Generic[K, V]):
+    """The answers to the questions that were asked last.
+
+    Its answers are not part of what it is: a copy, and what another process gets, begins empty.
+
+    Parameters
+    ----------
+    most : int
+        Answers kept; the one that was asked for longest ago goes first.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._lock = Lock()
+        self.clear()
+
+    def __reduce__(self) -> tuple[type[Recent[K, V]], tuple[int]]:
+        return type(self), (self.most,)
+
+    def clear(self) -> None:
+        """Forget all."""
+        with self._lock:
+            self._answers: OrderedDict[K, V] = OrderedDict()
+            self._hits = self._misses = 0
+
+    def info(self) -> RecentInfo:
+        """Return how the store has served."""
+        with self._lock:
+            return RecentInfo(self._hits, self._misses, len(self._answers))
+
+    def find(self, questions: Sequence[K]) -> list[V | None]:
+        """Return the answer to each question, None where it is not known."""
+        with self._lock:
+            answers = self._answers
+            found: list[V | None] = []
+            for question in questions:
+                answer = answers.get(question)
+                if answer is None:
+                    self._misses += 1
+                else:
+                    self._hits += 1
+                    answers.move_to_end(question)
+                found.append(answer)
+            return found
+
+    def keep(self, answers: Iterable[tuple[K, V]]) -> None:
+        """Add answers, and let those go that were not asked for longest."""
+        with self._lock:
+            for question, answer in answers:
+                self._answers[question] = answer
+            while len(self._answers) > self.most:
+                self._answers.popitem(last=False)

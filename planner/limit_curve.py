@@ -1,0 +1,84 @@
+"""The limit surface of tiles (Eq. 21 and what stands beside it), load by load, for the check.
+
+The same surface as `Surface.strength`, written in the load itself instead of its direction: with a
+the load in the tile's plane and r its size, cos φ = a / r and cos θ = T / a, so that
+
+    f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from hand_models.frames import Array, Indices
+from hand_models.spines import Surface
+from planner.stacked import KEPT_NAMES, Same
+
+__all__ = ["LimitCurves"]
+
+SMALL: Final = 1e-300
+"""In place of a load that is zero, where something is divided by it [N]."""
+
+
+class LimitCurves:
+    """The limit surfaces of some tiles, each on its own rock.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Some of them, in any order.
+    of_tile : ndarray of int, shape (n,)
+        Which of them each tile has.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], of_tile: Indices) -> None:
+        self._numbers = _numbers(Same(*surfaces)).take(of_tile, 1)
+
+    def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
+        """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
+
+        Parameters
+        ----------
+        shear, normal, lateral : ndarray, shape (n,)
+            The last of either sign. Shear is not below zero but by rounding.
+        relative : float
+            Part of its strength by which a load may exceed it.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Negative inside.
+        """
+        most, loss, per_radian, aside, leaves, gain = self._numbers
+        along = np.hypot(shear, lateral)
+        pull = np.minimum(normal, 0.0)
+        # pressed, a tile holds what it does in its own plane, and more by the gain
+        size = np.hypot(along, pull)
+        ratio = np.minimum(np.arctan2(pull, along) * per_radian, 1.0)
+        turned = (along - shear) / np.maximum(size, SMALL)
+        strength = (most - loss * ratio) * (1.0 - (aside + leaves * ratio) * turned)
+        return np.asarray(size - gain * (normal - pull) - (1.0 + relative) * strength)
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _numbers(key: Same) -> Array:
+    """Return f_max, f_max − f_min, −1 / φ_max, 1 − λ(0), λ(0) − λ(φ_max) and γ of surfaces."""
+    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
+    shares = [surface.lateral_limit / surface.shear_limit for surface in surfaces]
+    return np.array(
+        [
+            (
+                surface.shear_limit,
+                surface.shear_limit - surface.pull_off_limit,
+                -1.0 / surface.pull_off_angle,
+                1.0 - share,
+                share * (1.0 - surface.lateral_pull_off_ratio),
+                surface.compression_gain,
+            )
+            for surface, share in zip(surfaces, shares, strict=True)
+        ]
+    ).T

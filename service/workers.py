@@ -1,0 +1,221 @@
+"""Processes that do one kind of work, kept open; one that dies costs what it had in hand at most.
+
+Work goes out in chunks and comes back as it is done. What a process had in hand when it died is
+tried once more, alone: whatever kills its process then is lost, and nothing else is.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection, wait
+from types import TracebackType
+from typing import Final, Generic, Self, TypeVar
+
+__all__ = ["Lost", "Workers", "cores"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+CHUNK: Final = 8
+"""Most items that go out together."""
+
+ROUNDS: Final = 8
+"""Chunks for each process at least, so that none waits long for the last one."""
+
+FLUSH: Final = 0.05
+"""How long results wait for the rest of their chunk [s]."""
+
+PATIENCE: Final = 1.0
+"""How long processes that are to end may take [s]."""
+
+STARTS: Final = 2
+"""Processes in a row that may die before they are ready; after that no more are started."""
+
+THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""What keeps a library of linear algebra to one thread, before it is loaded."""
+
+
+class Lost:
+    """Takes the place of a result that there is none of.
+
+    Parameters
+    ----------
+    reason : str
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Workers(Generic[T, R]):
+    """Processes that turn items into results, while it is entered. For one caller at a time.
+
+    Parameters
+    ----------
+    make : callable
+        Called once in each process; returns what turns an item into its result. It, items and
+        results can be pickled. What it raises ends its process.
+    count : int
+        How many processes.
+    """
+
+    def __init__(self, make: Callable[[], Callable[[T], R]], count: int) -> None:
+        self._make = make
+        self._count = max(1, count)
+        self._all: list[_Worker[T, R]] = []
+        self._stillborn = 0
+        """Processes in a row that have died before they were ready."""
+
+    def __enter__(self) -> Self:
+        self._hire()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for worker in self._all:
+            worker.pipe.close()
+        until = time.monotonic() + PATIENCE
+        for worker in self._all:
+            worker.end(until)
+        self._all.clear()
+
+    def each(self, items: Sequence[T]) -> Iterator[tuple[int, R | Lost]]:
+        """Yield each item's index and result, as they are done."""
+        size = max(1, min(CHUNK, math.ceil(len(items) / (self._count * ROUNDS))))
+        todo = deque(range(i, min(i + size, len(items))) for i in range(0, len(items), size))
+        tried: set[int] = set()
+        try:
+            while todo or any(worker.hand for worker in self._all):
+                self._hire()
+                if not self._all:
+                    for i in (i for chunk in todo for i in chunk):
+                        yield i, Lost("processes do not start")
+                    return
+                for worker in self._all:
+                    if worker.idle and todo:
+                        worker.give([(i, items[i]) for i in todo.popleft()])
+                for pipe in wait([worker.pipe for worker in self._all]):
+                    worker = next(each for each in self._all if each.pipe is pipe)
+                    done = worker.take()
+                    if done is not None:
+                        self._stillborn = 0
+                        yield from done
+                        continue
+                    self._dismiss(worker)
+                    for i in sorted(worker.hand):
+                        if i in tried:
+                            yield i, Lost("its process died, twice")
+                        else:
+                            tried.add(i)
+                            todo.append(range(i, i + 1))
+        finally:
+            # what nobody waits for any more
+            for worker in [worker for worker in self._all if worker.hand]:
+                self._dismiss(worker)
+
+    def _hire(self) -> None:
+        while len(self._all) < self._count and self._stillborn < STARTS:
+            self._all.append(_Worker(self._make))
+
+    def _dismiss(self, worker: _Worker[T, R]) -> None:
+        self._all.remove(worker)
+        self._stillborn += not worker.ready
+        worker.pipe.close()
+        worker.process.kill()
+        worker.process.join()
+
+
+class _Worker(Generic[T, R]):
+    """One process, and what it has in hand."""
+
+    def __init__(self, make: Callable[[], Callable[[T], R]]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, other = context.Pipe()
+        self.process = context.Process(target=_work, args=(other, make), daemon=True)
+        with _one_thread():
+            self.process.start()
+        # the process has the other end alone, so that its death ends the pipe
+        other.close()
+        self.ready = False
+        self.hand: set[int] = set()
+
+    @property
+    def idle(self) -> bool:
+        """Whether it waits for work."""
+        return self.ready and not self.hand
+
+    def give(self, chunk: list[tuple[int, T]]) -> None:
+        """Send a chunk of work."""
+        self.hand = {i for i, _ in chunk}
+        # of a process that has died, its pipe tells next
+        with suppress(OSError):
+            self.pipe.send(chunk)
+
+    def take(self) -> list[tuple[int, R]] | None:
+        """Return the results that have come; None if the process has died."""
+        try:
+            done: list[tuple[int, R]] = self.pipe.recv()
+        except (EOFError, OSError):
+            return None
+        self.ready = True
+        self.hand -= {i for i, _ in done}
+        return done
+
+    def end(self, until: float) -> None:
+        """Let the process come to its end, and kill it if it is not there in time."""
+        self.process.join(max(0.0, until - time.monotonic()))
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+
+
+def _work(pipe: Connection, make: Callable[[], Callable[[T], R]]) -> None:
+    """Do chunks of work until nobody sends any more; what a process of `Workers` runs."""
+    # Ctrl-C is the caller's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    turn = make()
+    pipe.send([])
+    with suppress(EOFError, OSError):
+        while True:
+            done: list[tuple[int, R]] = []
+            flushed = time.monotonic()
+            for i, item in pipe.recv():
+                done.append((i, turn(item)))
+                if time.monotonic() > flushed + FLUSH:
+                    pipe.send(done)
+                    done, flushed = [], time.monotonic()
+            if done:
+                pipe.send(done)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started here do their linear algebra on one thread."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

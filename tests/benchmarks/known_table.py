@@ -1,0 +1,77 @@
+"""What another body wrench on a known stance takes: planned, and streamed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+from measured_stances import question_of
+from plain_programs import Clarabel, scaled, unique
+from race import WARM, race
+from results import Table, lines
+
+from planner import program
+from planner.gathering import gather
+from planner.known_stance import KnownStance
+from planner.stance_data import WRENCH_UNIT
+from planner.stream import SetPoints, WrenchStream
+
+__all__ = ["known_tables"]
+
+STEP = 0.3
+"""How far the wrench goes from one query to the next [N], a tenth of that as moments [N·m]."""
+
+AGREEMENT = 1e-5
+"""How far utilisations of the same wrench may be apart."""
+
+
+def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
+    """Measure, with so many rounds, on the way of a wrench that drifts."""
+    question = question_of(0)
+    needed = question.needed_wrench()
+    way = np.random.default_rng(0).normal(size=6)
+    way *= STEP / np.linalg.norm(way) * WRENCH_UNIT / WRENCH_UNIT[0]
+    places = [number if number < rounds else 0 for number in range(rounds + WARM)]
+    wrenches = [needed + place * way for place in places]
+    _, hands = gather(question, None, needed)
+    data = scaled(hands.sets(hands.at_rest(hands.idle)))
+    raw = Clarabel(
+        [unique(data._replace(wrench=wrench / WRENCH_UNIT)) for wrench in wrenches],
+        program.Unique.settings[0],
+    )
+    known = KnownStance(question)
+    given: list[SetPoints] = []
+    with WrenchStream(question) as stream:
+        timed = race(
+            {
+                "floor": raw.turned,
+                "plan": lambda k: known.plan(wrenches[k]),
+                "stream": lambda k: given.append(stream.set_points(wrenches[k])),
+            },
+            rounds,
+            tick,
+        )
+    for number, points in enumerate(given[WARM:]):
+        used = known.plan(wrenches[number]).utilisation or np.nan
+        assert points.verified
+        assert abs(used - raw.turned(number).x[-1]) <= AGREEMENT
+        assert used - AGREEMENT <= points.utilisation <= used + points.gap + AGREEMENT
+    sources = Counter(points.source for points in given[WARM:])
+    return [
+        Table(
+            "A known stance of four hands, its body wrench drifting",
+            ("median", "× floor"),
+            lines(
+                timed,
+                ["floor"],
+                ("raw Clarabel, right-hand side updated, and solve (the floor)", "floor"),
+                ("**verified plan, `KnownStance`**", "plan"),
+                ("**verified set-points, `WrenchStream`**", "stream"),
+            ),
+            f"{STEP:g} N from query to query. Set-points: "
+            + ", ".join(f"{count} {source}" for source, count in sources.most_common())
+            + f"; certified gap of the utilisation at most {max(p.gap for p in given):.1e}; "
+            f"99 of 100 within {1e3 * np.percentile(timed.times['stream'], 99):.2f} ms.",
+        )
+    ]

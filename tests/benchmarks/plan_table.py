@@ -1,0 +1,217 @@
+"""What a plan takes, above raw Clarabel and beside other ways to the same plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from cvxpy_users import Parametrised, Query, rebuilt
+from measured_stances import payload, question_of, request
+from plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
+from race import WARM, Way, race
+from results import Line, Table, lines, span
+
+from planner import program
+from planner.gathering import gather
+from planner.hand_sets import Hands, Sets
+from planner.question import Question
+from planner.solve import plan
+from service import dispatch
+from service.keys import PLAN
+from service.questions import question
+
+__all__ = ["plan_tables"]
+
+AGREEMENT = 1e-5
+"""How far another way's utilisation may be from a plan's."""
+
+FEW = 4
+"""Stances that are asked for again and again, where caches count."""
+
+
+class Known(NamedTuple):
+    """All that is known of a measured stance before the clock starts."""
+
+    question: Question
+    hands: Hands
+    sets: Sets
+    utilisation: float
+
+
+def known(number: int) -> Known:
+    """A measured stance, its hands' sets and its utilisation."""
+    asked = question_of(number)
+    _, hands = gather(asked, None, asked.needed_wrench())
+    sets = hands.sets(hands.at_rest(hands.idle))
+    return Known(asked, hands, sets, program.unique(sets.data).value)
+
+
+class Rivals:
+    """Other ways to the plans of some stances, each a function of the stance's number."""
+
+    def __init__(self, stances: Sequence[Known]) -> None:
+        self.stances = stances
+        own = [scaled(each.sets) for each in stances]
+        plain = [si(each.question, each.sets) for each in stances]
+        used = [each.utilisation for each in stances]
+        settings = program.Unique.settings[0]
+        self.unique = Clarabel([unique(data) for data in own], settings)
+        self.least = Clarabel([least(data) for data in own], program.SETTINGS)
+        self.tie = Clarabel(
+            [tie(data, u) for data, u in zip(own, used, strict=True)], program.SETTINGS
+        )
+        self.si = Clarabel([unique(data) for data in plain], {})
+        self.qoco = Qoco([unique(data) for data in own])
+        self.plain = [least(data) for data in plain]
+        self.queries = [
+            Query(
+                each.sets.spaces,
+                each.hands.transports,
+                each.question.needed_wrench(),
+                np.split(data.w, np.cumsum([hand.shape[0] for hand in each.sets.data.hands])[:-1]),
+            )
+            for each, data in zip(stances, plain, strict=True)
+        ]
+        self.parametrised = Parametrised(self.queries[0])
+
+    def check(self, number: int) -> None:
+        """Raise unless all ways come to the same utilisation."""
+        expected = self.stances[number].utilisation
+        query = self.queries[number]
+        for name, got in (
+            ("Clarabel", self.unique.updated(number).x[-1]),
+            ("Clarabel, SI", self.si.fresh(number).x[-1]),
+            ("QOCO", self.qoco.updated(number).x[-1]),
+            ("least utilisation", self.least.updated(number).x[-1]),
+            ("HiGHS", highs(self.plain[number]).fun),
+            ("CVXPY rebuilt", rebuilt(query)),
+            ("CVXPY with DPP", self.parametrised.solve(query)),
+            ("plan", plan(question_of(number)).utilisation or float("nan")),
+        ):
+            if not abs(got - expected) <= AGREEMENT:
+                raise AssertionError(f"{name}: utilisation {got}, not {expected}")
+
+    def two_solves(self, number: int) -> None:
+        """Least utilisation, then the tie-break."""
+        self.least.updated(number)
+        self.tie.updated(number)
+
+
+def plan_tables(rounds: int, few: int, tick: Callable[[], object]) -> list[Table]:
+    """Measure, with so many rounds, or few where they are long."""
+    rivals = Rivals([known(number) for number in range(rounds + WARM)])
+    for number in range(min(rounds, 5)):
+        rivals.check(number)
+    plans, others = _plans(rivals, rounds, tick), _others(rivals, rounds, tick)
+    plans.lines.append(_first(few, tick))
+    return [plans, others]
+
+
+def _plans(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
+    """A new stance, from request to plan, and parts of the way."""
+    # twins: the numbers that the rivals get, on holds that no cache has seen
+    count = rounds + WARM
+    requests = [request(number, twin=1) for number in range(count)]
+    questions = [question_of(number, twin=2) for number in range(count)]
+    payloads = [payload(number, twin=3) for number in range(count)]
+    extras = ("load_factor", "prices")
+    wanting = [question_of(number, twin=4, want=extras) for number in range(count)]
+
+    def sets(asked: Question) -> Hands:
+        return gather(asked, None, asked.needed_wrench())[1]
+
+    timed = race(
+        {
+            "floor": rivals.unique.updated,
+            "two": rivals.two_solves,
+            "plan": lambda k: plan(question(requests[k])),
+            "sets": lambda k: sets(questions[k]),
+            "seen": lambda k: sets(rivals.stances[k % FEW].question),
+            "again": lambda k: plan(rivals.stances[k % FEW].question),
+            "bytes": lambda k: dispatch.handle(PLAN, payloads[k]),
+            "extras": lambda k: plan(wanting[k]),
+        },
+        rounds,
+        tick,
+    )
+    return Table(
+        "A plan of four hands, each time another stance",
+        ("median", "× floor", "× two"),
+        lines(
+            timed,
+            ["floor", "two"],
+            ("raw Clarabel on the same program: update and solve (the floor)", "floor"),
+            ("raw Clarabel, least utilisation, then the tie-break (two)", "two"),
+            ("**new stance, parsed request → verified plan**", "plan"),
+            ("… of that hold → wrench spaces, four hands", "sets"),
+            ("… the same where the holds are known from before", "seen"),
+            ("… plan on holds known from before", "again"),
+            ("request bytes → reply bytes", "bytes"),
+            ("new stance with load factor and prices", "extras"),
+        ),
+    )
+
+
+def _first(rounds: int, tick: Callable[[], object]) -> Line:
+    """Stances of a shape that there was not before, each tile of each hand with other limits."""
+
+    def asked(number: int) -> Question:
+        question = question_of(number, twin=5)
+        hands = tuple(
+            replace(hand, surface=replace(hand.surface, half_planes=2 + number // 3**i % 3))
+            for i, hand in enumerate(question.stance.hands)
+        )
+        return replace(question, stance=replace(question.stance, hands=hands))
+
+    questions = [asked(number) for number in range(rounds + WARM)]
+    timed = race({"first": lambda k: plan(questions[k])}, rounds, tick)
+    return Line(
+        "first stance of a shape, for which programs are compiled",
+        (span(timed.median("first")), "", ""),
+    )
+
+
+def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
+    """Other ways from the hands' sets to the loads."""
+    # the same sets as new objects, so that nothing is known of them
+    stances = [
+        replace(each.hands, spaces=tuple(replace(space) for space in each.hands.spaces))
+        for each in rivals.stances
+    ]
+
+    def ours(number: int) -> None:
+        hands = stances[number]
+        program.unique(hands.sets(hands.at_rest(hands.idle)).data)
+
+    ways: dict[str, Way] = {
+        "floor": rivals.unique.updated,
+        "ours": ours,
+        "least": rivals.least.updated,
+        "fresh": rivals.unique.fresh,
+        "si": rivals.si.fresh,
+        "qoco": rivals.qoco.updated,
+        "highs": lambda k: highs(rivals.plain[k]),
+        "dpp": lambda k: rivals.parametrised.solve(rivals.queries[k]),
+        "rebuilt": lambda k: rebuilt(rivals.queries[k]),
+    }
+    timed = race(ways, rounds, tick)
+    return Table(
+        "The same program by other ways: from the hands' sets to the loads",
+        ("median", "× floor", "× ours"),
+        lines(
+            timed,
+            ["floor", "ours"],
+            ("raw Clarabel, update and solve (the floor)", "floor"),
+            ("**ours, compiled from CVXPY**", "ours"),
+            ("raw Clarabel, set up anew", "fresh"),
+            ("raw Clarabel, SI data and default settings, set up anew", "si"),
+            ("raw Clarabel, least utilisation alone", "least"),
+            ("QOCO, update and solve", "qoco"),
+            ("HiGHS (`scipy.optimize.linprog`), least utilisation alone", "highs"),
+            ("CVXPY with DPP, SI data and default options", "dpp"),
+            ("CVXPY, the problem rebuilt for each query", "rebuilt"),
+        ),
+        f"Utilisations agree to {AGREEMENT:.0e}.",
+    )

@@ -1,0 +1,99 @@
+"""How long set-points for a changing wrench take, what they are made of, and their declaration.
+
+``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+"""
+
+from itertools import cycle
+
+import msgspec
+import numpy as np
+import pytest
+from stances import ask, on_wall
+from test_stream_service import stream_request
+
+from planner.interpolation import Interpolation
+from planner.known_stance import KnownStance
+from planner.stream import WrenchStream
+from planner.stream_stance import StreamStance
+from service import dispatch
+from service.keys import SET_POINTS, STREAM
+from service.stream_messages import SetPointsReply, SetPointsRequest, StreamReply
+from service.streams import Streams
+
+QUESTION = ask(on_wall())
+CENTRE = QUESTION.needed_wrench()
+
+STEP = np.array([0.6, -0.3, 0.2, 0.02, 0.01, -0.03])
+WRENCHES = [CENTRE + k * STEP for k in (-8, -5, -2, 1, 4, 7)]
+"""Within the radius about the centre, so that none drifts."""
+
+
+@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
+def test_set_points(benchmark):
+    wrenches = cycle(WRENCHES)
+    with WrenchStream(QUESTION) as stream:
+        points = benchmark(lambda: stream.set_points(next(wrenches)))
+    assert (points.source, points.verified) == ("interpolated", True)
+
+
+@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
+def test_set_points_as_messages(benchmark):
+    """Without the way over zenoh."""
+    known = Streams()
+    declared = dispatch.handle(STREAM, msgspec.json.encode(stream_request()), streams=known)
+    reply = msgspec.json.decode(declared.payload, type=StreamReply)
+    centre = np.array(reply.body_wrench)
+    payloads = cycle(
+        msgspec.json.encode(
+            SetPointsRequest(v=1, stream=reply.stream, body_wrench=tuple((centre + k).tolist()))
+        )
+        for k in (-0.3, -0.1, 0.1, 0.3)
+    )
+    payloads = cycle([next(payloads) for _ in range(4)])
+    answer = benchmark(lambda: dispatch.handle(SET_POINTS, next(payloads), streams=known))
+    known.close()
+    assert msgspec.json.decode(answer.payload, type=SetPointsReply).source == "interpolated"
+
+
+@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
+def test_solved_set_points(benchmark):
+    wrenches, stance = cycle(WRENCHES), StreamStance(QUESTION)
+    assert benchmark(lambda: stance.solve(next(wrenches))).outcome.solved
+
+
+@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
+def test_whole_plan(benchmark):
+    wrenches, known = cycle(WRENCHES), KnownStance(QUESTION)
+    assert benchmark(lambda: known.plan(next(wrenches))).verified
+
+
+@pytest.mark.benchmark(group="parts of a set-point")
+def test_interpolated_loads(benchmark):
+    wrenches = cycle(WRENCHES)
+    found = Interpolation.about(StreamStance(QUESTION), CENTRE, 30.0)
+    distance, _ = benchmark(lambda: found.at(next(wrenches)))
+    assert distance < 1.0
+
+
+@pytest.mark.benchmark(group="parts of a set-point")
+def test_check_of_loads(benchmark):
+    stance = StreamStance(QUESTION)
+    loads = stance.solve(CENTRE).loads
+    wrenches, used = stance.read(loads)
+    assert benchmark(stance.check.fault, loads, wrenches, used, CENTRE) is None
+
+
+@pytest.mark.benchmark(group="before the first set-point")
+def test_declaration(benchmark):
+    def declared():
+        with WrenchStream(QUESTION) as stream:
+            return stream.interpolates
+
+    assert benchmark(declared) == 30.0
+
+
+@pytest.mark.benchmark(group="before the first set-point")
+def test_thirteen_plans_and_their_proofs(benchmark):
+    stance = StreamStance(QUESTION)
+    found = benchmark(Interpolation.about, stance, CENTRE, 30.0)
+    assert len(found.constants) == 13

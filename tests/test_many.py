@@ -1,0 +1,228 @@
+"""Many requests at once: order, errors in their places, and the command."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+from asked import HEAVY, flat_request, put, wall_request
+from test_service import ROOT, plan_request
+
+from service import dispatch
+from service.codec import decode_request
+from service.command import run
+from service.many import WORTH_A_PROCESS, Planners, plan_many, worth
+from service.replies import ErrorReply, PlanReply
+from service.requests import PlanRequest
+from service.schema import schema
+from service.workers import cores
+
+MASSES = [40.0, HEAVY, 60.0, 80.0, 100.0, 55.0]
+
+
+def asked(mass: float, name: str) -> PlanRequest:
+    return plan_request(wall_request(mass) | {"id": name})
+
+
+def mixed() -> list[PlanRequest]:
+    """Good ones, with one that cannot be, one without a plan, and one without the time for one."""
+    good = [asked(mass, f"number {i}") for i, mass in enumerate(MASSES)]
+    unknown = msgspec.structs.replace(
+        good[0], stance=msgspec.structs.replace(good[0].stance, robot="nobody")
+    )
+    free = plan_request(put(flat_request(), ("stance", "hands", 0, "grasp", "palm"), False))
+    late = msgspec.structs.replace(good[1], deadline=1e-6)
+    endless = msgspec.structs.replace(good[1], body_wrench=(math.nan,) * 6)
+    return [good[0], unknown, *good[1:3], free, late, endless, object(), *good[3:]]
+
+
+def summary(replies: list[PlanReply | ErrorReply]) -> list[str]:
+    return [
+        reply.status if isinstance(reply, PlanReply) else f"{reply.error.kind} {reply.error.field}"
+        for reply in replies
+    ]
+
+
+EXPECTED = [
+    "optimal",
+    "invalid stance.robot",
+    "overloaded",
+    "optimal",
+    "infeasible",
+    "deadline deadline",
+    "invalid body_wrench[0]",
+    "malformed None",
+    "optimal",
+    "optimal",
+    "optimal",
+]
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[Planners]:
+    with Planners(2) as planners:
+        yield planners
+
+
+def test_errors_are_in_their_places_and_replies_in_their_order():
+    seen = []
+    replies = plan_many(mixed(), workers=1, progress=lambda *now: seen.append(now))
+    assert summary(replies) == EXPECTED
+    names = [reply.id for reply in replies if isinstance(reply, PlanReply)]
+    assert names == [
+        "number 0",
+        "number 1",
+        "number 2",
+        "wall",
+        *[f"number {i}" for i in (3, 4, 5)],
+    ]
+    assert seen == [(i, len(EXPECTED)) for i in range(2, len(EXPECTED) + 1)]
+
+
+def test_each_reply_is_what_it_would_be_alone(two):
+    requests = [asked(mass, str(i)) for i, mass in enumerate(MASSES)]
+    for reply, request in zip(two.plan_many(requests), requests, strict=True):
+        alone = dispatch.plan(request)
+        assert (reply.id, reply.status, reply.verified) == (request.id, alone.status, True)
+        assert reply.utilisation == pytest.approx(alone.utilisation, rel=1e-9)
+
+
+def test_processes_answer_as_this_process_does(two):
+    seen = []
+    assert summary(two.plan_many(mixed(), lambda *now: seen.append(now))) == EXPECTED
+    assert sorted(seen) == seen
+    assert seen[-1] == (len(EXPECTED), len(EXPECTED))
+    assert two.plan_many([]) == []
+
+
+def test_a_process_that_is_killed_while_it_plans_costs_no_reply(two):
+    requests = [asked(50.0 + i, str(i)) for i in range(40)]
+    killed = []
+
+    def kill_one(done: int, total: int) -> None:
+        if not killed:
+            worker = two._workers._all[0]
+            os.kill(worker.process.pid, signal.SIGKILL)
+            killed.append(worker)
+
+    replies = two.plan_many(requests, kill_one)
+    assert killed
+    assert [reply.id for reply in replies] == [str(i) for i in range(40)]
+    assert {reply.status for reply in replies} <= {"optimal", "overloaded"}
+    assert killed[0] not in two._workers._all
+
+
+def test_few_requests_are_not_worth_processes():
+    assert worth(WORTH_A_PROCESS - 1) == 1
+    assert worth(WORTH_A_PROCESS) == cores() >= 1
+
+
+# The command --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def batch_file(tmp_path: Path):
+    def write(*lines: object) -> str:
+        path = tmp_path / "requests.jsonl"
+        texts = [line if isinstance(line, str) else json.dumps(line) for line in lines]
+        path.write_text("".join(text + "\n" for text in texts))
+        return str(path)
+
+    return write
+
+
+GOOD = wall_request() | {"id": "a"}
+OVERLOADED = wall_request(HEAVY) | {"id": "b"}
+LATE = wall_request() | {"deadline": 1e-6}
+BAD = {"v": 1}
+
+
+@pytest.mark.parametrize(
+    ("lines", "code"),
+    [
+        ([], 0),
+        ([GOOD, GOOD], 0),
+        ([GOOD, OVERLOADED], 3),
+        ([GOOD, OVERLOADED, BAD], 2),
+        ([LATE, GOOD, OVERLOADED, BAD], 1),
+    ],
+)
+def test_the_exit_status_of_a_batch_is_that_of_its_worst_request(lines, code, batch_file, capfd):
+    assert run(["batch", batch_file(*lines), "--workers", "1", "--json"]) == code
+    out, err = capfd.readouterr()
+    assert len(out.splitlines()) == len(lines)
+    assert err.count("\n") == (BAD in lines)
+
+
+def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
+    path = batch_file(GOOD, "{", "", BAD, OVERLOADED)
+    assert run(["batch", path, "--workers", "1", "--json"]) == 2
+    out, err = capfd.readouterr()
+    replies = [json.loads(line) for line in out.splitlines()]
+    assert [reply.get("status", reply.get("error", {}).get("kind")) for reply in replies] == [
+        "optimal",
+        "malformed",
+        "malformed",
+        "invalid",
+        "overloaded",
+    ]
+    assert [replies[0]["id"], replies[4]["id"]] == ["a", "b"]
+    assert err == ("crux: line 2: not json: Input data was truncated; 2 more lines are bad input\n")
+    alone = dispatch.plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
+    assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
+
+
+def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd):
+    kept = tmp_path / "replies.jsonl"
+    path = batch_file(GOOD, OVERLOADED, GOOD, LATE)
+    assert run(["batch", path, "-o", str(kept), "--workers", "1", "--json"]) == 1
+    told = json.loads(capfd.readouterr().out)
+    assert len(kept.read_text().splitlines()) == told["requests"] == 4
+    assert (told["optimal"], told["overloaded"], told["infeasible"], told["failed"]) == (2, 1, 0, 0)
+    assert told["errors"] == {"deadline": 1}
+    assert 0.0 < told["time"]["median"] <= told["time"]["longest"] <= told["time"]["elapsed"]
+    assert run(["batch", path, "-o", str(kept), "--workers", "1"]) == 1
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert max(len(line) for line in out.splitlines() if "replies:" not in line) <= 80
+    cells = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.strip()}
+    assert cells["optimal"][0] == "2"
+    assert cells["infeasible"] == ["0", "-", "-"]
+    assert cells["error:"] == ["deadline", "1", "-", "-"]
+
+
+def test_a_batch_from_standard_input_goes_through_processes_of_its_own():
+    lines = b"".join(msgspec.json.encode(wall_request() | {"id": str(i)}) + b"\n" for i in range(5))
+    found = subprocess.run(
+        [sys.executable, "-m", "service.command", "batch", "-", "--workers", "2", "--json"],
+        input=lines,
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        timeout=120,
+        check=False,
+    )
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert [json.loads(line)["id"] for line in found.stdout.splitlines()] == list("01234")
+
+
+@pytest.mark.parametrize("more", [["nowhere.jsonl"], ["FILE", "-o", "no/such/folder/file"]])
+def test_files_that_cannot_be_read_or_written_are_bad_input(more, batch_file, capfd):
+    path = batch_file(GOOD)
+    assert run(["batch", *(path if part == "FILE" else part for part in more)]) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith("crux: ")
+    assert err.count("\n") == 1
+
+
+def test_what_a_deadline_leaves_unfinished_is_in_the_schema():
+    assert "unfinished" in schema()["$defs"]["PlanReply"]["properties"]

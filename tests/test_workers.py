@@ -1,0 +1,89 @@
+"""Processes that are kept open: they die under their work, and nothing else is lost."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections import Counter
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+import workshop
+
+from service.workers import THREADS, Lost, Workers
+
+
+def logged(log: Path) -> Counter[int]:
+    return Counter(int(line.split()[0]) for line in log.read_text().splitlines())
+
+
+def done(workers: Workers, items: list) -> dict:
+    found = dict(workers.each(items))
+    assert sorted(found) == list(range(len(items)))
+    return found
+
+
+@pytest.fixture(scope="module")
+def nappers() -> Iterator[Workers]:
+    with Workers(workshop.naps, 2) as workers:
+        yield workers
+
+
+def test_what_kills_its_process_is_tried_twice_and_costs_nothing_else(tmp_path):
+    log = tmp_path / "log"
+    with Workers(partial(workshop.squares, str(log)), 2) as workers:
+        for _ in range(2):
+            # nothing stays behind from one time to the next
+            found = done(workers, list(range(100, 150)))
+            assert [found[i] for i in range(50)] == [i * i for i in range(100, 150)]
+        assert done(workers, []) == {}
+        assert len({line.split()[1] for line in log.read_text().splitlines()}) <= 2
+        found = done(workers, list(range(20)))
+        again = done(workers, [2, 3])
+    lost = {i for i, result in found.items() if isinstance(result, Lost)}
+    assert lost == {13}
+    assert found[13].reason == "its process died, twice"
+    assert all(found[i] == i * i for i in found if i not in lost)
+    # what dies once by chance is done again
+    assert (logged(log)[13], logged(log)[7]) == (2, 2)
+    assert again == {0: 4, 1: 9}
+    alive = {process.pid for process in multiprocessing.active_children()}
+    assert not alive & {int(line.split()[1]) for line in log.read_text().splitlines()}
+
+
+def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
+    found, killed = {}, None
+    for i, result in nappers.each([0.02] * 30):
+        found[i] = result
+        if killed is None:
+            killed = result
+            os.kill(killed, 9)
+    assert sorted(found) == list(range(30))
+    assert not any(isinstance(result, Lost) for result in found.values())
+    # one that has nothing to do is replaced, too
+    (first,) = done(nappers, [0.0]).values()
+    os.kill(first, 9)
+    assert first not in done(nappers, [0.0] * 4).values()
+
+
+def test_who_stops_listening_leaves_no_work_behind(nappers):
+    for _ in nappers.each([0.0, *[60.0] * 5]):
+        break
+    assert len(done(nappers, [0.0, 0.0])) == 2
+
+
+def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
+    with Workers(workshop.nothing, 2) as workers:
+        found = done(workers, list(range(20)))
+    assert {result.reason for result in found.values()} == {"processes do not start"}
+
+
+def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
+    monkeypatch.setenv(THREADS[0], "7")
+    monkeypatch.delenv(THREADS[1], raising=False)
+    with Workers(workshop.threads, 1) as workers:
+        assert set(done(workers, list(THREADS)).values()) == {"1"}
+    assert os.environ[THREADS[0]] == "7"
+    assert THREADS[1] not in os.environ

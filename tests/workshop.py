@@ -1,0 +1,45 @@
+"""Work for processes, some of which kills them; apart, so that these import nothing else."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def squares(log: str) -> Callable[[int], int]:
+    """Squares numbers; 13 kills its process always, 7 the first time; all are logged."""
+
+    def square(number: int) -> int:
+        with Path(log).open("a") as stream:
+            stream.write(f"{number} {os.getpid()}\n")
+        first = Path(log).read_text().split("\n").count(f"{number} {os.getpid()}") == 1
+        seen = sum(line.startswith(f"{number} ") for line in Path(log).read_text().splitlines())
+        if number == 13 or (number == 7 and seen == 1 and first):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number * number
+
+    return square
+
+
+def nothing() -> Callable[[int], int]:
+    """Dies before it can do anything."""
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+def naps() -> Callable[[float], int]:
+    """Sleeps as long as it is told [s], and says in which process."""
+
+    def nap(seconds: float) -> int:
+        time.sleep(seconds)
+        return os.getpid()
+
+    return nap
+
+
+def threads() -> Callable[[str], str | None]:
+    """Looks up what its environment says."""
+    return os.environ.get
