@@ -36,7 +36,7 @@ def cut_of(shape: Swept, plane: Plane) -> Cut | None:
     g11, g12, g22 = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
     b1, b2 = a * x + b * y + c * z, d * x + e * y + f * z
     determinant = g11 * g22 - g12 * g12
-    if determinant <= SKEW * g11 * g22:
+    if determinant <= SKEW * (0.5 * (g11 + g22)) ** 2:
         return None
     centre = complex(g12 * b2 - g22 * b1, g12 * b1 - g11 * b2) / determinant
     square = shape.radius**2 - (x * x + y * y + z * z) - b1 * centre.real - b2 * centre.imag

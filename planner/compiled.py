@@ -289,12 +289,25 @@ class _Solver:
 
     def solve(self) -> Solution:
         """Solve with the values taken last."""
-        timed = deadline.left() is not None
-        if timed:
-            self._solver.set_termination_callback(lambda _: deadline.expired())
-        raw = self._solver.solve()
-        if timed:
+        if deadline.left() is None:
+            return self._read(self._solver.solve())
+        caught: list[BaseException] = []
+
+        def over(_: object) -> bool:
+            # the solver would print what is raised here, and go on
+            try:
+                return deadline.expired()
+            except BaseException as error:
+                caught.append(error)
+                return True
+
+        self._solver.set_termination_callback(over)
+        try:
+            raw = self._solver.solve()
+        finally:
             self._solver.unset_termination_callback()
+        if caught:
+            raise caught[0]
         return self._read(raw)
 
     def data(self) -> tuple[Any, Array, Any, Array]:

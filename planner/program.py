@@ -30,6 +30,7 @@ only, is compiled once and solved with new data after (`planner.compiled`).
 from __future__ import annotations
 
 import math
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -74,6 +75,9 @@ SLACK: Final = 1e-6
 TIE: Final = 8e-6
 """Weight of the mean square of relative tensions beside the utilisation."""
 
+SHARP_SLACK: Final = 1e-9
+"""The same where the least utilisation has all its digits."""
+
 SETTINGS: Final[dict[str, Any]] = {
     "equilibrate_enable": False,
     "iterative_refinement_enable": False,
@@ -97,7 +101,7 @@ CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
 
 SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
-BUILDER: Final = ThreadPoolExecutor(1, "program-builder")
+_builders = [ThreadPoolExecutor(1, "program-builder")]
 """The one thread that builds programs: CVXPY counts its variables for all threads, and loses count
 where two build at a time. Who cannot wait for it goes on without."""
 
@@ -439,9 +443,19 @@ class Nearest(_Program):
         return self.run(data)[0]
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=128)
 def _built(kind: type[_Program], shape: Shape, *further: int) -> Future[_Program]:
-    return BUILDER.submit(kind, shape, *further)
+    return _builders[0].submit(kind, shape, *further)
+
+
+def _after_fork() -> None:
+    """Begin anew in a forked process: threads, and what they held, did not come along."""
+    _builders[0] = ThreadPoolExecutor(1, "program-builder")
+    _built.cache_clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def _ask(kind: Any, data: StanceData, *question: Any, further: Sequence[int] = ()) -> Outcome:
@@ -469,6 +483,16 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
 def tie_break(data: StanceData, cap: float) -> Outcome:
     """Solve `TieBreak`, built once for each shape."""
     return _ask(TieBreak, data, cap)
+
+
+def least_tensions(data: StanceData, utilisation: float) -> Outcome:
+    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
+    outcome = LATE
+    for slack in (SHARP_SLACK, SLACK):
+        outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
+        if outcome.solved or deadline.expired():
+            break
+    return outcome
 
 
 def effort(data: StanceData, cap: float) -> Outcome:

@@ -60,9 +60,6 @@ __all__ = ["Ground", "ground_of", "plan", "plan_on"]
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
 
-SHARP: Final = 1e-9
-"""What the tie-break may give away of a utilisation that has all its digits."""
-
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
@@ -238,7 +235,7 @@ class _Answer:
             if used - self.bound <= OPTIMAL * max(1.0, used):
                 exact = polished(self.data, self.outcome)
                 if exact is None:
-                    self._settle_tie(SHARP)
+                    self._settle_tie()
                 else:
                     self._take(exact.loads)
                 if not self.wrong:
@@ -253,14 +250,13 @@ class _Answer:
     def _settle_in_two(self) -> None:
         """Take the plan of least effort among those of the very least utilisation."""
         self.outcome, self.bound = program.margin(self.data), None
-        self._settle_tie(SLACK)
+        self._settle_tie()
 
-    def _settle_tie(self, slack: float) -> None:
-        """Take the plan of least tensions among those of least utilisation, or so little more."""
+    def _settle_tie(self) -> None:
+        """Take the plan of least tensions among those of least utilisation."""
         if not self.outcome.solved:
             return
-        cap = self.outcome.value + slack * max(1.0, abs(self.outcome.value))
-        tidy = program.tie_break(self.data, cap)
+        tidy = program.least_tensions(self.data, self.outcome.value)
         if tidy.solved:
             self._take(tidy.loads)
         else:

@@ -78,6 +78,7 @@ class WrenchStream:
         self._lock = threading.Lock()
         self._proofs: list[Proof] = []
         self._last: SetPoints | None = None
+        self._closed = False
         self._key = b""
         """The wrench of the last set-points."""
 
@@ -115,8 +116,9 @@ class WrenchStream:
         self.close()
 
     def close(self) -> None:
-        """End the thread. Set-points are still given, but no new interpolations are solved."""
+        """End the thread, and give no more set-points."""
         with self._lock:
+            self._closed = True
             thread = self._following.close()
         if thread is not None:
             thread.shutdown(wait=True, cancel_futures=True)
@@ -144,12 +146,14 @@ class WrenchStream:
         Raises
         ------
         InvalidInputError
-            If it is not six finite numbers, or absurdly large.
+            If it is not six finite numbers, or absurdly large, or if the stream is closed.
         """
         # a copy: callers may well fill their own array again
         wrench = moderate(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench").copy()
         key = wrench.tobytes()
         with self._lock:
+            if self._closed:
+                raise InvalidInputError("is closed; open another", field="stream")
             if self._last is not None:
                 if self._last.verified and self._key == key:
                     return self._last

@@ -21,7 +21,8 @@ from planner.cuts import Cut, cut
 from planner.known_stance import KnownStance
 from planner.loads_check import LoadsCheck
 from planner.plan import Plan
-from planner.program import SLACK, Outcome
+from planner.polish import polished
+from planner.program import Outcome
 from planner.question import Question
 from planner.solve import OPTIMAL
 from planner.stance_data import WRENCH_UNIT
@@ -136,14 +137,16 @@ class StreamStance:
         if outcome.solved:
             bound = dual_bounds.unique_bound(data, outcome)
             if outcome.value - bound <= OPTIMAL * max(1.0, outcome.value):
-                return Solved(self._stacked(outcome.loads), outcome, bound)
+                tidy = polished(data, outcome) or program.least_tensions(data, outcome.value)
+                loads = tidy.loads if tidy.solved else outcome.loads
+                return Solved(self._stacked(loads), outcome, bound)
         outcome = program.margin(data)
         if not outcome.solved:
             return None
         bound = dual_bounds.least_bound(data, outcome)
         if outcome.value - bound > OPTIMAL * max(1.0, outcome.value):
             return None
-        tidy = program.tie_break(data, outcome.value + SLACK * max(1.0, abs(outcome.value)))
+        tidy = program.least_tensions(data, outcome.value)
         loads = tidy.loads if tidy.solved else outcome.loads
         return Solved(self._stacked(loads), outcome, bound)
 

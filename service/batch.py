@@ -73,20 +73,20 @@ def batch(
 ) -> int:
     """Answer many plan requests: one a line in, one reply or error a line out, in order.
 
-    REQUESTS is the path of a file of JSON lines, or - for standard input. Lines are as the service
-    takes them: meshes travel whole, extras are those that a request wants itself, and the numbers
-    of --hand are those that it leaves open. With --json the replies are written on standard output,
-    or with -o a summary is.
+    REQUESTS is the path of a file of JSON lines, or - for standard input; blank lines are skipped.
+    Lines are as the service takes them: meshes travel whole, extras are those that a request wants
+    itself, and the numbers of --hand are those that it leaves open. With --json the replies are
+    written on standard output, or with -o a summary is.
 
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    lines = _lines(requests)
+    numbers, lines = _lines(requests)
     told: list[_Told] = []
     begun = perf_counter()
     with (
         _written(file, as_json) as out,
-        Planners(worth(len(lines)) if workers is None else workers, robot=robot, hand=hand) as many,
+        Planners(worth(len(lines), workers), robot=robot, hand=hand) as many,
         progress(f"planning {requests}") as tell,
     ):
         for answer in _in_order(many.answers(lines)):
@@ -95,7 +95,7 @@ def batch(
             told.append(msgspec.json.decode(answer.payload, type=_Told))
             tell(len(told), len(lines))
     elapsed = perf_counter() - begun
-    _complain(told)
+    _complain(numbers, told)
     if not as_json:
         _print(told, elapsed, file)
     elif file is not None:
@@ -103,14 +103,14 @@ def batch(
     return min((one.exit_status for one in told), key=WORST_FIRST.index, default=DONE)
 
 
-def _lines(source: str) -> list[bytes]:
-    """Return the lines of a file, or of standard input."""
+def _lines(source: str) -> tuple[list[int], list[bytes]]:
+    """Return the lines of a file, or of standard input, that are not blank, and their numbers."""
     try:
         data = sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes()
     except OSError as error:
         raise InvalidInputError(f"{error.strerror}: {source}", field="REQUESTS") from None
-    lines = data.split(b"\n")
-    return lines if lines[-1].strip() else lines[:-1]
+    kept = [(i, line) for i, line in enumerate(data.split(b"\n"), start=1) if line.strip()]
+    return [i for i, _ in kept], [line for _, line in kept]
 
 
 @contextlib.contextmanager
@@ -137,11 +137,11 @@ def _in_order(answers: Iterator[tuple[int, Answered]]) -> Iterator[Answered]:
             following += 1
 
 
-def _complain(told: Sequence[_Told]) -> None:
+def _complain(numbers: Sequence[int], told: Sequence[_Told]) -> None:
     """Name the first line that is bad input, and how many more are."""
     bad = [
         (number, one.error)
-        for number, one in enumerate(told, start=1)
+        for number, one in zip(numbers, told, strict=True)
         if one.error is not None and one.exit_status == BAD_INPUT
     ]
     if bad:

@@ -67,7 +67,7 @@ def check(value: object, path: str = "") -> None:
                 check(part, field)
     elif isinstance(value, Mapping):
         for name, part in value.items():
-            check(part, f"{path}.{name}")
+            check(part, f"{path}.{name}" if path else str(name))
     elif isinstance(value, (list, tuple)):
         for i, part in enumerate(value):
             check(part, f"{path}[{i}]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from enum import Enum
 from typing import Any, Final, TypeVar
 
@@ -12,8 +13,9 @@ from service.blame import blame, leaves_open
 from service.checks import check
 from service.errors import MalformedError
 from service.replies import ErrorDetail, ErrorReply
+from service.requests import Identifier
 
-__all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error"]
+__all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error", "identifier"]
 
 T = TypeVar("T")
 
@@ -97,6 +99,10 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
     try:
         request = form.decode(payload, kind)
     except msgspec.ValidationError as error:
+        if form is Format.MSGPACK and "Expected `float`" in str(error):
+            # no bound is kept by what is not a number
+            with suppress(RecursionError):
+                check(_plain(payload, form))
         document = _plain(payload, form) if leaves_open(error) else None
         field, message = blame(
             error, kind, document, lambda part: form.decode(form.encode(part), kind)
@@ -117,7 +123,23 @@ def _plain(payload: bytes, form: Format) -> Any:
         return None
 
 
-def encode_error(kind: str, error: CruxError, form: Format) -> tuple[bytes, str]:
-    """Return an error reply's bytes and encoding."""
-    reply = ErrorReply(error=ErrorDetail(kind, error.field, error.message))
+class _Named(msgspec.Struct):
+    id: Identifier | None = None
+
+
+def identifier(payload: bytes, form: Format) -> str | None:
+    """Return a request's ``id``, whatever else is wrong with it; None where it cannot be read."""
+    if len(payload) > LARGEST_REQUEST:
+        return None
+    try:
+        return form.decode(payload, _Named).id
+    except (MalformedError, msgspec.ValidationError):
+        return None
+
+
+def encode_error(
+    kind: str, error: CruxError, form: Format, name: str | None = None
+) -> tuple[bytes, str]:
+    """Return an error reply's bytes and encoding; ``name`` is the request's ``id``."""
+    reply = ErrorReply(id=name, error=ErrorDetail(kind, error.field, error.message))
     return form.encode(reply), form.label(reply)

@@ -21,7 +21,7 @@ from planner.plan import Plan
 from planner.question import Question
 from service.answers import plan_reply, wrench_space_reply
 from service.body_space import explore
-from service.codec import Format, decode_request, encode_error
+from service.codec import Format, decode_request, encode_error, identifier
 from service.errors import REQUEST_KINDS
 from service.keys import BODY_SPACE, PLAN, SET_POINTS, STREAM, WRENCH_SPACE
 from service.own_hand import over_default
@@ -239,13 +239,13 @@ def handle(
         return Answer(form.encode(reply), form.label(reply), True)
     except InvalidInputError as error:
         kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        return Answer(*encode_error(kind, error, form), False)
+        return Answer(*encode_error(kind, error, form, identifier(payload, form)), False)
     except DeadlineError as error:
-        return Answer(*encode_error(error.kind, error, form), False)
+        return Answer(*encode_error(error.kind, error, form, identifier(payload, form)), False)
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        return Answer(*encode_error("internal", excuse, form), False)
+        return Answer(*encode_error("internal", excuse, form, identifier(payload, form)), False)
 
 
 @contextmanager

@@ -7,15 +7,16 @@ answer it.
 from __future__ import annotations
 
 import gc
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
-from hand_models.errors import CruxError
+from hand_models.errors import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
-from service.codec import Format, encode_error
+from service.codec import Format, encode_error, identifier
 from service.errors import LostError, MalformedError
 from service.keys import PLAN
 from service.replies import ErrorReply, PlanReply
@@ -44,11 +45,17 @@ class Planners:
     Parameters
     ----------
     workers : int, optional
-        Processes; as many as there are cores by default. One is this process itself.
+        Processes; as many as there are cores by default. One of them is this process itself, which
+        plans alone until the others have started.
     robot : RobotFile, optional
         The only robot that is planned for; those that are bundled by default.
     hand : ParameterTable, optional
         Entries in which hands are not the bundled one; a request's own go on top.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1, or after the end, when it is asked to plan.
     """
 
     def __init__(
@@ -58,13 +65,15 @@ class Planners:
         robot: RobotFile | None = None,
         hand: ParameterTable | None = None,
     ) -> None:
-        count = cores() if workers is None else max(1, workers)
+        count = cores() if workers is None else _whole(workers)
         self._make = partial(_answering, robot, hand)
+        self._closed = False
         self._workers: Workers[tuple[bytes, Format], Answered] | None = None
         if count > 1:
-            self._workers = Workers(self._make, count)
+            self._workers = Workers(self._make, count - 1)
 
     def __enter__(self) -> Self:
+        self._closed = False
         if self._workers is not None:
             self._workers.__enter__()
         return self
@@ -75,6 +84,7 @@ class Planners:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._closed = True
         if self._workers is not None:
             self._workers.__exit__(kind, error, traceback)
 
@@ -92,7 +102,9 @@ class Planners:
                 payloads.append(form.encode(request))
                 good.append(i)
             except (TypeError, ValueError, OverflowError, RecursionError) as error:
-                found[i] = _refused(MalformedError(f"no request: {error}"), form)
+                name = getattr(request, "id", None)
+                known = name if isinstance(name, str) else None
+                found[i] = _refused(MalformedError(f"no request: {error}"), form, known)
         for k, answer in self.answers(payloads, form):
             found[good[k]] = answer
             if progress is not None:
@@ -104,12 +116,18 @@ class Planners:
         self, payloads: Sequence[bytes], form: Format = Format.JSON
     ) -> Iterator[tuple[int, Answered]]:
         """Yield each encoded request's index and encoded answer, as they are done."""
+        if self._closed:
+            raise InvalidInputError("is closed; enter another, or this one again", field="planners")
+        answer = self._make()
         if self._workers is None:
-            answer = self._make()
             yield from ((i, answer((payload, form))) for i, payload in enumerate(payloads))
             return
-        for i, found in self._workers.each([(payload, form) for payload in payloads]):
-            yield i, _refused(LostError(found.reason), form) if isinstance(found, Lost) else found
+        for i, found in self._workers.each([(payload, form) for payload in payloads], answer):
+            if isinstance(found, Lost):
+                name = identifier(payloads[i], form)
+                yield i, _refused(LostError(found.reason), form, name)
+            else:
+                yield i, found
 
 
 def plan_many(
@@ -134,14 +152,40 @@ def plan_many(
     -------
     list of PlanReply or ErrorReply
         In the order of the requests. Nothing that is wrong with one of them is raised.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1.
     """
-    with Planners(worth(len(requests)) if workers is None else workers) as planners:
+    with Planners(worth(len(requests), workers)) as planners:
         return planners.plan_many(requests, progress)
 
 
-def worth(count: int) -> int:
-    """Return how many processes so many requests are worth."""
+def worth(count: int, workers: int | None = None) -> int:
+    """Return how many processes so many requests are worth: no more than are wanted.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1.
+    """
+    if workers is not None:
+        return min(_whole(workers), max(1, count))
     return cores() if count >= WORTH_A_PROCESS else 1
+
+
+def _whole(workers: object) -> int:
+    """Return a number of processes, checked."""
+    try:
+        count = 0 if isinstance(workers, bool) else operator.index(workers)  # type: ignore[arg-type]
+    except TypeError:
+        count = 0
+    if count < 1:
+        raise InvalidInputError(
+            f"must be a whole number of at least 1, got {workers!r}", field="workers"
+        )
+    return count
 
 
 def _answering(
@@ -173,8 +217,8 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _refused(error: CruxError, form: Format) -> Answered:
-    payload, _ = encode_error(error.kind, error, form)
+def _refused(error: CruxError, form: Format, name: str | None) -> Answered:
+    payload, _ = encode_error(error.kind, error, form, name)
     return Answered(payload, False)
 
 

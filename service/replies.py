@@ -65,8 +65,12 @@ class ErrorDetail(Struct):
 
 
 class ErrorReply(Reply, kw_only=True):
-    """A request that could not be understood, or a service that failed on it."""
+    """A request that could not be understood, or a service that failed on it.
 
+    ``id``: the request's, where it could be read.
+    """
+
+    id: str | None = None
     error: ErrorDetail
 
 

@@ -6,6 +6,7 @@ tried once more, alone: whatever kills its process then is lost, and nothing els
 
 from __future__ import annotations
 
+import logging
 import math
 import multiprocessing
 import os
@@ -19,6 +20,8 @@ from types import TracebackType
 from typing import Final, Generic, Self, TypeVar
 
 __all__ = ["Lost", "Workers", "cores"]
+
+log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -37,6 +40,10 @@ PATIENCE: Final = 1.0
 
 STARTS: Final = 2
 """Processes in a row that may die before they are ready; after that no more are started."""
+
+NO_START: Final = (
+    "processes do not start; a program that starts them needs its 'if __name__ == \"__main__\":'"
+)
 
 THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What keeps a library of linear algebra to one thread, before it is loaded."""
@@ -97,22 +104,42 @@ class Workers(Generic[T, R]):
             worker.end(until)
         self._all.clear()
 
-    def each(self, items: Sequence[T]) -> Iterator[tuple[int, R | Lost]]:
-        """Yield each item's index and result, as they are done."""
+    def each(
+        self, items: Sequence[T], here: Callable[[T], R] | None = None
+    ) -> Iterator[tuple[int, R | Lost]]:
+        """Yield each item's index and result, as they are done.
+
+        Parameters
+        ----------
+        items : sequence
+        here : callable, optional
+            What this process turns items into results with meanwhile, so that nothing waits for
+            processes to start; it does not try what has cost a process. By default it does none.
+        """
         size = max(1, min(CHUNK, math.ceil(len(items) / (self._count * ROUNDS))))
         todo = deque(range(i, min(i + size, len(items))) for i in range(0, len(items), size))
         tried: set[int] = set()
+        again: deque[range] = deque()
         try:
-            while todo or any(worker.hand for worker in self._all):
+            while todo or again or any(worker.hand for worker in self._all):
                 self._hire()
-                if not self._all:
-                    for i in (i for chunk in todo for i in chunk):
-                        yield i, Lost("processes do not start")
+                if not self._all and (here is None or not todo):
+                    for i in (i for chunk in (*todo, *again) for i in chunk):
+                        yield i, Lost(NO_START)
                     return
                 for worker in self._all:
-                    if worker.idle and todo:
-                        worker.give([(i, items[i]) for i in todo.popleft()])
-                for pipe in wait([worker.pipe for worker in self._all]):
+                    if worker.idle and (todo or again):
+                        worker.give([(i, items[i]) for i in (todo or again).popleft()])
+                if here is not None and todo:
+                    first, *rest = todo.popleft()
+                    if rest:
+                        todo.appendleft(range(rest[0], rest[-1] + 1))
+                    yield first, here(items[first])
+                if not self._all:
+                    continue
+                owed = bool(again) or any(worker.hand for worker in self._all)
+                block = owed and not todo if here is not None else True
+                for pipe in wait([worker.pipe for worker in self._all], None if block else 0.0):
                     worker = next(each for each in self._all if each.pipe is pipe)
                     done = worker.take()
                     if done is not None:
@@ -125,7 +152,7 @@ class Workers(Generic[T, R]):
                             yield i, Lost("its process died, twice")
                         else:
                             tried.add(i)
-                            todo.append(range(i, i + 1))
+                            again.append(range(i, i + 1))
         finally:
             # what nobody waits for any more
             for worker in [worker for worker in self._all if worker.hand]:
@@ -138,6 +165,8 @@ class Workers(Generic[T, R]):
     def _dismiss(self, worker: _Worker[T, R]) -> None:
         self._all.remove(worker)
         self._stillborn += not worker.ready
+        if self._stillborn == STARTS and not worker.ready:
+            log.warning(NO_START)
         worker.pipe.close()
         worker.process.kill()
         worker.process.join()
@@ -180,8 +209,9 @@ class _Worker(Generic[T, R]):
         return done
 
     def end(self, until: float) -> None:
-        """Let the process come to its end, and kill it if it is not there in time."""
-        self.process.join(max(0.0, until - time.monotonic()))
+        """Let the process come to its end, and kill it if it is not there in time or not ready."""
+        if self.ready:
+            self.process.join(max(0.0, until - time.monotonic()))
         if self.process.is_alive():
             self.process.kill()
             self.process.join()
@@ -192,8 +222,8 @@ def _work(pipe: Connection, make: Callable[[], Callable[[T], R]]) -> None:
     # Ctrl-C is the caller's to answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     turn = make()
-    pipe.send([])
     with suppress(EOFError, OSError):
+        pipe.send([])
         while True:
             done: list[tuple[int, R]] = []
             flushed = time.monotonic()

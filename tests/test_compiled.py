@@ -1,8 +1,12 @@
 """Compiled programs: CVXPY's own data to the last bit, whatever came before, from every thread."""
 
+import os
+import subprocess
+import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
+from pathlib import Path
 
 import cvxpy as cp
 import numpy as np
@@ -266,3 +270,43 @@ def test_compiling_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         program.Unique(SHAPES[1])
+
+
+def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
+    built = program.Unique(data.shape)
+    honest = built.solve(data)
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with deadline.within(60.0), monkeypatch.context() as patch:
+        patch.setattr(deadline, "expired", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            built.solve(data)
+    assert built.solve(data).value == honest.value
+
+
+FORKED = """
+import os
+from stances import PLACES, ask, on_wall
+from planner.solve import plan
+plan(ask(on_wall()))
+child = os.fork()
+if not child:
+    os._exit(0 if plan(ask(on_wall(limbs=tuple(PLACES)[:3]))).verified else 1)
+_, status = os.waitpid(child, 0)
+raise SystemExit(os.waitstatus_to_exitcode(status))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_builds_programs_of_its_own():
+    here = Path(__file__).parent
+    path = os.pathsep.join([str(here), str(here.parent)])
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORKED],
+        env={**os.environ, "PYTHONPATH": path},
+        timeout=120,
+        check=False,
+    )
+    assert ended.returncode == 0

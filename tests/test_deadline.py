@@ -402,7 +402,7 @@ def test_a_search_that_is_cut_short_after_its_first_plan_gives_that_plan(monkeyp
 
 def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question():
     gate = threading.Event()
-    program.BUILDER.submit(gate.wait, 60.0)
+    program._builders[0].submit(gate.wait, 60.0)
     program._built.cache_clear()
     try:
         with pytest.raises(DeadlineError, match="a plan was found"):

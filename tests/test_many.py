@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 from asked import HEAVY, flat_request, put, wall_request
 from test_service import ROOT, plan_request
 
+from hand_models.errors import InvalidInputError
 from service import dispatch
 from service.codec import decode_request
 from service.command import run
@@ -23,7 +25,7 @@ from service.many import WORTH_A_PROCESS, Planners, plan_many, worth
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.schema import schema
-from service.workers import cores
+from service.workers import Lost, cores
 
 MASSES = [40.0, HEAVY, 60.0, 80.0, 100.0, 55.0]
 
@@ -123,6 +125,81 @@ def test_a_process_that_is_killed_while_it_plans_costs_no_reply(two):
 def test_few_requests_are_not_worth_processes():
     assert worth(WORTH_A_PROCESS - 1) == 1
     assert worth(WORTH_A_PROCESS) == cores() >= 1
+    assert [worth(count, 3) for count in (0, 1, 2, 4)] == [1, 1, 2, 3]
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2", True])
+def test_workers_are_a_whole_number(workers):
+    for asked_for in (lambda: Planners(workers), lambda: plan_many([], workers=workers)):
+        with pytest.raises(InvalidInputError, match="whole number of at least 1") as caught:
+            asked_for()
+        assert caught.value.field == "workers"
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_is_closed_plans_no_more(workers):
+    with Planners(workers) as planners:
+        pass
+    before = multiprocessing.active_children()
+    with pytest.raises(InvalidInputError, match="closed"):
+        planners.plan_many([asked(50.0, "a")])
+    assert multiprocessing.active_children() == before
+
+
+def test_errors_carry_the_identifier_where_it_can_be_read(monkeypatch):
+    named = [reply.id for reply in plan_many(mixed(), workers=1) if isinstance(reply, ErrorReply)]
+    assert named == ["number 0", "number 1", "number 1", None]
+    with Planners(2) as planners:
+        monkeypatch.setattr(
+            planners._workers, "each", lambda items, here: iter([(0, Lost("a reason"))])
+        )
+        (reply,) = planners.plan_many([asked(50.0, "a")])
+    assert (reply.error.kind, reply.error.message, reply.id) == ("lost", "a reason", "a")
+
+
+SCRIPT = """
+import sys
+from asked import wall_request
+from test_service import plan_request
+from service.many import Planners, plan_many
+{guard}
+{body}
+"""
+
+
+def script(tmp_path: Path, body: str, guard: str = "") -> subprocess.CompletedProcess[str]:
+    path = tmp_path / "script.py"
+    path.write_text(SCRIPT.format(guard=guard, body=body))
+    return subprocess.run(
+        [sys.executable, str(path)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}"},
+        timeout=120,
+        check=False,
+    )
+
+
+def test_processes_that_come_too_late_are_not_heard_of(tmp_path):
+    body = """
+    with Planners(3) as planners:
+        print(planners.plan_many([plan_request(wall_request())])[0].status)
+    print(plan_many([plan_request(wall_request())], workers=3)[0].status)
+"""
+    found = script(tmp_path, body, 'if __name__ == "__main__":')
+    assert (found.returncode, found.stdout, found.stderr) == (0, "optimal\n" * 2, "")
+
+
+def test_a_program_without_its_guard_is_told_so_and_answered(tmp_path):
+    body = """
+with Planners(3) as planners:
+    while planners._workers._stillborn < 2:
+        reply = planners.plan_many([plan_request(wall_request())] * 20)[-1]
+    print(reply.status)
+"""
+    found = script(tmp_path, body)
+    assert (found.returncode, found.stdout) == (0, "optimal\n")
+    assert found.stderr.count("a program that starts them needs its 'if __name__") == 1
 
 
 # The command --------------------------------------------------------------------------------------
@@ -163,19 +240,18 @@ def test_the_exit_status_of_a_batch_is_that_of_its_worst_request(lines, code, ba
 
 
 def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
-    path = batch_file(GOOD, "{", "", BAD, OVERLOADED)
+    path = batch_file(GOOD, "", "{", " ", BAD | {"id": "c"}, OVERLOADED)
     assert run(["batch", path, "--workers", "1", "--json"]) == 2
     out, err = capfd.readouterr()
     replies = [json.loads(line) for line in out.splitlines()]
     assert [reply.get("status", reply.get("error", {}).get("kind")) for reply in replies] == [
         "optimal",
         "malformed",
-        "malformed",
         "invalid",
         "overloaded",
     ]
-    assert [replies[0]["id"], replies[4]["id"]] == ["a", "b"]
-    assert err == ("crux: line 2: not json: Input data was truncated; 2 more lines are bad input\n")
+    assert [reply["id"] for reply in replies] == ["a", None, "c", "b"]
+    assert err == ("crux: line 3: not json: Input data was truncated; 1 more lines are bad input\n")
     alone = dispatch.plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
     assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
 

@@ -349,7 +349,7 @@ def test_several_threads_may_ask(stream):
     assert wrong == []
 
 
-def test_closing_ends_the_thread_and_nothing_else():
+def test_closing_ends_the_thread_and_the_stream():
     def running() -> int:
         return sum("crux-stream" in thread.name for thread in threading.enumerate())
 
@@ -359,8 +359,9 @@ def test_closing_ends_the_thread_and_nothing_else():
         assert running() == before + 1
     assert running() == before
     stream.close()
-    assert stream.set_points(WEIGHT + 500.0 * PER_RADIUS / 6.0).verified
-    assert stream.wait(0.0)
+    with pytest.raises(InvalidInputError, match="closed") as caught:
+        stream.set_points(WEIGHT)
+    assert caught.value.field == "stream"
 
 
 # What is refused ----------------------------------------------------------------------------------

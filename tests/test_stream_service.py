@@ -257,6 +257,16 @@ def test_a_question_that_is_wrong_is_told_the_field(request_, field, known) -> N
     assert told["error"]["field"] == field
 
 
+def test_what_is_not_a_number_is_told_as_such(known) -> None:
+    request = {"v": 1, "stream": "x", "body_wrench": [*WRENCH[:5], float("nan")]}
+    answer = dispatch.handle(SET_POINTS, msgspec.msgpack.encode(request), MSGPACK, streams=known)
+    error = msgspec.msgpack.decode(answer.payload)["error"]
+    assert (error["field"], error["message"]) == (
+        "body_wrench[5]",
+        "must be a finite number, got nan",
+    )
+
+
 @pytest.mark.parametrize("form", [JSON, MSGPACK])
 def test_the_hand_of_the_service_is_that_of_its_streams(form, known, tmp_path) -> None:
     from hand_models.parameters import ParameterTable, Quantity
@@ -308,11 +318,16 @@ def test_each_line_gives_a_line(wrenches, statuses, code, stance, monkeypatch, c
     assert run(["stream", path]) == code
     out, err = capfd.readouterr()
     header, *lines = out.splitlines()
-    assert err == ""
-    assert "front_left" in header
+    assert err.count("\n") == 1
+    assert "within 30 N, 3 N·m of the first centre [490.5, " in err
+    assert "outer_left, inner_left, inner_right, outer_right" in err
+    assert "front_left [N]" in header
+    assert max(map(len, out.splitlines())) <= 100
     assert [line.split()[0] for line in lines] == statuses
     for line, reply in zip(lines, replies, strict=True):
-        assert f"{reply['hands'][0]['tensions'][0]:.1f}" in line
+        cells = [line[start : start + 16] for start in range(36, len(line), 16)]
+        told = [[int(part) for part in cell.split("/")] for cell in cells]
+        assert told == [[round(part) for part in hand["tensions"]] for hand in reply["hands"]]
 
 
 def test_a_failure_is_worse_than_an_overload(stance, monkeypatch, capfd) -> None:
@@ -331,9 +346,21 @@ def test_a_failure_is_worse_than_an_overload(stance, monkeypatch, capfd) -> None
 
 @pytest.mark.parametrize("line", ["[1, 2]", "x", '{"v": 1}', "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
 def test_a_line_that_is_no_wrench_is_told_by_its_number(line, stance, monkeypatch, capfd) -> None:
-    given(monkeypatch, "", line)
-    assert run(["stream", stance(wall_request()), "--json"]) == BAD_INPUT
-    assert complaint(capfd).startswith("crux: line 2: six numbers")
+    path = stance(wall_request())
+    given(monkeypatch, "", line, WRENCH)
+    assert run(["stream", path, "--json"]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    error, reply = map(json.loads, out.splitlines())
+    assert err == ""
+    assert departures("ErrorReply", error) == []
+    assert (error["error"]["kind"], error["error"]["field"]) == ("malformed", "line 2")
+    assert error["error"]["message"].startswith("six finite numbers")
+    assert reply["body_wrench"] == WRENCH
+    given(monkeypatch, "", line, WRENCH)
+    assert run(["stream", path]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    assert len(out.splitlines()) == 2
+    assert err.splitlines()[1].startswith("crux: line 2: six finite numbers")
 
 
 @pytest.mark.parametrize(
@@ -360,7 +387,7 @@ def test_another_objective_is_refused(stance, monkeypatch, capfd) -> None:
 def test_a_line_is_answered_before_the_next_is_there() -> None:
     """As a control loop asks: through pipes, one at a time."""
     lines = iter([json.dumps(WRENCH).encode() + b"\n"])
-    assert list(stream_command._wrenches(lines)) == [tuple(WRENCH)]
+    assert list(stream_command._wrenches(lines)) == [(1, tuple(WRENCH))]
     asked = process("stream", "wall", "--json", given=(json.dumps(WRENCH) + "\n").encode() * 3)
     assert (asked.returncode, asked.stderr) == (0, b"")
     assert len(asked.stdout.splitlines()) == 3

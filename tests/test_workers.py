@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import workshop
 
-from service.workers import THREADS, Lost, Workers
+from service.workers import NO_START, THREADS, Lost, Workers
 
 
 def logged(log: Path) -> Counter[int]:
@@ -77,7 +77,44 @@ def test_who_stops_listening_leaves_no_work_behind(nappers):
 def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
     with Workers(workshop.nothing, 2) as workers:
         found = done(workers, list(range(20)))
-    assert {result.reason for result in found.values()} == {"processes do not start"}
+    assert {result.reason for result in found.values()} == {NO_START}
+
+
+def test_this_process_works_while_others_start_and_where_none_does():
+    with Workers(workshop.sleepers, 2) as workers:
+        # well before any is ready
+        found = dict(workers.each(list(range(5)), lambda item: -item))
+        assert not any(worker.ready for worker in workers._all)
+        processes = [worker.process for worker in workers._all]
+    assert found == {i: -i for i in range(5)}
+    # what is not ready is not waited for
+    assert [process.exitcode for process in processes] == [-9, -9]
+    with Workers(workshop.nothing, 2) as workers:
+        found = {}
+        for i, result in workers.each([0.01] * 400, workshop.nap_here):
+            found[i] = result
+        assert workers._stillborn >= 2
+    assert set(found.values()) == {os.getpid()}
+    assert sorted(found) == list(range(400))
+
+
+def test_this_process_and_others_share_the_work(nappers):
+    # one of them at least is ready
+    done(nappers, [0.0])
+    found = dict(nappers.each([0.02] * 60, workshop.nap_here))
+    assert sorted(found) == list(range(60))
+    assert os.getpid() in found.values()
+    assert len(set(found.values())) >= 2
+
+
+def test_an_item_that_kills_processes_spares_this_one(tmp_path):
+    here = os.getpid()
+    with Workers(partial(workshop.squares, str(tmp_path / "log")), 1) as workers:
+        assert done(workers, [2]) == {0: 4}
+        found = dict(workers.each([13, 2, 3], lambda number: (here, number)))
+    assert isinstance(found[0], Lost)
+    assert found[1] in (4, (here, 2))
+    assert found[2] in (9, (here, 3))
 
 
 def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):

@@ -40,6 +40,17 @@ def naps() -> Callable[[float], int]:
     return nap
 
 
+def nap_here(seconds: float) -> int:
+    """Does the work of `naps`."""
+    return naps()(seconds)
+
+
+def sleepers() -> Callable[[int], int]:
+    """Is not ready for as long as anyone waits."""
+    time.sleep(600.0)
+    return abs
+
+
 def threads() -> Callable[[str], str | None]:
     """Looks up what its environment says."""
     return os.environ.get
