@@ -1,13 +1,14 @@
 """Programs at the speed of their solver: compiled once, refreshed in place for each query.
 
-CVXPY compiles a problem into conic data that are affine in its parameters (`cvxpy_internals`). A
-query's values are put into one vector, one sparse product gives the data, and a solver that is
-already set up takes them over. Of the data only the entries count that are not zero in the query:
-the blocks of `planner.program` are mostly zeros, and a solver that does not know costs three times
-as much. A solver is set up for a pattern of entries, and serves every query of that pattern: an
-answer depends on its query alone, not on those before.
+CVXPY compiles a problem into conic data that are affine in its parameters (`cvxpy_internals`), with
+room for smaller ones of its kind (`conic_extent`). A query's values are put into one vector, each
+datum is one of them or a sum of some, and a solver that is already set up takes them over. Of the
+data only the entries count that are not zero in the query: the blocks of `planner.program` are
+mostly zeros, and a solver that does not know costs three times as much. A solver is set up for a
+pattern of entries, and serves every query of that pattern: an answer depends on its query alone,
+not on those before.
 
-Solvers are kept, a few for each problem: each serves one caller at a time, so that threads do not
+Solvers are kept, some for each problem: each serves one caller at a time, so that threads do not
 wait for each other, and one whose last query had the same arrays is only given what is new. Where
 CVXPY's internals have changed, everything still works, at the speed of CVXPY's own `solve`.
 """
@@ -17,22 +18,26 @@ from __future__ import annotations
 import operator
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import clarabel
 import cvxpy as cp
 import numpy as np
-import scipy.sparse as sp
 
-from hand_models.frames import Array, Indices
+from hand_models.frames import Array
 from planner import deadline
-from planner.cvxpy_internals import STATUS, WRITTEN_FOR, Affine, ChangedError, ConeMap, cone_map
+from planner.conic_extent import Extent, Layout, Room
+from planner.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
 
 __all__ = ["OUT_OF_TIME", "Compiled", "Solution"]
 
-KEPT: Final = 8
+KEPT: Final = 32
 """Solvers that wait for queries of one problem."""
+
+LAYOUTS: Final = 128
+"""Extents of which the conic program is kept."""
 
 OUT_OF_TIME: Final = "out of time"
 """Status of a solver that the deadline has ended."""
@@ -105,6 +110,7 @@ class Compiled:
         self._variables, self._constraints = variables, constraints
         self._lock = threading.Lock()
         self._idle: list[_Solver] = []
+        self._layouts: OrderedDict[Extent, Layout] = OrderedDict()
         self.map: ConeMap | None = None
         try:
             self.map = cone_map(problem, parameters, variables, constraints)
@@ -115,54 +121,89 @@ class Compiled:
                 RuntimeWarning,
                 stacklevel=2,
             )
+        else:
+            self._room = Room(self.map)
 
-    def solve(self, values: Values) -> Solution:
-        """Solve for some values of the parameters, in their order."""
+    def solve(self, values: Values, extent: Extent) -> Solution:
+        """Solve for some values.
+
+        Parameters
+        ----------
+        values : sequence
+            Of the parameters, in their order; in their first rows and columns, if they are smaller.
+        extent : Extent
+            How much there is of variables and constraints then. Where `map` is None there must be
+            all of the problem.
+        """
         solution = FAILED
         for i, chosen in enumerate(self._settings):
             if self.map is None:
                 solution = self._slowly(values, chosen)
+            elif i == 0:
+                solution = self._fast(values, extent, chosen)
             else:
-                solution = self._fast(self.map, values, chosen, keep=i == 0)
+                layout = self._layout(values, extent)
+                query = _Query(layout)
+                query.take(values)
+                solution = _Solver(extent, layout, chosen, query).solve()
             ended = solution.status in (cp.OPTIMAL, cp.INFEASIBLE, cp.UNBOUNDED, OUT_OF_TIME)
             if ended or deadline.expired():
                 break
         return solution
 
-    def _fast(
-        self, of: ConeMap, values: Values, settings: Mapping[str, Any], *, keep: bool
-    ) -> Solution:
-        if not keep:
-            solver = _Solver(of, settings)
-            solver.take(values)
-            return solver.solve()
-        solver = self._ready(of, values, settings)
+    def _fast(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> Solution:
+        solver = self._ready(values, extent, settings)
         try:
             return solver.solve()
         finally:
-            with self._lock:
-                self._idle.append(solver)
-                del self._idle[:-KEPT]
+            self._put_back(solver)
 
-    def _ready(self, of: ConeMap, values: Values, settings: Mapping[str, Any]) -> _Solver:
-        """Return a solver that has taken the values over: first asked is who knows most of them."""
-        others: list[_Solver] = []
-        try:
-            while True:
-                with self._lock:
-                    if not self._idle:
-                        break
-                    solver = max(reversed(self._idle), key=lambda one: one.knows(values))
-                    self._idle.remove(solver)
-                if solver.take(values):
-                    return solver
-                others.append(solver)
-        finally:
-            with self._lock:
-                self._idle[:0] = others
-        solver = _Solver(of, settings)
-        solver.take(values)
-        return solver
+    def _ready(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> _Solver:
+        """Return a solver that has taken the values over."""
+        idle = self._take_idle(extent, lambda solver: 1 + solver.query.knows(values))
+        query = _Query(self._layout(values, extent)) if idle is None else idle.query
+        changed = query.take(values)
+        if idle is not None:
+            if query.pattern == idle.pattern:
+                idle.update(changed)
+                return idle
+            idle.query = _Query(idle.layout)
+            self._put_back(idle)
+            other = self._take_idle(extent, lambda solver: solver.pattern == query.pattern)
+            if other is not None:
+                other.turn_to(query)
+                return other
+        return _Solver(extent, query.layout, settings, query)
+
+    def _take_idle(self, extent: Extent, merit: Callable[[_Solver], int]) -> _Solver | None:
+        """Take the solver of that extent with the most merit, the last used of such, if any has."""
+        with self._lock:
+            found, most = None, 0
+            for solver in reversed(self._idle):
+                if solver.extent == extent and (its := merit(solver)) > most:
+                    found, most = solver, its
+            if found is not None:
+                self._idle.remove(found)
+            return found
+
+    def _put_back(self, solver: _Solver) -> None:
+        with self._lock:
+            self._idle.append(solver)
+            del self._idle[:-KEPT]
+
+    def _layout(self, values: Values, extent: Extent) -> Layout:
+        """Return the conic program of an extent, found once."""
+        with self._lock:
+            found = self._layouts.pop(extent, None)
+            if found is not None:
+                self._layouts[extent] = found
+                return found
+        found = self._room.layout(extent, [np.shape(value) for value in values])
+        with self._lock:
+            self._layouts[extent] = found
+            while len(self._layouts) > LAYOUTS:
+                self._layouts.popitem(last=False)
+        return found
 
     def _slowly(self, values: Values, settings: Mapping[str, Any]) -> Solution:
         """Solve by CVXPY itself."""
@@ -197,95 +238,84 @@ class Compiled:
             )
 
 
-class _Block:
-    """One part of the data, a matrix or a vector, with the entries that a solver is set up for.
+class _Query:
+    """A query's values as one vector p, and what they were.
 
     Parameters
     ----------
-    of : Affine
-    p : ndarray
-        Parameters' values.
-    whole : bool
-        Take all entries, or those alone that are not zero for p.
+    layout : Layout
     """
 
-    def __init__(self, of: Affine, p: Array, *, whole: bool) -> None:
-        count, last = of.values.shape[0], of.values.shape[1] - 1
-        # an entry with a constant part may be zero by chance alone
-        always = of.values[:, [last]].toarray().ravel() != 0.0
-        chosen = np.ones(count, dtype=bool) if whole else always | (of.values @ p != 0.0)
-        kept = np.flatnonzero(chosen)
-        self.values = of.values[kept]
-        self.indices = of.indices[kept]
-        self.indptr = np.searchsorted(kept, of.indptr)
-        self.shape = of.shape
-        self.own = _parameters(self.values)
-
-    def at(self, p: Array) -> Array:
-        """Return the entries' values."""
-        return np.asarray(self.values @ p)
-
-    def matrix(self, p: Array) -> Any:
-        """Return the block as a sparse matrix."""
-        return sp.csc_matrix((self.at(p), self.indices, self.indptr), shape=self.shape)
-
-
-def _parameters(values: Any) -> Indices:
-    """Return which entries of p, but for the constant, the rows of a map depend on."""
-    found = np.unique(values.indices)
-    return np.asarray(found[found < values.shape[1] - 1])
-
-
-class _Solver:
-    """A solver with what it was given last, set up for a pattern of data."""
-
-    def __init__(self, of: ConeMap, settings: Mapping[str, Any]) -> None:
-        self._map = of
-        self._settings = clarabel.DefaultSettings()
-        self._settings.verbose = False
-        for name, value in settings.items():
-            setattr(self._settings, name, value)
-        self._p = np.ones(of.size)
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.p = np.ones(layout.size)
         self._views = [
-            self._p[place].reshape(parameter.shape, order="F") for parameter, place in of.parameters
+            self.p[place].reshape(shape, order="F")
+            for place, shape in zip(layout.places, layout.shapes, strict=True)
         ]
         self._given: list[Any] = [None] * len(self._views)
-        self._shaping = _parameters(of.A.values)
-        """Entries of p that A depends on."""
-        self._pattern = b""
-        """Which of these are not zero."""
-        self._solver: Any = None
-        self._blocks: dict[str, _Block] = {}
-        self._touched: list[tuple[str, ...]] = []
+        self.pattern = b""
+        """Which of the entries that shape A are not zero."""
 
     def knows(self, values: Values) -> int:
         """Return how many of the values are the same arrays as last time."""
         return sum(map(operator.is_, self._given, values))
 
-    def take(self, values: Values) -> bool:
-        """Take values over; return whether they have the pattern that the solver is set up for."""
-        given, new = self._given, []
+    def take(self, values: Values) -> set[str]:
+        """Take values over; return the names of the parts that change with them."""
+        given, views, touched = self._given, self._views, self.layout.touched
+        changed: set[str] = set()
         for i, value in enumerate(values):
             if given[i] is not value:
-                self._views[i][...] = value
+                views[i][...] = value
                 given[i] = value
-                new.append(i)
-        pattern = (self._p[self._shaping] != 0.0).tobytes()
-        if self._solver is None:
-            self._pattern = pattern
-            self._set_up()
-        elif pattern != self._pattern:
-            # the solver itself has not got these: nothing is known
-            self._given = [None] * len(given)
-            return False
-        else:
-            names = {name for i in new for name in self._touched[i]}
-            # it takes lists faster than arrays, and cannot take nothing
-            if names:
-                self._solver.update(
-                    **{name: self._blocks[name].at(self._p).tolist() for name in names}
-                )
-        return True
+                changed.update(touched[i])
+        if "A" in changed:
+            self.pattern = (self.p.take(self.layout.shaping) != 0.0).tobytes()
+        return changed
+
+
+class _Solver:
+    """A solver with what it was given last, set up for a pattern of data.
+
+    Parameters
+    ----------
+    extent : Extent
+    layout : Layout
+        Of that extent.
+    settings : mapping of str to value
+        Of Clarabel.
+    query : _Query
+        For whose pattern it is set up.
+    """
+
+    def __init__(
+        self, extent: Extent, layout: Layout, settings: Mapping[str, Any], query: _Query
+    ) -> None:
+        self.extent, self.layout, self.query, self.pattern = extent, layout, query, query.pattern
+        chosen = clarabel.DefaultSettings()
+        chosen.verbose = False
+        for name, value in settings.items():
+            setattr(chosen, name, value)
+        self._parts = {
+            "P": layout.P,
+            "q": layout.q,
+            "A": layout.A.without_zeros(query.p),
+            "b": layout.b,
+        }
+        self._solver = clarabel.DefaultSolver(*self.data(), layout.cones, chosen)
+
+    def update(self, names: set[str]) -> None:
+        """Take over parts of the data that have changed in the query."""
+        # it takes lists faster than arrays, and cannot take nothing
+        if names:
+            parts, p = self._parts, self.query.p
+            self._solver.update(**{name: parts[name].entries.at(p).tolist() for name in names})
+
+    def turn_to(self, query: _Query) -> None:
+        """Take over another query of the pattern."""
+        self.query = query
+        self.update({name for names in self.layout.touched for name in names})
 
     def solve(self) -> Solution:
         """Solve with the values taken last."""
@@ -312,36 +342,19 @@ class _Solver:
 
     def data(self) -> tuple[Any, Array, Any, Array]:
         """Return P, q, A and b as the solver has them."""
-        blocks, p = self._blocks, self._p
-        return blocks["P"].matrix(p), blocks["q"].at(p), blocks["A"].matrix(p), blocks["b"].at(p)
-
-    def _set_up(self) -> None:
-        """Set the solver up for the pattern of the present values."""
-        of, p = self._map, self._p
-        self._blocks = {
-            name: _Block(part, p, whole=name != "A")
-            for name, part in (("P", of.P), ("q", of.q), ("A", of.A), ("b", of.b))
-        }
-        self._touched = [
-            tuple(
-                name
-                for name, block in self._blocks.items()
-                if ((block.own >= place.start) & (block.own < place.stop)).any()
-            )
-            for _, place in of.parameters
-        ]
-        P, q, A, b = self.data()
-        self._solver = clarabel.DefaultSolver(P, q, A, b, of.cones, self._settings)
+        parts, p = self._parts, self.query.p
+        P, A = (parts[name].matrix(p) for name in "PA")
+        return P, parts["q"].entries.at(p), A, parts["b"].entries.at(p)
 
     def _read(self, raw: Any) -> Solution:
-        of, word = self._map, str(raw.status)
+        of, word = self.layout, str(raw.status)
         status = OUT_OF_TIME if word == STOPPED else STATUS.get(word, cp.SOLVER_ERROR)
         if status not in PRESENT + PROVEN:
             return Solution(status, raw.iterations, float("nan"))
         multipliers = of.constraints.of(raw.z)
         if status in PROVEN:
             return Solution(status, raw.iterations, float("nan"), (), multipliers)
-        offset = float((of.d.values @ self._p)[0])
+        offset = float(of.d.entries.at(self.query.p)[0])
         return Solution(
             status=status,
             iterations=raw.iterations,

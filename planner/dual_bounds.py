@@ -27,7 +27,7 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
     return _dual_bound(data, outcome, None, 0.0, _missing(outcome))
 
 
-def unique_bound(data: StanceData, outcome: Outcome) -> float:
+def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> float:
     """Return a lower bound of the least utilisation from the multipliers of `Unique`.
 
     Its second term f is convex, so with the plan z₁ and its slope every plan z has
@@ -36,12 +36,13 @@ def unique_bound(data: StanceData, outcome: Outcome) -> float:
 
     the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
     `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
+    ``share``: how much of its weight the second term had.
     """
-    weight, hands = tie_weight(data.shape), data.hands
-    tie = joined([hand.tie for hand in hands])
-    small = tie * joined(outcome.loads) / joined([hand.unit for hand in hands])
-    value = -weight * float(small @ small) - TIE * outcome.value**2
-    slopes = 2.0 * weight * tie * small
+    weight, hands = share * tie_weight(data.shape), data.hands
+    z = joined(outcome.loads) / joined([hand.unit for hand in hands])
+    small = weight * joined([hand.tie for hand in hands]) * z
+    value = -float(small @ z) - share * TIE * outcome.value**2
+    slopes = 2.0 * small
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
 
 
@@ -54,7 +55,7 @@ def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
     slopes, value = [], 0.0
     for hand, y in zip(data.hands, outcome.loads, strict=True):
         z = y / hand.unit
-        effort, small = hand.E @ z + hand.e0, hand.rest**2 * z
+        effort, small = hand.E @ z + hand.e0, hand.rest * z
         slopes.append(2.0 * (hand.E.T @ effort + small))
         value += float(effort @ effort + small @ z - slopes[-1] @ z)
     return _dual_bound(data, outcome, joined(slopes), cap, 0.0) + value

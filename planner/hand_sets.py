@@ -108,7 +108,7 @@ class Sets(NamedTuple):
             z = y / hand.unit
             used = max(used, float((hand.L @ z + hand.l0).max()))
             broken = max(broken, float((hand.H @ z - hand.h).max(initial=0.0)))
-            effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum((hand.rest * z) ** 2))
+            effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum(hand.rest * z**2))
         missing = stance_data.body_wrench(self.data, loads) - self.data.wrench
         return Measure(used, float(np.abs(missing).sum()), broken, effort)
 

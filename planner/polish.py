@@ -2,47 +2,107 @@
 
 An interior-point solver ends near the optimum of `program.Unique`, whose second term is so small
 that tensions may be off by newtons while the objective has all its digits. Which rows are active is
-clear by then. With these as equations the optimum is one linear system (Karush, Kuhn and Tucker),
+nearly clear by then: C z − d u = b of the balance and these rows, with d one for limits. With them
+as equations the optimum is where (Karush, Kuhn and Tucker)
 
-    [ Q  Aᵀ ] [ x ]   [ −c ]
-    [ A  0  ] [ λ ] = [  b ] ,      x = (u, z),
+    Q z + Cᵀ λ = 0,   dᵀ λ = 1,   C z − d u = b,
 
-and it is the optimum if λ ≥ 0 and every other row holds. Where some do not, they change sides, a
-few times at most.
+Q the curvature of the small term. Newton's step to it from the solver's own point is, with z
+eliminated, one small system, r being what is missing in the three:
+
+    [ S  d ] [ δλ ]   [ C Q⁻¹ r₁ − r₂ ]
+    [ dᵀ 0 ] [ δu ] = [ r₃            ] ,   S = C Q⁻¹ Cᵀ,   δz = Q⁻¹ (r₁ − Cᵀ δλ).
+
+A little softness keeps S regular where rows say the same, and takes nothing away, since steps are
+repeated. On the way there the first row that would break becomes active; at its end the one with
+the least λ < 0 no longer is: the active-set method for a convex quadratic program (Nocedal and
+Wright, Numerical Optimization, algorithm 16.3), begun next to its end.
 """
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from hand_models.frames import Array
 from planner.program import Outcome, tie_weight
+from planner.stacked import joined
 from planner.stance_data import StanceData
 
 __all__ = ["polished"]
 
-ROUNDS: Final = 6
-"""Systems that are solved at most."""
+SURE: Final = (1e-6, 1.0)
+"""How many times a row's multiplier may be less than its room for the row to be active at first."""
+
+ROUNDS: Final = 12
+"""Sets of active rows that are tried at most."""
 
 HOLDS: Final = 1e-9
 """By how much a row may be broken, scaled."""
 
-PUSHES: Final = 1e-7
+PUSHES: Final = 1e-12
 """How far below zero a multiplier may be, those of the limits adding up to one."""
 
 SOFT: Final = 1e-13
-"""Softness of equations, so that rows that say the same do not make the system singular."""
+"""Softness of S, whose diagonal is scaled to ones."""
 
-STEPS: Final = 2
-"""Refinements of each solution, which take the softness back."""
+STEPS: Final = 6
+"""Newton's steps for a set of active rows, at most."""
+
+MET: Final = 1e-10
+"""What may be missing of the equations of rows, scaled."""
+
+STILL: Final = 1e-13
+"""What may be missing of Q z + Cᵀ λ = 0."""
+
+WHOLE: Final = 1e-9
+"""What may be missing of dᵀ λ = 1."""
 
 
-def polished(data: StanceData, outcome: Outcome) -> Outcome | None:
+class _Point(NamedTuple):
+    """Loads z, scaled, the utilisation u and the multipliers λ of rows."""
+
+    z: Array
+    u: float
+    multipliers: Array
+
+
+class _Rows(NamedTuple):
+    """All rows C z − d u ≤ b of a stance, of which the first, of the balance, are equations."""
+
+    C: Array
+    d: Array
+    b: Array
+    equations: int
+
+    @classmethod
+    def of(cls, data: StanceData) -> _Rows:
+        """Write the hands' rows below each other: balance, limits, hard rows."""
+        hands, nb = data.hands, len(data.wrench)
+        rest, hard = joined([hand.l0 for hand in hands]), joined([hand.h for hand in hands])
+        limits = len(rest)
+        C = np.zeros((nb + limits + len(hard), sum(len(hand.unit) for hand in hands)))
+        left, limit, below = 0, nb, nb + limits
+        for hand in hands:
+            m, nl, nh, _ = hand.shape
+            right = left + m
+            C[:nb, left:right] = hand.G
+            C[limit : limit + nl, left:right] = hand.L
+            C[below : below + nh, left:right] = hand.H
+            left, limit, below = right, limit + nl, below + nh
+        d = np.zeros(len(C))
+        d[nb : nb + limits] = 1.0
+        return cls(C, d, np.concatenate([data.offset, -rest, hard]), nb)
+
+    def room(self, z: Array, u: float) -> Array:
+        """Return by how much each row holds."""
+        return np.asarray(self.b + self.d * u - self.C @ z)
+
+
+def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Outcome | None:
     """Return the outcome of `program.unique` with its loads exact; None if that is not found.
 
     Parameters
@@ -50,66 +110,75 @@ def polished(data: StanceData, outcome: Outcome) -> Outcome | None:
     data : StanceData
     outcome : Outcome
         Solved.
+    share : float, optional
+        Of the weight of its second term, as in `program.unique`.
     """
-    hands = data.hands
-    ends = np.cumsum([1, *(len(hand.unit) for hand in hands)])
-    limits = [len(hand.l0) for hand in hands]
-    n, count, nb = int(ends[-1]), sum(limits), len(data.wrench)
-    rows = np.zeros((count + sum(len(hand.h) for hand in hands), n))
-    rows[:count, 0] = -1.0
-    G, at, hard = np.zeros((nb, n)), 0, count
-    for i, hand in enumerate(hands):
-        columns = slice(int(ends[i]), int(ends[i + 1]))
-        G[:, columns] = hand.G
-        rows[at : at + limits[i], columns] = hand.L
-        rows[hard : hard + len(hand.h), columns] = hand.H
-        at, hard = at + limits[i], hard + len(hand.h)
-    most = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
-    weight = tie_weight(data.shape)
-    # the objective over its small weight, so that both of its parts have a say
-    c = np.zeros(n)
-    c[0] = 1.0 / weight
-    Q = np.zeros(n)
-    Q[1:] = 2.0 * np.concatenate([hand.tie for hand in hands]) ** 2
-    x = np.concatenate(
-        [[outcome.value], *(y / hand.unit for y, hand in zip(outcome.loads, hands, strict=True))]
-    )
-    duals = np.concatenate([*outcome.limit_duals, *outcome.hard_duals])
-    active = duals > most - rows @ x
-    for _ in range(ROUNDS):
-        found = _meeting(Q, c, np.vstack([G, rows[active]]), np.append(data.offset, most[active]))
-        if found is None:
-            return None
-        x, multipliers = found
-        broken = rows @ x - most > HOLDS
-        broken[active] = False
-        pushing = multipliers[nb:] * weight >= -PUSHES
-        if pushing.all() and not broken.any():
-            loads = tuple(x[ends[i] : ends[i + 1]] * hand.unit for i, hand in enumerate(hands))
-            return replace(outcome, value=float(x[0]), loads=loads)
-        active[np.flatnonzero(active)[~pushing]] = False
-        active |= broken
+    assert outcome.balance_dual is not None
+    hands, rows = data.hands, _Rows.of(data)
+    unit = joined([hand.unit for hand in hands])
+    Q = 2.0 * share * tie_weight(data.shape) * joined([hand.tie for hand in hands])
+    multipliers = joined([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
+    start = _Point(joined(outcome.loads) / unit, outcome.value, multipliers)
+    room = rows.room(start.z, start.u)
+    for sure in SURE:
+        active = multipliers > sure * room
+        active[: rows.equations] = True
+        found = _optimum(rows, Q, start, active)
+        if found is not None:
+            ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
+            loads = tuple(np.split(found.z * unit, ends))
+            return replace(outcome, value=found.u, loads=loads)
     return None
 
 
-def _meeting(Q: Array, c: Array, A: Array, b: Array) -> tuple[Array, Array] | None:
-    """Return x and λ of least ½ xᵀQ x + cᵀx with A x = b; None where there is no such point."""
-    n, m = len(c), len(b)
-    K = np.zeros((n + m, n + m))
-    K[:n, n:], K[n:, :n] = A.T, A
-    K.flat[: n * (n + m) : n + m + 1] = Q
-    goal = np.append(-c, b)
-    soft = K.copy()
-    soft.flat[:: n + m + 1] += np.append(np.full(n, SOFT), np.full(m, -SOFT))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", LinAlgWarning)
-        try:
-            factors = lu_factor(soft, check_finite=False, overwrite_a=True)
-        except LinAlgWarning:
+def _optimum(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | None:
+    """Return the optimum, by the active-set method; None if it is not found in some rounds."""
+    z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
+    for _ in range(ROUNDS):
+        found = _meeting(rows, Q, _Point(z, u, multipliers), active)
+        if found is None:
             return None
-    found = lu_solve(factors, goal, check_finite=False)
-    for _ in range(STEPS):
-        found += lu_solve(factors, goal - K @ found, check_finite=False)
-    if not np.isfinite(found).all() or np.abs(K[n:] @ found - b).max() > HOLDS:
+        after = rows.room(found.z, found.u)
+        broken = np.flatnonzero(~active & (after < -HOLDS))
+        if len(broken):
+            room = np.maximum(rows.room(z, u)[broken], 0.0)
+            way = room / (room - after[broken])
+            first = int(way.argmin())
+            z, u = z + way[first] * (found.z - z), u + way[first] * (found.u - u)
+            active[broken[first]] = True
+            continue
+        z, u, multipliers = found
+        least = rows.equations + int(multipliers[rows.equations :].argmin())
+        if multipliers[least] >= -PUSHES:
+            return found
+        active[least] = False
+        multipliers[least] = 0.0
+    return None
+
+
+def _meeting(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | None:
+    """Return the least point where active rows meet; None where they do not."""
+    C, d, b = rows.C[active], rows.d[active], rows.b[active]
+    z, u, multipliers = start.z, start.u, start.multipliers[active]
+    flexible = C / Q
+    S = flexible @ C.T
+    diagonal = S.diagonal()
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    S = scale[:, None] * S * scale
+    S.flat[:: len(S) + 1] += SOFT
+    factor, failed = dpotrf(S, lower=1)
+    if failed:
         return None
-    return found[:n], found[n:]
+    across = dpotrs(factor, d * scale, lower=1)[0] * scale
+    stiffness = float(d @ across)
+    for _ in range(STEPS):
+        r1, r2, r3 = -Q * z - multipliers @ C, b + d * u - C @ z, 1.0 - float(d @ multipliers)
+        if np.abs(r2).max() <= MET and np.abs(r1).max() <= STILL and abs(r3) <= WHOLE:
+            whole = np.zeros(len(active))
+            whole[active] = multipliers
+            return _Point(z, u, whole)
+        step = dpotrs(factor, (flexible @ r1 - r2) * scale, lower=1)[0] * scale
+        rise = (float(d @ step) - r3) / stiffness
+        step -= rise * across
+        z, u, multipliers = z + (r1 - step @ C) / Q, u + rise, multipliers + step
+    return None

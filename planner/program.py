@@ -24,7 +24,8 @@ Eight programs share these rows:
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
 body wrenches over `WRENCH_UNIT`, limit rows over their capacities. Data enter as whole-block
 parameters (disciplined parametrised programming), so a program depends on the shape of a stance
-only, is compiled once and solved with new data after (`planner.compiled`).
+only, is compiled once and solved with new data after (`planner.compiled`). Programs have room for
+more than a stance, and one serves nearly all stances of so many hands (`Shape.with_room`).
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ from hand_models.frames import Array
 from hand_models.hand import FINGERS
 from planner import deadline
 from planner.compiled import OUT_OF_TIME, Compiled
+from planner.conic_extent import Extent
 from planner.stance_data import Shape, StanceData
 
 __all__ = [
@@ -180,10 +182,19 @@ class _Program(ABC):
 
     @classmethod
     def built(cls, shape: Shape, *further: int) -> Self | None:
-        """Return the program for a shape, built on first use and kept.
+        """Return a program for a shape, built on first use and kept.
 
-        None if the deadline comes before: it will be there for a later question.
+        It has room for other shapes, if there is a map to leave out what is not there. None if the
+        deadline comes before: it will be there for a later question.
         """
+        program = cls._awaited(shape.with_room(), *further)
+        if program is not None and program.compiled.map is None:
+            program = cls._awaited(shape, *further)
+        return program
+
+    @classmethod
+    def _awaited(cls, shape: Shape, *further: int) -> Self | None:
+        """Return the program for that very shape; None if the deadline comes before."""
         try:
             program = _built(cls, shape, *further).result(deadline.left())
         except TimeoutError:
@@ -197,6 +208,19 @@ class _Program(ABC):
         self.l0 = [cp.Parameter(nl) for _, nl, _, _ in self.shape.hands]
         return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
 
+    def values(self, data: StanceData, *own: Any) -> list[Any]:
+        """Return what the parameters are given."""
+        hands = data.hands
+        limits = [*(hand.L for hand in hands), *(hand.l0 for hand in hands)] if self.L else []
+        return [
+            *(hand.G for hand in hands),
+            *limits,
+            *(hand.H for hand in hands),
+            *(hand.h for hand in hands),
+            data.offset,
+            *own,
+        ]
+
     def run(self, data: StanceData, *own: Any) -> tuple[Outcome, list[Array]]:
         """Solve with the stance's data and the values of `own`.
 
@@ -207,16 +231,7 @@ class _Program(ABC):
             Values of the variables `further`; empty where there is no solution.
         """
         hands = data.hands
-        limits = [*(hand.L for hand in hands), *(hand.l0 for hand in hands)] if self.L else []
-        values = [
-            *(hand.G for hand in hands),
-            *limits,
-            *(hand.H for hand in hands),
-            *(hand.h for hand in hands),
-            data.offset,
-            *own,
-        ]
-        found = self.compiled.solve(values)
+        found = self.compiled.solve(self.values(data, *own), self._extent(data.shape))
         solved = found.status in SOLVED and math.isfinite(found.value)
         duals, first = found.multipliers, 1 + len(self.limits)
         outcome = Outcome(
@@ -232,6 +247,18 @@ class _Program(ABC):
             balance_dual=duals[0] if duals else None,
         )
         return outcome, list(found.variables[len(hands) :]) if solved else []
+
+    def _extent(self, shape: Shape) -> Extent:
+        """Return how much there is of variables and constraints for a shape."""
+        loads, limits, hard = [], [], []
+        for m, nl, nh, _ in shape.hands:
+            loads.append(m)
+            limits.append(nl)
+            hard.append(nh)
+        if not self.limits:
+            limits = []
+        further = [variable.size for variable in self.further]
+        return Extent((*loads, *further), (shape.balance, *limits, *hard), shape)
 
 
 class Margin(_Program):
@@ -263,15 +290,21 @@ class Unique(_Program):
         self.limits = [row <= self.u for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         ties = sum(
-            cp.sum_squares(cp.multiply(weights, z))
+            cp.sum(cp.multiply(weights, cp.square(z)))
             for weights, z in zip(self.weights, self.z, strict=True)
         )
         rows = [self.balance, *self.limits, *self.hard]
         return cp.Problem(cp.Minimize(self.u + tie_weight(self.shape) * ties), rows)
 
-    def solve(self, data: StanceData) -> Outcome:
-        """Return the plan of least utilisation; ``value`` is that utilisation."""
-        outcome, further = self.run(data, *(hand.tie for hand in data.hands))
+    def solve(self, data: StanceData, share: float = 1.0) -> Outcome:
+        """Return the plan of least utilisation; ``value`` is that utilisation.
+
+        ``share``: how much of its weight the second term is given.
+        """
+        ties = [hand.tie for hand in data.hands]
+        if share != 1.0:
+            ties = [share * tie for tie in ties]
+        outcome, further = self.run(data, *ties)
         return replace(outcome, value=float(further[0])) if further else outcome
 
 
@@ -286,19 +319,21 @@ class Curved(_Program):
     def define(self) -> cp.Problem:
         self.u = cp.Variable()
         size = sum(z.shape[0] for z in self.z)
-        self.root = cp.Parameter((size, size))
+        self.root = [cp.Parameter((size, z.shape[0])) for z in self.z]
         self.centre = cp.Parameter(size)
-        self.own = [self.root, self.centre]
+        self.own = [*self.root, self.centre]
         self.limits = [row <= self.u for row in self.utilisations()]
         self.balance = self.reaction == self.offset
-        bent = cp.sum_squares(self.root @ cp.hstack(self.z) - self.centre)
+        parts = [root @ z for root, z in zip(self.root, self.z, strict=True)]
+        bent = cp.sum_squares(sum(parts) - self.centre)
         rows = [self.balance, *self.limits, *self.hard]
         return cp.Problem(cp.Minimize(self.u + 0.5 * bent), rows)
 
     def solve(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
         """Return the plan for the root R (M, M) of the curvature in all hands' z, about their y."""
         z = [y / hand.unit for hand, y in zip(data.hands, near, strict=True)]
-        return self.run(data, root, root @ np.concatenate(z))[0]
+        parts = np.split(root, np.cumsum([len(part) for part in z])[:-1], axis=1)
+        return self.run(data, *parts, root @ np.concatenate(z))[0]
 
 
 class TieBreak(_Program):
@@ -311,7 +346,7 @@ class TieBreak(_Program):
         self.limits = [row <= self.cap for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         effort = sum(
-            cp.sum_squares(cp.multiply(weights, z))
+            cp.sum(cp.multiply(weights, cp.square(z)))
             for weights, z in zip(self.weights, self.z, strict=True)
         )
         return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
@@ -338,7 +373,7 @@ class Effort(_Program):
         self.limits = [row <= self.cap for row in self.utilisations()]
         self.balance = self.reaction == self.offset
         effort = sum(
-            cp.sum_squares(E @ z + e0) + cp.sum_squares(cp.multiply(weights, z))
+            cp.sum_squares(E @ z + e0) + cp.sum(cp.multiply(weights, cp.square(z)))
             for E, e0, weights, z in zip(self.E, self.e0, self.weights, self.z, strict=True)
         )
         return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
@@ -433,7 +468,7 @@ class Nearest(_Program):
         count = self.shape.balance
         self.shortfall = cp.Variable(count)
         self.balance = self.reaction + self.shortfall == self.offset
-        box = [cp.abs(z) <= UNLIMITED for z in self.z]
+        box = [sign * z <= UNLIMITED for z in self.z for sign in (1.0, -1.0)]
         kept = [self.shortfall[count - self.kept :] == 0.0] if self.kept else []
         objective = cp.Minimize(cp.norm(self.shortfall))
         return cp.Problem(objective, [self.balance, *self.hard, *box, *kept])
@@ -470,9 +505,9 @@ def margin(data: StanceData) -> Outcome:
     return _ask(Margin, data)
 
 
-def unique(data: StanceData) -> Outcome:
+def unique(data: StanceData, share: float = 1.0) -> Outcome:
     """Solve `Unique`, built once for each shape."""
-    return _ask(Unique, data)
+    return _ask(Unique, data, share)
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:

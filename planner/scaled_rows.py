@@ -114,11 +114,11 @@ class _Roles(NamedTuple):
     weight : ndarray, shape (m,)
         In the tie-break, of loads that no capacity measures.
     other : ndarray, shape (m,)
-        Zero for tensions, `LIGHT`'s root for the others.
+        Zero for tensions, `LIGHT` for the others.
     measured, measures : ndarray of int
         Columns with a capacity of their own (tendons, the palm), and the limit rows that have it.
     forces : ndarray
-        Weights of those columns by that capacity [N].
+        Roots of the weights of those columns by that capacity [N].
     over : ndarray, shape (nh,), or None
         What hard rows are divided by; None where it is `LOAD_UNIT`, as the columns' unit is.
     efforts : slice or ndarray of int
@@ -157,7 +157,7 @@ def _worked_out(space: WrenchSpace) -> ScaledRows:
     else:
         H, h = space.H * scale / roles.over[:, None], space.h / roles.over
     tie = roles.weight.copy()
-    tie[roles.measured] = roles.forces / s.take(roles.measures)
+    tie[roles.measured] = (roles.forces / s.take(roles.measures)) ** 2
     rest = tie * roles.other
     generators = space.generators * scale
     for array in (L, l0, H, h, tie, rest, generators):
@@ -193,16 +193,16 @@ def _roles(names: Names) -> _Roles:
     # hard rows are in newtons, but for those of a wrist's range
     ranges = np.array([row.limit == WRIST_RANGE for row in names.rows[names.limits :]])
     efforts = np.flatnonzero([is_effort(row) for row in limits])
-    weight = np.where(tensions, 1.0, SECONDARY**0.5)
+    weight = np.where(tensions, 1.0, SECONDARY)
     measured = np.array(list(measures), dtype=np.intp)
     roles = _Roles(
         unit=TWIST_UNIT if floats else np.full(len(columns), LOAD_UNIT),
         scale=TWIST_UNIT if floats else LOAD_UNIT,
         weight=weight,
-        other=np.where(tensions, 0.0, LIGHT**0.5),
+        other=np.where(tensions, 0.0, LIGHT),
         measured=measured,
         measures=np.array(list(measures.values()), dtype=np.intp),
-        forces=weight[measured] * LOAD_UNIT,
+        forces=np.sqrt(weight[measured]) * LOAD_UNIT,
         over=np.where(ranges, 1.0, LOAD_UNIT) if floats or ranges.any() else None,
         efforts=efforts,
     )

@@ -35,6 +35,7 @@ from planner.floating_warnings import far_wrists, idle_preloads, strained_preloa
 from planner.gathering import gather
 from planner.hand_plan import HandPlan, WristPlan
 from planner.hand_sets import Hands
+from planner.least_utilisation import OPTIMAL, least_utilisation
 from planner.plan import (
     Certificate,
     LimitName,
@@ -45,7 +46,6 @@ from planner.plan import (
     TensionPath,
     Times,
 )
-from planner.polish import polished
 from planner.posture import Posture, posture
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
@@ -56,9 +56,6 @@ from planner.unfinished import Unfinished, late_sentence
 from planner.verify import Check
 
 __all__ = ["Ground", "ground_of", "plan", "plan_on"]
-
-OPTIMAL: Final = 1e-5
-"""How far, relatively, the utilisation may be above its proven lower bound."""
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
@@ -229,17 +226,16 @@ class _Answer:
         One solve has its utilisation, and mostly its active rows, which give its last digits; else
         a second solve has these.
         """
-        self.outcome = program.unique(self.data)
-        if self.outcome.solved:
-            used, self.bound = self.outcome.value, dual_bounds.unique_bound(self.data, self.outcome)
-            if used - self.bound <= OPTIMAL * max(1.0, used):
-                exact = polished(self.data, self.outcome)
-                if exact is None:
-                    self._settle_tie()
-                else:
-                    self._take(exact.loads)
-                if not self.wrong:
-                    return
+        found = least_utilisation(self.data)
+        self.outcome = found.outcome
+        if found.proven:
+            self.bound = found.bound
+            if found.exact is None:
+                self._settle_tie()
+            else:
+                self._take(found.exact.loads)
+            if not self.wrong:
+                return
         one, bound = self.outcome, self.bound
         self._settle_in_two()
         if one.solved and not self.outcome.solved and deadline.expired():
@@ -275,7 +271,7 @@ class _Answer:
         if self.outcome.value > cap + SLACK:
             return
         # where the least utilisation is the cap itself, rounding must not empty the set
-        self.cap = max(cap, self.outcome.value + SLACK)
+        self.cap = max(cap, self.outcome.value + 0.5 * SLACK)
         found = program.effort(self.data, self.cap)
         if not found.solved and deadline.expired():
             self._mind_time("least_effort")

@@ -6,6 +6,7 @@ Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,6 +44,9 @@ __all__ = [
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
 
+ROOM: Final = (16, 256, 32, 16)
+"""What programs have room for at least, (m, nl, nh, ne) of each hand: all tiles and joints."""
+
 
 class HandData(NamedTuple):
     """One hand's rows, nondimensional; nb rows of balance.
@@ -58,9 +62,9 @@ class HandData(NamedTuple):
     E, e0 : ndarray, shapes (ne, m), (ne,)
         Efforts E z + e0: tensions and joint torques over their capacities.
     tie : ndarray, shape (m,)
-        Weights of z in the tie-break.
+        Weights of z² in the tie-break.
     rest : ndarray, shape (m,)
-        Weights of loads that are no tensions beside the effort; zero for tensions.
+        Weights of z², of loads that are no tensions, beside the effort; zero for tensions.
     unit : ndarray, shape (m,)
         Of z: the loads are ``y = unit z`` [N], of a floating wrist [m, rad].
     """
@@ -130,6 +134,19 @@ class Shape(NamedTuple):
 
     balance: int
     hands: tuple[tuple[int, int, int, int], ...]
+
+    def with_room(self) -> Shape:
+        """Return the shape of a program that serves this and most others of so many hands.
+
+        All hands have room for `ROOM`, or its double, and so on, as the largest needs.
+        """
+        most = np.max(np.array(self.hands).reshape(-1, len(ROOM)), axis=0, initial=0)
+        room = [
+            least << max(0, math.ceil(math.log2(max(size, 1) / least)))
+            for size, least in zip(most.tolist(), ROOM, strict=True)
+        ]
+        m, nl, nh, ne = room
+        return Shape(self.balance, ((m, nl, nh, ne),) * len(self.hands))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,11 @@ from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from planner import dual_bounds, program
 from planner.cuts import Cut, cut
 from planner.known_stance import KnownStance
+from planner.least_utilisation import OPTIMAL, least_utilisation
 from planner.loads_check import LoadsCheck
 from planner.plan import Plan
-from planner.polish import polished
 from planner.program import Outcome
 from planner.question import Question
-from planner.solve import OPTIMAL
 from planner.stance_data import WRENCH_UNIT
 
 __all__ = ["Proof", "Read", "Solved", "StreamStance"]
@@ -133,20 +132,15 @@ class StreamStance:
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""
         data = self._data.turned(self._scaled(body_wrench))
-        outcome = program.unique(data)
-        if outcome.solved:
-            bound = dual_bounds.unique_bound(data, outcome)
-            if outcome.value - bound <= OPTIMAL * max(1.0, outcome.value):
-                tidy = polished(data, outcome) or program.least_tensions(data, outcome.value)
-                loads = tidy.loads if tidy.solved else outcome.loads
-                return Solved(self._stacked(loads), outcome, bound)
-        outcome = program.margin(data)
-        if not outcome.solved:
-            return None
-        bound = dual_bounds.least_bound(data, outcome)
-        if outcome.value - bound > OPTIMAL * max(1.0, outcome.value):
-            return None
-        tidy = program.least_tensions(data, outcome.value)
+        outcome, bound, exact = found = least_utilisation(data)
+        if not found.proven:
+            outcome = program.margin(data)
+            if not outcome.solved:
+                return None
+            bound = dual_bounds.least_bound(data, outcome)
+            if outcome.value - bound > OPTIMAL * max(1.0, outcome.value):
+                return None
+        tidy = exact or program.least_tensions(data, outcome.value)
         loads = tidy.loads if tidy.solved else outcome.loads
         return Solved(self._stacked(loads), outcome, bound)
 

@@ -86,20 +86,25 @@ def test_the_solver_has_the_data_of_cvxpy_to_the_last_bit(kind):
     for shape in SHAPES:
         built = KINDS[kind](shape)
         parameters = built.compiled.parameters
-        solver = compiled._Solver(built.compiled.map, SETTINGS)
+        # what serves it: a program with room for more
+        serving = KINDS[kind](shape.with_room()).compiled
         first = list(random_values(parameters, rng))
         # the same pattern with other numbers, and half of the arrays the same: an update
         second = [value if i % 2 else 1.5 * value for i, value in enumerate(first)]
-        for values in (first, second):
-            assert solver.take(values)
+        third = [np.zeros(p.shape) for p in parameters]
+        for values in (first, second, third, first):
+            solver = serving._ready(values, built._extent(shape), SETTINGS)
             P, q, A, b = solver.data()
             P_cvxpy, q_cvxpy, A_cvxpy, b_cvxpy = cvxpy_data(built.problem, parameters, values)
             assert is_the_same(A, A_cvxpy)
             assert is_the_same(P, P_cvxpy)
             np.testing.assert_array_equal(q, q_cvxpy)
             np.testing.assert_array_equal(b, b_cvxpy)
-        other = [np.zeros(p.shape) for p in parameters]
-        assert not solver.take(other)
+            assert [(type(c), c.dim) for c in solver.layout.cones] == [
+                (type(c), c.dim) for c in built.compiled.map.cones
+            ]
+            serving._put_back(solver)
+        assert len(serving._idle) == 2
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +146,7 @@ def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
     assert given == [{"b"}]
     assert turned.value == program.Unique(data.shape).solve(data.turned(1.1 * data.wrench)).value
     built.solve(program_data(ask(on_wall())))
-    assert given[1] == {"A", "b"}
+    assert given[1] == {"P", "A", "b"}
 
 
 def test_threads_do_not_disturb_each_other(data):
@@ -156,7 +161,7 @@ def test_threads_do_not_disturb_each_other(data):
 
 def test_the_solvers_that_wait_are_bounded(data):
     built = program.Margin(data.shape)
-    for i, j in product(range(3), range(6)):
+    for i, j in product(range(10), range(6)):
         hand = data.hands[0]
         # another entry that is zero: another pattern
         G = hand.G.copy()

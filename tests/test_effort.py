@@ -243,7 +243,7 @@ def random_hand(rng: np.random.Generator, balance: int = 6) -> HandData:
     """A polyhedron about zero with four tensions, and loads that are none."""
     m, limits = 7, 24
     L = rng.normal(size=(limits, m))
-    tie = np.where(np.arange(m) < 4, 1.0, 0.01)
+    tie = np.where(np.arange(m) < 4, 1.0, 1e-4)
     H = -np.eye(m)[:4]
     E = np.vstack([np.eye(m)[:4] / 7.0, 0.3 * rng.normal(size=(2, m))])
     return HandData(
@@ -256,7 +256,7 @@ def random_hand(rng: np.random.Generator, balance: int = 6) -> HandData:
         E=E,
         e0=np.concatenate([np.zeros(4), rng.normal(size=2) * 0.3]),
         tie=tie,
-        rest=np.where(np.arange(m) < 4, 0.0, 0.01),
+        rest=np.where(np.arange(m) < 4, 0.0, 1e-4),
         unit=np.full(m, 100.0),
     )
 
@@ -268,8 +268,8 @@ def effort_gap(data: StanceData, cap: float, loads) -> tuple[float, float]:
     value, slope = 0.0, []
     for hand, part in zip(hands, z, strict=True):
         effort, small = hand.E @ part + hand.e0, hand.rest * part
-        value += float(effort @ effort + small @ small)
-        slope.append(2.0 * (hand.E.T @ effort + hand.rest * small))
+        value += float(effort @ effort + small @ part)
+        slope.append(2.0 * (hand.E.T @ effort + small))
     g = np.concatenate(slope)
     found = peer.solve(
         g,

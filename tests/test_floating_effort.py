@@ -105,7 +105,7 @@ def promised(question: Question, answer: Plan, cap: float) -> float:
             if is_tension(row) or (row.limit == "joint_torque" and row.label.endswith("+"))
         ]
         E, e0 = space.L[those] / space.s[those, None], space.l0[those] / space.s[those]
-        slopes.append(2.0 * (E.T @ (E @ y + e0) + (scaled.rest / scaled.unit) ** 2 * y))
+        slopes.append(2.0 * (E.T @ (E @ y + e0) + scaled.rest / scaled.unit**2 * y))
     cost = np.concatenate(slopes)
     r = peer.rows(question, spaces)
     result = peer.solve(

@@ -73,11 +73,11 @@ def check_hand(question: Question, hands: Hands, data: StanceData, i: int, y: np
     for column, tie, rest in zip(space.columns, hand.tie, hand.rest, strict=True):
         finger, _, name = column.rpartition("/")
         if name == "tension":
-            assert tie == pytest.approx(LOAD / most[f"{finger}/tendon_tension"], rel=1e-12)
+            assert tie == pytest.approx((LOAD / most[f"{finger}/tendon_tension"]) ** 2, rel=1e-12)
             assert rest == 0.0
         else:
-            assert tie == pytest.approx(0.01 * LOAD / most.get(column, LOAD), rel=1e-12)
-            assert rest == pytest.approx(math.sqrt(0.1) * tie, rel=1e-12)
+            assert tie == pytest.approx((0.01 * LOAD / most.get(column, LOAD)) ** 2, rel=1e-12)
+            assert rest == pytest.approx(0.1 * tie, rel=1e-12)
     assert hand.shape == (len(y), len(used), len(space.h), len(efforts))
 
 

@@ -55,7 +55,7 @@ def scaled(sets: Sets) -> Data:
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(hand, name) for hand in hands])
 
-    l0, v = joined("l0"), joined("tie")
+    l0, v = joined("l0"), np.sqrt(joined("tie"))
     return Data(
         peer.Rows(
             L=spread("L"),
@@ -75,7 +75,7 @@ def scaled(sets: Sets) -> Data:
 def si(question: Question, sets: Sets) -> Data:
     """Rows in N and N·m, each against its own capacity."""
     unit = np.concatenate([hand.unit for hand in sets.data.hands])
-    v = np.concatenate([hand.tie for hand in sets.data.hands]) / unit
+    v = np.sqrt(np.concatenate([hand.tie for hand in sets.data.hands])) / unit
     w = math.sqrt(tie_weight(sets.data.shape)) * v
     return Data(peer.rows(question, list(sets.spaces)), question.needed_wrench(), w, v)
 

@@ -54,26 +54,29 @@ class WholeBlocks:
     """Raw Clarabel on the data as CVXPY writes them: whole blocks, with their zeros."""
 
     def __init__(self, stances: Sequence[Known]) -> None:
-        built = program.Unique.built(stances[0].sets.data.shape)
-        assert built is not None
+        built = program.Unique(stances[0].sets.data.shape)
         of = built.compiled.map
         assert of is not None
         self._places, self._new = of.variables, []
         for each in stances:
-            built.solve(each.sets.data)
-            p = built.compiled._idle[-1]._p
-            self._new.append(((of.A.values @ p).tolist(), (of.b.values @ p).tolist()))
+            ties = (hand.tie for hand in each.sets.data.hands)
+            values = built.values(each.sets.data, *ties)
+            for parameter, value in zip(built.compiled.parameters, values, strict=True):
+                parameter.value = value
+            p = of.vector()
+            new = {"P": of.P.values @ p, "A": of.A.values @ p, "b": of.b.values @ p}
+            self._new.append({name: part.tolist() for name, part in new.items()})
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         for name, value in program.Unique.settings[0].items():
             setattr(settings, name, value)
-        A, b = (np.array(part) for part in self._new[0])
-        P, q, A = (
-            sp.csc_matrix((of.P.values @ p, of.P.indices, of.P.indptr), of.P.shape),
-            of.q.values @ p,
-            sp.csc_matrix((A, of.A.indices, of.A.indptr), of.A.shape),
+        P, A = (
+            sp.csc_matrix((part.values @ p, part.indices, part.indptr), part.shape)
+            for part in (of.P, of.A)
         )
-        self._solver = clarabel.DefaultSolver(P, q, A, b, of.cones, settings)
+        self._solver = clarabel.DefaultSolver(
+            P, of.q.values @ p, A, of.b.values @ p, of.cones, settings
+        )
 
     def used(self, number: int) -> float:
         """Return the utilisation that it comes to."""
@@ -81,8 +84,7 @@ class WholeBlocks:
 
     def updated(self, number: int) -> Any:
         """Solve with all data of that stance new."""
-        A, b = self._new[number % len(self._new)]
-        self._solver.update(A=A, b=b)
+        self._solver.update(**self._new[number % len(self._new)])
         return self._solver.solve()
 
 
