@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Hashable, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -18,68 +18,81 @@ from hand_models.contact_states import ClosedFinger, Closing, cling, close_all
 from hand_models.errors import InvalidInputError
 from hand_models.finger import PHALANGES
 from hand_models.frames import Array
-from hand_models.laid_loads import stays
+from hand_models.laid_loads import LaidLoads, stays
 from hand_models.laying import KINDS, Laid
-from hand_models.placed_hands import PlacedHands
+from hand_models.placed_hands import PlacedHands, Placement
 from hand_models.postures import FREE, STOPS
 from hand_models.settled_hand import FINGERS, HandPostures
 from hand_models.settling import intrusion
 
+if TYPE_CHECKING:
+    from hand_models.hand import SpinyHand
+
 __all__ = ["ClosedFingers", "close_fingers"]
 
 Row = list[float]
-"""All numbers of a closed finger, one after the other; see `ClosedFingers`."""
+"""All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
 
-ENDS: Final = np.cumsum([3, 6, 3, 3, 3, 12, 18]).tolist()
-"""Where each kind of numbers ends in a row."""
+ANGLE, ALONG, JOINT, LOADS, CODES, PLACES = 0, 1, slice(2, 4), slice(4, 8), slice(8, 10), 10
+"""Numbers of a phalanx: its angle [rad], contact and joint [m]; its shear and normal load, each at
+zero tension [N] and per newton; the codes of its contact and its joint's stop; and in the finger's
+plane, each in homogeneous coordinates, its contact and its axes of shear and of normal load."""
 
-NOWHERE: Final = [0.0] * ENDS[-1]
+TILE: Final = slice(LOADS.start, CODES.stop - 1)
+"""Those that are its tile's as they are: the loads, and the code of the contact."""
+
+NUMBERS: Final = PLACES + 9
+
+NOWHERE: Final = [0.0] * (len(PHALANGES) * NUMBERS)
 """In place of a finger of a hand that cannot be where it is."""
 
 
 class ClosedFingers:
-    """The fingers of n hands, closed; attributes hand by hand, finger by finger.
+    """The fingers of n hands, closed.
 
     Parameters
     ----------
-    rows : sequence of list of float, length 4 n
+    rows : sequence of list of float
+        Of fingers that differ.
+    row_of : sequence of int, length 4 n
+        Index of each finger's row, hand by hand.
     alone : dict of int to ClosedFinger
         Fingers that could not be left as they were laid.
 
     Attributes
     ----------
-    angles, joints, alongs, kinds, stops : ndarray, shapes (n, 4, 3)
-        As of `HandPostures`.
-    loads : ndarray, shape (n, 4, 3, 2, 2)
-        Shear and normal load of each phalanx, at zero tension [N] and per newton.
-    places : ndarray, shape (n, 4, 9, 2)
-        In each finger's plane: contacts [m], then axes of shear, then of normal load.
+    places : ndarray, shape (n, 4, 9, 3)
+        In each finger's plane, phalanx by phalanx, where its contact is [m] and its axes of shear
+        and of normal load; (x, z, 1) for places, (x, z, 0) for directions.
+    tiles : ndarray, shape (n, 4, 3, 5)
+        Shear and normal load of each phalanx, each at zero tension [N] and per newton, and the code
+        of its contact.
     """
 
-    def __init__(self, rows: Sequence[Row], alone: dict[int, ClosedFinger]) -> None:
+    def __init__(
+        self, rows: Sequence[Row], row_of: Sequence[int], alone: dict[int, ClosedFinger]
+    ) -> None:
         self.alone = alone
-        alike = {id(row): row for row in rows}
-        index = {each: i for i, each in enumerate(alike)}
-        table = np.array(list(alike.values())).take([index[id(row)] for row in rows], axis=0)
-        a, b, c, _, e, f, g = ENDS
-        shape = len(rows) // len(FINGERS), len(FINGERS), len(PHALANGES)
-        self.angles = table[:, :a].reshape(shape)
-        self.joints = table[:, a:b].copy().view(complex).reshape(shape)
-        self.alongs = table[:, b:c].reshape(shape)
-        codes = table[:, c:e].astype(np.int8)
-        self.kinds, self.stops = (codes[:, i : i + 3].reshape(shape) for i in (0, 3))
-        self.loads = table[:, e:f].reshape(*shape, 2, 2)
-        self.places = table[:, f:g].reshape(*shape[:2], 3 * len(PHALANGES), 2)
+        count = len(FINGERS)
+        shape = len(row_of) // count, count, len(PHALANGES), NUMBERS
+        self._table = np.array(rows).take(row_of, axis=0).reshape(shape)
+        self._table.setflags(write=False)
+        self.places = self._table[..., PLACES:].reshape(-1, count, 3 * len(PHALANGES), 3)
+        self.tiles = self._table[..., TILE]
 
     def of_hands(self) -> list[HandPostures]:
         """Return how the fingers of each hand stand; arrays are read-only."""
-        numbers = self.angles, self.joints, self.alongs, self.kinds, self.stops
-        for each in numbers:
-            each.setflags(write=False)
-        return [HandPostures(*hand) for hand in zip(*numbers, strict=True)]
+        table = self._table
+        codes = table[..., CODES].astype(np.int8)
+        codes.setflags(write=False)
+        joints = table[..., JOINT].view(complex)
+        numbers = (table[..., ANGLE], joints[..., 0], table[..., ALONG], codes[..., 0])
+        return [HandPostures(*hand) for hand in zip(*numbers, codes[..., 1], strict=True)]
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
         """Return finger, joint and torque of each joint of a hand that stands at a limit."""
+        if not self.alone:
+            return ()
         stops = []
         for finger in range(len(FINGERS)):
             alone = self.alone.get(len(FINGERS) * index + finger)
@@ -95,7 +108,7 @@ class ClosedFingers:
 
 def close_fingers(
     placed: PlacedHands,
-    laid: Sequence[list[Laid]],
+    laid: Sequence[Sequence[list[Laid]]],
     tensions: Sequence[float],
     errors: dict[int, InvalidInputError],
 ) -> ClosedFingers:
@@ -104,44 +117,53 @@ def close_fingers(
     Parameters
     ----------
     placed : PlacedHands
-    laid : sequence of list of Laid, length 4 n
-        Phalanges of their fingers that rest on smooth rock, one after the other; equal ones for
+    laid : sequence of sequence of list of Laid, lengths n and 4
+        Phalanges of their fingers that rest on smooth rock, one after the other; the same ones for
         fingers that are alike.
     tensions : sequence of float, length n
         Closing tension of each hand [N].
     errors : dict of int to InvalidInputError
         Why hands cannot be where they are; those that cannot close are added.
     """
-    hand, height = placed.hand, placed.hand.finger.tile_height
-    rows = [NOWHERE] * len(laid)
-    known: dict[Hashable, Row] = {}
+    hand, rows, row_of = placed.hand, [NOWHERE], [0] * (len(FINGERS) * len(laid))
     left: list[int] = []
     for i, (placement, tension) in enumerate(zip(placed.placements, tensions, strict=True)):
         if i in errors:
             continue
-        surface, clings = placement.surface, placement.grasp.fingernail
-        for k in range(len(FINGERS) * i, len(FINGERS) * (i + 1)):
-            phalanges, base_tile = laid[k], hand.rubbing[k % len(FINGERS)]
-            row = None
-            if len(phalanges) == len(PHALANGES) and not clings:
-                key = id(phalanges), tension, base_tile, id(surface)
-                row = known.get(key)
+        known: dict[Hashable, int] = {}
+        for k, (phalanges, base_tile) in enumerate(
+            zip(laid[i], hand.rubbing, strict=True), len(FINGERS) * i
+        ):
+            key = id(phalanges), base_tile
+            if key not in known:
+                row = _row_laid(hand, placement, phalanges, tension, base_tile)
                 if row is None:
-                    loads = hand.tendon_loads.loads(phalanges, tension, base_tile)
-                    if loads is not None and stays(phalanges, loads, surface, tension):
-                        row = known[key] = _row(phalanges, height, *loads)
-            if row is None:
-                left.append(k)
-            else:
-                rows[k] = row
+                    left.append(k)
+                    continue
+                known[key] = len(rows)
+                rows.append(row)
+            row_of[k] = known[key]
     alone: dict[int, ClosedFinger] = {}
     for k, finger in zip(left, _alone(placed, left, tensions), strict=True):
         i = k // len(FINGERS)
         if finger is not None:
-            alone[k], rows[k] = finger, _row_alone(finger)
+            alone[k], row_of[k] = finger, len(rows)
+            rows.append(_row_alone(finger))
         elif i not in errors:
             errors[i] = _no_way(placed, i, k % len(FINGERS))
-    return ClosedFingers(rows, alone)
+    return ClosedFingers(rows, row_of, alone)
+
+
+def _row_laid(
+    hand: SpinyHand, placement: Placement, laid: list[Laid], tension: float, base_tile: bool
+) -> Row | None:
+    """Return the numbers of a finger that can be left as it is laid."""
+    if len(laid) < len(PHALANGES) or placement.grasp.fingernail:
+        return None
+    loads = hand.tendon_loads.loads(laid, tension, base_tile)
+    if loads is None or not stays(laid, loads, placement.surface, tension):
+        return None
+    return _row(laid, hand.finger.tile_height, loads)
 
 
 def _alone(
@@ -154,13 +176,13 @@ def _alone(
     closed: dict[Hashable, ClosedFinger | None] = {}
     for k in left:
         i, finger = divmod(k, len(FINGERS))
-        placement, cut = placed.placements[i], placed.cut_key(i, finger)
+        placement, cuts = placed.placements[i], placed.cuts(i)
         if placement.grasp.fingernail:
             keys.append(k)
             closed[k] = cling(hand.finger, placed.section(i, finger))
             continue
         given = placement.surface, tensions[i], hand.rubbing[finger]
-        key = (k if cut is None else cut, *given)
+        key = (k if cuts is None else (cuts[0], cuts[1][finger]), *given)
         keys.append(key)
         if key not in closings:
             closings[key] = Closing(placed.section(i, finger), *given)
@@ -187,28 +209,16 @@ def _no_way(placed: PlacedHands, index: int, finger: int) -> InvalidInputError:
 def _row(
     phalanges: Sequence[Laid],
     height: float,
-    shears: Sequence[Sequence[float]],
-    normals: Sequence[Sequence[float]],
+    loads: LaidLoads,
     stops: Sequence[int] = (FREE,) * len(PHALANGES),
 ) -> Row:
     """Return the numbers of a finger; ``height`` of its tiles above the phalanges [m]."""
-    angles, directions, joints, alongs, kinds = zip(*phalanges, strict=True)
-    row = [*angles]
-    for q in joints:
-        row += q.real, q.imag
-    row += alongs
-    row += kinds
-    row += stops
-    for shear, normal in zip(shears, normals, strict=True):
-        row += shear
-        row += normal
-    for q, c, u in zip(joints, alongs, directions, strict=True):
-        place = q + complex(c, height) * u
-        row += place.real, place.imag
-    for u in directions:
-        row += -u.real, -u.imag
-    for u in directions:
-        row += -u.imag, u.real
+    row: Row = []
+    for (angle, u, joint, along, kind), t, n, stop in zip(phalanges, *loads, stops, strict=True):
+        place = joint + complex(along, height) * u
+        row += (angle, along, joint.real, joint.imag)
+        row += (t.real, t.imag, n.real, n.imag, kind, stop)
+        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 
 
@@ -219,6 +229,8 @@ def _row_alone(closed: ClosedFinger) -> Row:
         Laid(c.angle, cmath.rect(1.0, c.angle), complex(*c.joint), c.along, KINDS.index(c.kind))
         for c in contacts
     ]
+    (t_0, t_1, t_2), (n_0, n_1, n_2) = (
+        [complex(*load) for load in loads.tolist()] for loads in (closed.shears, closed.normals)
+    )
     stops = [STOPS.index(c.stop) for c in contacts]
-    loads = closed.shears.tolist(), closed.normals.tolist()
-    return _row(phalanges, model.tile_height, *loads, stops)
+    return _row(phalanges, model.tile_height, LaidLoads((t_0, t_1, t_2), (n_0, n_1, n_2)), stops)

@@ -15,7 +15,7 @@ from hand_models.frames import Array, Pose
 from hand_models.holds import Hold
 from hand_models.laying import NONE
 from hand_models.sections import Section
-from hand_models.settled_hand import FINGERS, NAIL
+from hand_models.settled_hand import FINGERS
 
 if TYPE_CHECKING:
     from hand_models.hand import SpinyHand
@@ -30,8 +30,6 @@ __all__ = [
     "KIND",
     "NORMAL",
     "OUTER",
-    "PARTS",
-    "PLACES",
     "POSITION",
     "SHEAR",
     "TILES",
@@ -47,23 +45,18 @@ OUTER: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
 BASES: Final = len(FINGERS[OUTER])
 """How many these are."""
 
-JOINTS: Final = slice(0, len(FINGERS))
-"""Rows of `FingerFrames.rows` that are the fingers' proximal joints."""
+TILES: Final = slice(0, -2 * len(FINGERS) - 1)
+"""Rows of `FingerFrames.rows` that are tiles which do not turn toward the rock: the two base tiles,
+then the palm's."""
 
-TILES: Final = slice(len(FINGERS), -len(FINGERS) - 1)
-"""Those that are tiles which do not turn toward the rock: the two base tiles, then the palm's."""
+JOINTS: Final = slice(TILES.stop, TILES.stop + len(FINGERS))
+"""Those that are the fingers' proximal joints."""
 
-PLACES: Final = slice(0, TILES.stop)
-"""Those that are places."""
-
-ALONG: Final = slice(TILES.stop, -1)
+ALONG: Final = slice(JOINTS.stop, -1)
 """Those that are the directions of the fingers."""
 
 INTO: Final = -1
 """The one that is the direction z of H, into the rock."""
-
-PARTS: Final = ("base", *PHALANGES, NAIL)
-"""Tiles that a finger may have, and its nail."""
 
 POSITION, AXES, SHEAR, NORMAL, KIND = slice(0, 3), slice(3, 12), slice(12, 14), slice(14, 16), 16
 """Numbers of a tile: where it is [m], its axes row by row, its loads at zero tension [N] and per
@@ -133,24 +126,35 @@ class FingerFrames:
 
     @cached_property
     def rows(self) -> Array:
-        """All that is seen from a hold, shape (t + 11, 3); see `JOINTS` and its like [m]."""
+        """All that is seen from a hold, shape (t + 11, 4); see `TILES` and its like.
+
+        In homogeneous coordinates: (p, 1) for a place p [m], (d, 0) for a direction d.
+        """
         joints, alongs = ([getattr(f, name) for f in self.fingers] for name in ("joint", "along"))
-        return np.vstack([joints, self.bases, self.palm, alongs, UP])
+        places, directions = np.vstack([self.bases, self.palm, joints]), np.vstack([alongs, UP])
+        return np.vstack([np.insert(places, 3, 1.0, axis=1), np.insert(directions, 3, 0.0, axis=1)])
 
     @cached_property
     def planes(self) -> Array:
-        """Axes of the fingers' planes F, along each finger and into the rock, (4, 2, 3)."""
-        return np.stack([np.stack([frame.along, UP]) for frame in self.fingers])
+        """Fingers' planes F, (4, 3, 3): along, into the rock, the joint; (x, z, 1) there is x, z.
+
+        And (x, z, 0) is a direction.
+        """
+        return np.array([(frame.along, UP, frame.joint) for frame in self.fingers])
 
     @cached_property
-    def parts(self) -> Array:
-        """Numbers of the fingers' `PARTS` where none is turned nor touches, (4, 5, `COLUMNS`)."""
-        parts = np.zeros((len(FINGERS), len(PARTS), COLUMNS))
-        parts[OUTER, PARTS.index("base"), POSITION] = self.bases
-        for finger, frame in zip(parts, self.fingers, strict=True):
-            finger[:, AXES] = np.concatenate([-frame.along, UP, frame.across])
-        parts[..., KIND] = NONE
-        return parts
+    def across(self) -> Array:
+        """Across the fingers, for each of their phalanges, (4, 3, 3)."""
+        return np.array([[frame.across] * len(PHALANGES) for frame in self.fingers])
+
+    @cached_property
+    def base_tiles(self) -> Array:
+        """Numbers of the base tiles where they touch nothing, (2, `COLUMNS`)."""
+        tiles = np.zeros((BASES, COLUMNS))
+        tiles[:, POSITION], tiles[:, KIND] = self.bases, NONE
+        for tile, frame in zip(tiles, self.fingers[OUTER], strict=True):
+            tile[AXES] = np.concatenate([-frame.along, UP, frame.across])
+        return tiles
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,25 +164,28 @@ class FrameStack:
     Attributes
     ----------
     hands : tuple of FingerFrames
-    rows : ndarray, shape (n, t + 11, 3)
+    rows : ndarray, shape (n, t + 11, 4)
         Of `FingerFrames.rows`.
-    planes : ndarray, shape (n, 4, 2, 3)
+    planes : ndarray, shape (n, 4, 3, 3)
         Of `FingerFrames.planes`.
-    parts : ndarray, shape (n, 4, 5, `COLUMNS`)
-        Of `FingerFrames.parts`.
+    across : ndarray, shape (n, 4, 3, 3)
+        Of `FingerFrames.across`.
+    base_tiles : ndarray, shape (n, 2, `COLUMNS`)
+        Of `FingerFrames.base_tiles`.
     """
 
     hands: tuple[FingerFrames, ...]
     rows: Array
     planes: Array
-    parts: Array
+    across: Array
+    base_tiles: Array
 
     @classmethod
     def of(cls, hands: Sequence[FingerFrames]) -> FrameStack:
         """Stack frames, read-only."""
         stacks = [
             np.array([getattr(frames, name) for frames in hands])
-            for name in ("rows", "planes", "parts")
+            for name in ("rows", "planes", "across", "base_tiles")
         ]
         for stack in stacks:
             stack.setflags(write=False)

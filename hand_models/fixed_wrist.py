@@ -10,32 +10,22 @@ together: sums over the tiles of each finger, of their places p and forces F,
 
     Σ (1, p) ⊗ F,    F at zero tension, per newton of tension and per newton of lateral reaction,
 
-hold the wrenches of all columns; what then goes where is in `row_entries`.
+hold the wrenches of all columns; what then goes where is in `many_entries`.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Final, NamedTuple
-from weakref import WeakKeyDictionary
+from typing import Final
 
 import numpy as np
 
 from hand_models.errors import InvalidInputError
-from hand_models.frames import Array, Indices, skew
+from hand_models.frames import Array, skew
 from hand_models.hand import FINGERS, SettledHand
-from hand_models.row_entries import (
-    WRENCH_PARTS,
-    Entries,
-    entries_of,
-    hand_sources,
-    surface_sources,
-)
-from hand_models.row_layout import KEPT as KEPT_LAYOUTS
+from hand_models.many_entries import ManyEntries, many_entries
 from hand_models.row_layout import RowLayout, layout_of
 from hand_models.structure import HELD
 from hand_models.wrench_space import WrenchSpace
@@ -66,10 +56,6 @@ def _moments() -> Array:
 
 MOMENTS: Final = _moments()
 """From (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
-
-
-_kept: WeakKeyDictionary[SettledHand, dict[float, WrenchSpace]] = WeakKeyDictionary()
-"""Sets of hands that somebody still has, by their largest tension."""
 
 
 def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> WrenchSpace:
@@ -117,96 +103,88 @@ def wrench_spaces(
     found: dict[SettledHand, WrenchSpace] = {}
     new: dict[SettledHand, float] = {}
     for hand, limit in zip(settled, limits, strict=True):
-        known = _kept.get(hand, {}).get(limit)
+        known = hand.sets.get(limit)
         if known is None:
             new[hand] = limit
         else:
             found[hand] = known
     if new:
-        for hand, space in zip(new, _worked_out(list(new), list(new.values())), strict=True):
-            found[hand] = space
-            kept = _kept.setdefault(hand, {})
-            kept[new[hand]] = space
-            for limit in list(kept)[:-KEPT]:
-                kept.pop(limit, None)
+        for (hand, limit), space in zip(new.items(), _worked_out(new), strict=True):
+            found[hand] = hand.sets[limit] = space
+            if len(hand.sets) > KEPT:
+                for known_limit in list(hand.sets)[:-KEPT]:
+                    hand.sets.pop(known_limit, None)
     return [found[hand] for hand in settled]
 
 
-def _worked_out(settled: Sequence[SettledHand], limits: Sequence[float]) -> list[WrenchSpace]:
+def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
     """Return the sets of hands for each hand's largest tension [N]."""
-    layouts = [layout_of(hand, sticking=hand.hand.finger.friction > 0.0) for hand in settled]
-    entries = [entries_of(layout) for layout in layouts]
-    tiles = _tiles_of(tuple(entries))
-    # tiles of all hands along the last axis
-    loads = np.concatenate([hand.loads for hand in settled]).transpose(2, 1, 0)
-    axes = np.concatenate([hand.axes for hand in settled]).transpose(1, 2, 0)
-    arms = np.ones((4, loads.shape[2]))
-    arms[1:] = np.concatenate([hand.positions for hand in settled]).T
-
-    forces = np.empty((3, 3, loads.shape[2]))
-    np.add(loads[:, :1] * axes[0], loads[:, 1:] * axes[1], out=forces[:2])
-    np.multiply(axes[2], tiles.shares, out=forces[2])
-    of_tiles = np.empty((3 * 12 + 2, loads.shape[2]))
-    np.multiply(arms[:, None], forces[:, None], out=of_tiles[:-2].reshape(3, 4, 3, -1))
-    of_tiles[-2:] = loads[:, 0]
-    of_fingers = np.add.reduceat(of_tiles, tiles.starts, axis=1)
-    sums = np.empty((3 * WRENCH_PARTS + 2, of_fingers.shape[1]))
-    np.matmul(
-        MOMENTS,
-        of_fingers[:-2].reshape(3, 12, -1),
-        out=sums[:-2].reshape(3, WRENCH_PARTS, -1),
+    hands = list(limits)
+    layouts = [layout_of(hand, sticking=hand.hand.finger.friction > 0.0) for hand in hands]
+    entries = many_entries(
+        tuple(layouts),
+        tuple([hand.hand for hand in hands]),
+        tuple([hand.surface for hand in hands]),
     )
-    sums[-2:] = of_fingers[-2:]
-    of_hands = sums.reshape(-1, len(settled), len(FINGERS))
-    at_zero = of_hands[:WRENCH_PARTS].sum(axis=2).T
-    by_finger = of_hands[WRENCH_PARTS:].transpose(1, 0, 2).reshape(len(settled), -1)
-
-    spaces = []
-    for i, (hand, layout) in enumerate(zip(settled, layouts, strict=True)):
-        surface, palm = surface_sources(hand.surface), hand.palm
+    loads = np.concatenate([hand.loads for hand in hands])
+    wrenches, shears = _sums(hands, loads, entries)
+    at_zero = np.add.reduce(wrenches[:, 0].reshape(-1, len(FINGERS)), axis=1)
+    given: list[float] = []
+    further: list[Array] = []
+    for (hand, limit), layout in zip(limits.items(), layouts, strict=True):
+        palm = hand.palm
         x, y, z = palm.centre.tolist()
-        planar = loads[:, :, tiles.ends[i] : tiles.ends[i + 1]].swapaxes(0, 1).reshape(2, -1)
-        own = hand.loads.ravel()
-        sources = (
-            hand_sources(hand.hand),
-            surface.sources,
-            (limits[i], -hand.closing_tension, palm.shear_limit, palm.pressing_limit, -z, y, -x),
-            own,
-            -own,
-            (surface.planar @ planar).ravel(),
-            by_finger[i],
-            at_zero[i],
-            *(_stops_and_nails(hand, layout) if layout.stops or layout.nail_columns else ()),
-        )
-        spaces.append(_assembled(layout, entries[i], np.concatenate(sources)))
-    return spaces
+        given += (limit, -hand.closing_tension, palm.shear_limit, palm.pressing_limit, -z, y, -x)
+        if layout.stops or layout.nail_columns:
+            further += _stops_and_nails(hand, layout)
+    own = loads.ravel()
+    planes = entries.planes * loads.reshape(-1, 4).take(entries.plane_tiles, axis=0)
+    planar = (planes[:, :2] + planes[:, 2:]).ravel()
+    sources = np.concatenate(
+        [
+            *(entries.constants, given, own, -own, planar),
+            *(wrenches.ravel(), shears.ravel(), at_zero, *further),
+        ]
+    )
+    numbers = sources.take(entries.index)
+    numbers.setflags(write=False)
+    return [
+        _assembled(layout, ends, numbers)
+        for layout, ends in zip(layouts, entries.ends, strict=True)
+    ]
 
 
-class _Tiles(NamedTuple):
-    """The tiles of some hands, one hand after another.
+def _sums(
+    settled: Sequence[SettledHand], loads: Array, entries: ManyEntries
+) -> tuple[Array, Array]:
+    """Return sums over the tiles of each finger, of hands one after another.
 
-    Attributes
+    Parameters
     ----------
-    ends : tuple of int, length hands + 1
-        Where each hand's begin, and where the last one's end.
-    starts : ndarray of int, shape (fingers of all hands,)
-        First tile of each finger.
-    shares : ndarray, shape (n,)
-        Part of its finger's lateral reaction that each tile carries.
+    settled : sequence of SettledHand
+    loads : ndarray, shape (n, 2, 2)
+        Of all their tiles.
+    entries : ManyEntries
+
+    Returns
+    -------
+    wrenches : ndarray, shape (`WRENCH_PARTS`, 3, fingers)
+        At zero tension, per newton of tension and per newton of lateral reaction.
+    shears : ndarray, shape (fingers, 2)
+        At zero tension, and per newton of it.
     """
-
-    ends: tuple[int, ...]
-    starts: Indices
-    shares: Array
-
-
-@lru_cache(maxsize=KEPT_LAYOUTS)
-def _tiles_of(entries: tuple[Entries, ...]) -> _Tiles:
-    """Return the tiles of hands whose numbers come from these entries."""
-    ends = tuple(itertools.accumulate((len(each.shares) for each in entries), initial=0))
-    starts = [each.starts + end for each, end in zip(entries, ends, strict=False)]
-    shares = [each.shares for each in entries]
-    return _Tiles(ends, np.concatenate(starts), np.concatenate(shares))
+    axes = np.concatenate([hand.axes for hand in settled])
+    places = np.concatenate([hand.positions for hand in settled])
+    # F three times, first in the tile's axes, then in H
+    forces = entries.sideways.copy()
+    forces[:, :2, :2] = loads.transpose(0, 2, 1)
+    forces = (forces @ axes).reshape(-1, 1, 9)
+    arms = np.concatenate([entries.ones, places], axis=1)
+    of_tiles = (arms[:, :, None] * forces).reshape(-1, 36)
+    # not as a product of matrices: its last digits would depend on how many hands there are
+    sums = np.add.reduceat(of_tiles, entries.starts).reshape(-1, 4, 3, 3)
+    wrenches = MOMENTS @ sums.transpose(1, 3, 2, 0).reshape(12, -1)
+    return wrenches.reshape(len(MOMENTS), 3, -1), np.add.reduceat(loads[:, 0], entries.starts)
 
 
 def _stops_and_nails(settled: SettledHand, layout: RowLayout) -> list[Array]:
@@ -233,21 +211,19 @@ def _stops_and_nails(settled: SettledHand, layout: RowLayout) -> list[Array]:
     ]
 
 
-def _assembled(layout: RowLayout, entries: Entries, sources: Array) -> WrenchSpace:
-    """Return the set of a layout whose numbers come from these sources."""
-    numbers = sources.take(entries.index)
-    numbers.setflags(write=False)
+def _assembled(layout: RowLayout, ends: tuple[int, ...], numbers: Array) -> WrenchSpace:
+    """Return the set of a layout whose numbers are between these ends."""
     m = len(layout.columns)
-    a, b, c, d, e, f = entries.ends
+    a, b, c, d, e, f, g, last = ends
     return WrenchSpace.assembled(
-        origin=numbers[:a],
-        generators=numbers[a:b].reshape(6, m),
+        origin=numbers[a:b],
+        generators=numbers[b:c].reshape(6, m),
         columns=layout.columns,
         rows=layout.rows,
-        L=numbers[b:c].reshape(-1, m),
-        l0=numbers[c:d],
-        s=numbers[d:e],
-        H=numbers[e:f].reshape(-1, m),
-        h=numbers[f:],
+        L=numbers[c:d].reshape(-1, m),
+        l0=numbers[d:e],
+        s=numbers[e:f],
+        H=numbers[f:g].reshape(-1, m),
+        h=numbers[g:last],
         D=HELD_ROWS,
     )

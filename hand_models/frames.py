@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -68,10 +68,14 @@ class Pose:
         Origin of the child in the parent [m].
     rotation : ndarray, shape (3, 3)
         Columns are the child's axes in the parent.
+    proper : bool
+        Whether it is known to be finite, its axes orthonormal and right-handed; then its arrays are
+        read-only. False where nobody has looked.
     """
 
     position: Array
     rotation: Array
+    proper: bool = field(default=False, init=False)
 
     @classmethod
     def identity(cls) -> Pose:
@@ -90,15 +94,15 @@ class Pose:
             If a number is not finite or the norm is off by more than
             `QUATERNION_NORM_TOLERANCE`.
         """
-        q = finite_vector(orientation, 4, "orientation")
-        norm = math.hypot(*q.tolist())
+        q = finite_vector(orientation, 4, "orientation").tolist()
+        norm = math.hypot(*q)
         if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
             raise InvalidInputError(
                 f"a quaternion [x, y, z, w] of norm 1 ± {QUATERNION_NORM_TOLERANCE:g} is needed, "
                 f"the norm is {norm:.6g}",
                 field="orientation",
             )
-        x, y, z, w = (q / norm).tolist()
+        x, y, z, w = [component / norm for component in q]
         rotation = np.array(
             [
                 [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
@@ -106,7 +110,12 @@ class Pose:
                 [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
             ]
         )
-        return cls(finite_vector(position, 3, "position"), rotation)
+        place = np.array(finite_vector(position, 3, "position"))
+        place.setflags(write=False)
+        rotation.setflags(write=False)
+        pose = cls(place, rotation)
+        object.__setattr__(pose, "proper", True)
+        return pose
 
     def quaternion(self) -> Array:
         """Return the orientation as ``[x, y, z, w]``, shape (4,), with w ≥ 0."""
@@ -171,8 +180,9 @@ def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
         The frames in the world.
     """
     inverse = body.rotation.T
-    rotations = inverse @ np.array([pose.rotation for pose in poses])
-    places = (np.array([pose.position for pose in poses]) - body.position) @ body.rotation
+    rotations = inverse @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+    places = np.concatenate([pose.position for pose in poses]).reshape(-1, 3)
+    places = (places - body.position) @ body.rotation
     transports = np.zeros((len(poses), 6, 6))
     transports[:, :3, :3] = transports[:, 3:, 3:] = rotations
     crosses = (places @ SKEW.reshape(3, 9)).reshape(-1, 3, 3)

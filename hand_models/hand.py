@@ -29,10 +29,9 @@ from hand_models.holds import Hold
 from hand_models.hooked_nails import no_nails
 from hand_models.laid_loads import TendonLoads
 from hand_models.laying import Layer
-from hand_models.outlined import OutlinedHold
-from hand_models.palm import PalmTendon
+from hand_models.palm import PalmTendon, shear_capacity
 from hand_models.parameters import ParameterTable, hand_table
-from hand_models.placed_hands import Placement
+from hand_models.placed_hands import Placement, PlacementKey
 from hand_models.recent import Recent
 from hand_models.seating import Seating, seat
 from hand_models.sections import Section
@@ -71,6 +70,9 @@ KEPT: Final = 256
 SCANS: Final = 16
 """Settled hands on meshes and profiles that are kept, those used last."""
 
+SHARES: Final = 512
+"""Choices of palm tiles, and of what one holds, whose shares are kept."""
+
 ROTATIONS: Final = 64
 """Choices of outer rotations for which frames are kept, at most."""
 
@@ -100,6 +102,7 @@ class SpinyHand:
         self.settled: Recent[Hashable, SettledHand] = Recent(KEPT)
         self.settled_scans: Recent[Hashable, SettledHand] = Recent(SCANS)
         self._frames: dict[tuple[float, ...], FrameStack] = {}
+        self.palm_share = lru_cache(maxsize=SHARES)(self._palm_share)
         self.finger = FingerModel.from_table(table)
         self.drive = TendonDrive.from_table(table)
         self.structure = Structure.from_table(table)
@@ -129,8 +132,10 @@ class SpinyHand:
         self.torsional_stiffness = table.positive("beam", "torsional_stiffness")
         self.seated_contact = table.scalar("finger", "seated_contact")
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
+        self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))
         self.outer_reach = table.scalar("fingers", "outer_reach")
+        self.pinch_crest = 0.5 * (x + self.outer_axis.item(0) - self.outer_reach)
         self.base_tile_reach = table.scalar("fingers", "base_tile_reach")
         self.base_tile_surface = table.scalar("fingers", "base_tile_surface")
         self.palm_tiles = np.array(
@@ -181,6 +186,20 @@ class SpinyHand:
             found = FrameStack.of([FingerFrames.of(self, angle) for angle in outer_rotations])
             self._frames[outer_rotations] = found
         return found
+
+    def _palm_share(
+        self, engaged: tuple[int, ...], tile_limit: float
+    ) -> tuple[float, float, float]:
+        """Return x and y of the centre of palm tiles [m], and what shear they share [N].
+
+        Zeros for no tiles. ``tile_limit`` is what one holds [N].
+        """
+        if not engaged:
+            return 0.0, 0.0, 0.0
+        x, y, _ = self.palm_tiles[list(engaged)].mean(axis=0).tolist()
+        stiffness = tuple([self.palm_contact[i] for i in engaged])
+        friction = self.palm_friction, tile_limit, self.palm_own_friction
+        return x, y, shear_capacity(stiffness, self.palm_spring, *friction)
 
     def seat(self, hold: Hold, grasp: Grasp) -> Seating:
         """Seat the hand on a hold that was given no place; see `hand_models.seating`."""
@@ -238,7 +257,7 @@ class SpinyHand:
             In order; the error that `settle` would raise in place of a hand that cannot be where
             it is.
         """
-        scanned = [isinstance(each.hold, OutlinedHold) for each in placements]
+        scanned = [each.hold.scanned for each in placements]
         if not any(scanned):
             return self._known_or_settled(self.settled, placements)
         smooth, rough = (
@@ -255,32 +274,22 @@ class SpinyHand:
     def _known_or_settled(
         self, store: Recent[Hashable, SettledHand], placements: Sequence[Placement]
     ) -> list[SettledHand | InvalidInputError]:
-        keys = [_key(each) for each in placements]
-        known = store.find(keys)
-        if None not in known:
-            return [settled for settled in known if settled is not None]
-        new = {
-            key: each
-            for key, each, settled in zip(keys, placements, known, strict=True)
-            if settled is None
-        }
-        outcomes = dict(zip(new, settle_hands(self, list(new.values())), strict=True))
-        store.keep(
-            (key, outcome) for key, outcome in outcomes.items() if isinstance(outcome, SettledHand)
-        )
-        return [
-            outcomes[key] if settled is None else settled
-            for key, settled in zip(keys, known, strict=True)
-        ]
-
-
-def _key(placement: Placement) -> Hashable:
-    """Return what a settled hand depends on, as a key; the place by its digits."""
-    hold, surface, grasp, pose = placement
-    if pose is None:
-        return hold, surface, grasp
-    place = np.asarray(pose.position, dtype=float), np.asarray(pose.rotation, dtype=float)
-    return hold, surface, grasp, place[0].tobytes(), place[1].tobytes()
+        keys = [PlacementKey(each) for each in placements]
+        known: list[SettledHand | InvalidInputError | None] = [*store.find(keys)]
+        new: dict[PlacementKey, list[int]] = {}
+        for i, key in enumerate(keys):
+            if known[i] is None:
+                new.setdefault(key, []).append(i)
+        if new:
+            outcomes = settle_hands(self, [placements[alike[0]] for alike in new.values()])
+            kept: list[tuple[Hashable, SettledHand]] = []
+            for (key, alike), outcome in zip(new.items(), outcomes, strict=True):
+                if isinstance(outcome, SettledHand):
+                    kept.append((key, outcome))
+                for i in alike:
+                    known[i] = outcome
+            store.keep(kept)
+        return [outcome for outcome in known if outcome is not None]
 
 
 def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:

@@ -36,6 +36,9 @@ class Hold(ABC):
 
     shape: str
 
+    scanned = False
+    """Whether it is known by much data, rather than by a few numbers."""
+
     @property
     def swept(self) -> Swept | None:
         """The hold as a ball that is swept along faces, if it is one."""
@@ -159,7 +162,8 @@ class _Extruded(Hold):
         )
 
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        return self.profile_radius, self.profile_radius
+        radius = self.profile_radius
+        return radius, radius
 
 
 def _profile_entry(p: Vector2, d: Vector2, radius: float, faces: Array) -> float:

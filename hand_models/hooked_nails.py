@@ -9,9 +9,10 @@ import numpy as np
 
 from hand_models.closed_fingers import ClosedFingers
 from hand_models.errors import InvalidInputError
-from hand_models.finger_frames import AXES, KIND, NORMAL, PARTS, POSITION, UP
+from hand_models.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
 from hand_models.fingernail import Fingernail
 from hand_models.frames import Array
+from hand_models.laying import NONE
 from hand_models.placed_hands import PlacedHands
 from hand_models.settled_hand import CONTACTS, FINGERS, NAIL
 
@@ -26,11 +27,14 @@ class Nails(NamedTuple):
     angles : ndarray, shape (4,)
     normals : ndarray, shape (4, 3)
     rows : tuple of (ndarray, ndarray)
+    tiles : ndarray, shape (4, `COLUMNS`), or None
+        Numbers of the nails as tiles; None of a hand that does not cling with them.
     """
 
     angles: Array
     normals: Array
     rows: tuple[tuple[Array, Array], ...]
+    tiles: Array | None = None
 
 
 def no_nails(nail: Fingernail) -> Nails:
@@ -41,17 +45,13 @@ def no_nails(nail: Fingernail) -> Nails:
     return Nails(angles, normals, ())
 
 
-def hook_nails(
-    placed: PlacedHands, closed: ClosedFingers, parts: Array, index: int, closing: float
-) -> Nails:
-    """Return where the nails of a hand hook whose fingers are straight, and add them to its parts.
+def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: float) -> Nails:
+    """Return where the nails of a hand hook whose fingers are straight.
 
     Parameters
     ----------
     placed : PlacedHands
     closed : ClosedFingers
-    parts : ndarray, shape (n, 4, 5, `COLUMNS`)
-        Of all hands; the nails of this one are put there.
     index : int
         Of the hand.
     closing : float
@@ -64,9 +64,10 @@ def hook_nails(
     """
     nail = placed.hand.nail
     angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
-    rows = []
+    rows, tiles = [], np.zeros((len(FINGERS), COLUMNS))
+    tiles[:, KIND] = NONE
     frames = placed.frames.hands[index].fingers
-    for i, (name, frame) in enumerate(zip(FINGERS, frames, strict=True)):
+    for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=True)):
         section = placed.section(index, i)
         finger = closed.alone[len(FINGERS) * index + i].finger
         if nail.stuck(section, finger.pin):
@@ -75,7 +76,6 @@ def hook_nails(
                 "move the hand away from the rock",
                 field="hold",
             )
-        tip = parts[index, i, PARTS.index(NAIL)]
         cling = nail.cling(section, finger, closing, name.startswith("outer"))
         reach = nail.length
         if cling is not None:
@@ -90,4 +90,4 @@ def hook_nails(
         tip[AXES] = np.concatenate([-w, cosine * UP - sine * frame.along, frame.across])
     for array in (angles, normals, *(part for pair in rows for part in pair)):
         array.setflags(write=False)
-    return Nails(angles, normals, tuple(rows))
+    return Nails(angles, normals, tuple(rows), tiles)

@@ -25,6 +25,8 @@ class OutlinedHold(Hold):
         is the scale to which the rock is smoothed for its fingers.
     """
 
+    scanned = True
+
     def __init__(self, hand: ParameterTable | None = None) -> None:
         self._scale = Scale.of(hand)
 

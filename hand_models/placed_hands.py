@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from hand_models.finger_frames import ALONG, INTO, JOINTS, PLACES, TILES
-from hand_models.frames import Array, Pose
+from hand_models.finger_frames import ALONG, INTO, JOINTS, TILES
+from hand_models.frames import Pose
 from hand_models.grasp import Grasp
 from hand_models.holds import Hold
 from hand_models.seating import Seating
 from hand_models.sections import Section
-from hand_models.settled_hand import FINGERS
 from hand_models.spines import Surface
 from hand_models.swept import Swept, entries
 from hand_models.swept_cuts import Plane
@@ -22,10 +21,7 @@ from hand_models.swept_cuts import Plane
 if TYPE_CHECKING:
     from hand_models.hand import SpinyHand
 
-__all__ = ["CutKey", "PlacedHands", "Placement"]
-
-CutKey = tuple[Swept, Plane]
-"""A hold and the plane that cuts it; arguments of `cut_of`."""
+__all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
 DIGITS: Final = 15
 """Of lengths in metres, and of directions, that count."""
@@ -53,6 +49,29 @@ class Placement(NamedTuple):
     hold_in_hand: Pose | None
 
 
+class PlacementKey:
+    """A placement as a key: equal where hands close alike; places are the same by their digits.
+
+    Its hash is worked out once, and asked for again and again.
+    """
+
+    __slots__ = ("_hash", "_parts")
+
+    def __init__(self, placement: Placement) -> None:
+        hold, surface, grasp, pose = placement
+        self._parts: Hashable = hold, surface, grasp
+        if pose is not None:
+            place = np.asarray(pose.position, dtype=float), np.asarray(pose.rotation, dtype=float)
+            self._parts = hold, surface, grasp, place[0].tobytes(), place[1].tobytes()
+        self._hash = hash(self._parts)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PlacementKey) and self._parts == other._parts
+
+
 class PlacedHands:
     """Hands of one kind at their holds.
 
@@ -62,80 +81,78 @@ class PlacedHands:
     placements : sequence of Placement, length n
     seatings : sequence of Seating, length n
         Where their holds are.
+    shapes : sequence of Swept or None, length n
+        Of their holds.
 
     Attributes
     ----------
     frames : FrameStack
         Of the hands.
-    seatings : list of Seating
-        As given, with copies of the poses that nobody can change.
     """
 
     def __init__(
-        self, hand: SpinyHand, placements: Sequence[Placement], seatings: Sequence[Seating]
+        self,
+        hand: SpinyHand,
+        placements: Sequence[Placement],
+        seatings: Sequence[Seating],
+        shapes: Sequence[Swept | None],
     ) -> None:
         self.hand = hand
         self.placements = placements
+        self.seatings = seatings
+        self.shapes = shapes
         self.frames = hand.frame_stack(tuple([each.grasp.outer_rotation for each in placements]))
-        positions = np.array([seating.pose.position for seating in seatings], dtype=float)
-        rotations = np.array([seating.pose.rotation for seating in seatings], dtype=float)
-        positions.setflags(write=False)
-        rotations.setflags(write=False)
-        self.seatings = [
-            Seating(Pose(position, rotation), seating.rule)
-            for position, rotation, seating in zip(positions, rotations, seatings, strict=True)
-        ]
-        self._swept = [each.hold.swept for each in placements]
-        self._shapes = np.array([shape or NOTHING for shape in self._swept])
-        # from the centre of each hold's ball, in its axes and scaled
-        rows = self.frames.rows.copy()
-        rows[:, PLACES] -= positions[:, None]
-        rows = rows @ rotations
-        rows[:, PLACES, 2] -= self._shapes[:, 3:4]
+        swept = np.array([shape or NOTHING for shape in shapes])
+        poses = [seating.pose for seating in seatings]
+        rotations = np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+        positions = np.concatenate([pose.position for pose in poses]).reshape(-1, 1, 3)
+        # from the centre of each hold's ball, in its axes
+        there = np.empty((len(poses), 4, 3))
+        there[:, :3], there[:, 3:] = rotations, -positions @ rotations
+        there[:, 3, 2] -= swept[:, 3]
         # fingers that are alike but for rounding are alike
-        self._rows = rows.round(DIGITS) * self._shapes[:, None, :3]
+        seen = (self.frames.rows @ there).round(DIGITS)
+        self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
 
-    def cut_key(self, index: int, finger: int) -> CutKey | None:
-        """Return what the rock in the plane of a finger depends on; None if it is not smooth.
+    def cuts(self, index: int) -> tuple[Swept, list[Plane]] | None:
+        """Return what the rock in the planes of a hand's fingers depends on, as `cut_of` takes it.
 
-        Equal for fingers that are mirror images of one another.
+        Planes are equal for fingers that are mirror images of one another. None if the rock is not
+        smooth.
         """
-        shape = self._swept[index]
+        shape, rows = self.shapes[index], self._seen[index]
         if shape is None:
             return None
-        along, into, origin = self._planes[index][finger]
-        (a, b, c), (d, e, f), (x, y, z) = along, into, origin
-        # every swept hold is its own mirror image in x and in y
-        if (a or d or x) < 0.0:
-            a, d, x = -a, -d, -x
-        if (b or e or y) < 0.0:
-            b, e, y = -b, -e, -y
-        return shape, (a, b, c, d, e, f, x, y, z)
+        into = rows[INTO]
+        planes: list[Plane] = []
+        for origin, along in zip(rows[JOINTS], rows[ALONG], strict=True):
+            (a, b, c), (d, e, f), (x, y, z) = along, into, origin
+            # every swept hold is its own mirror image in x and in y
+            if (a or d or x) < 0.0:
+                a, d, x = -a, -d, -x
+            if (b or e or y) < 0.0:
+                b, e, y = -b, -e, -y
+            planes.append((a, b, c, d, e, f, x, y, z))
+        return shape, planes
 
     @cached_property
-    def _planes(self) -> list[list[list[list[float]]]]:
-        """Axes and origin of each finger's plane."""
-        planes = np.empty((len(self._rows), len(FINGERS), 3, 3))
-        planes[:, :, 0] = self._rows[:, ALONG]
-        planes[:, :, 1] = self._rows[:, INTO, None]
-        planes[:, :, 2] = self._rows[:, JOINTS]
-        return planes.tolist()  # type: ignore[no-any-return]
-
-    @cached_property
-    def gaps(self) -> Array:
-        """From the base tiles and the palm's tiles to the rock along z of H, (n, 2 + t) [m].
+    def gaps(self) -> list[list[float]]:
+        """From the base tiles and the palm's tiles of each hand to the rock along z of H [m].
 
         Infinite where there is none.
         """
-        gaps = entries(self._shapes, self._rows[:, TILES], self._rows[:, INTO])
-        for i, shape in enumerate(self._swept):
-            if shape is None:
-                there = self.seatings[i].pose.inverse()
-                into = there.rotation[:, 2]
-                hold = self.placements[i].hold
-                places = there.apply(self.frames.rows[i, TILES])
-                gaps[i] = [hold.entry(place, into) for place in places]
-        return gaps
+        return [
+            self._gaps_on(i) if shape is None else entries(shape, seen[TILES], seen[INTO])
+            for i, (shape, seen) in enumerate(zip(self.shapes, self._seen, strict=True))
+        ]
+
+    def _gaps_on(self, index: int) -> list[float]:
+        """Return the gaps of one hand on rock that is not smooth."""
+        there = self.seatings[index].pose.inverse()
+        into = there.rotation[:, 2]
+        hold = self.placements[index].hold
+        places = there.apply(self.frames.rows[index, TILES, :3])
+        return [hold.entry(place, into) for place in places]
 
     def section(self, index: int, finger: int) -> Section | None:
         """Return the rock in the plane of a finger of one hand; raw under one that clings."""

@@ -23,6 +23,7 @@ from hand_models.spines import Surface
 from hand_models.structure import HELD
 
 __all__ = [
+    "GIVEN",
     "NAIL_ROWS",
     "WRENCH_PARTS",
     "Entries",
@@ -34,6 +35,9 @@ __all__ = [
 
 WRENCH_PARTS: Final = 6 + len(HELD)
 """A wrench, and what of its force is held along each of `HELD`."""
+
+GIVEN: Final = 7
+"""Numbers of a hand on its hold that are no loads: two tensions, and five of its palm."""
 
 NAIL_ROWS: Final = 3 + len(PHALANGES)
 """Hard rows of a nail that hooks."""
@@ -119,40 +123,41 @@ class Entries:
         Of the sources that are o (6,), V (6, m), L (nl, m), l0, s (nl,), H (nh, m) and h (nh,).
     ends : tuple of int
         Where each of these ends but the last.
-    starts : ndarray of int, shape (fingers,)
-        First tile of each finger.
     shares : ndarray, shape (n,)
         Part of its finger's lateral reaction that each tile carries.
+    sources : int
+        How many there are.
     """
 
     index: Indices
     ends: tuple[int, ...]
-    starts: Indices
     shares: Array
+    sources: int
 
 
 class _Numbering:
     """Hands out the numbers of sources."""
 
     def __init__(self) -> None:
-        self._next = 0
+        self.count = 0
 
     def next(self, *shape: int) -> Indices:
         """Return the next numbers, in an array of this shape."""
         count = math.prod(shape)
-        self._next += count
-        return np.arange(self._next - count, self._next).reshape(shape)
+        self.count += count
+        return np.arange(self.count - count, self.count).reshape(shape)
 
 
 @lru_cache(maxsize=KEPT)
 def entries_of(layout: RowLayout) -> Entries:
     """Return where the numbers of the sets of a layout come from."""
-    n, p, nails, new = len(layout.finger_of), layout.pieces, len(layout.nails), _Numbering().next
+    n, p, nails, numbering = len(layout.finger_of), layout.pieces, len(layout.nails), _Numbering()
+    new = numbering.next
     zero, one, minus, torque, current, idle_current, most_torque, most_current = new(8)
     finger_shear, fingertip_force, hand_load = new(3)
     held_drag, held_press = new(2, len(HELD))
     capacity, lateral = new(p), new(2, TILES, p)
-    most, closing, palm_shear, palm_pressing, below, aside, behind = new(7)
+    most, closing, palm_shear, palm_pressing, below, aside, behind = new(GIVEN)
     loads, opposite = new(n, 2, 2), new(n, 2, 2)
     planes = new(p, 2, n)
     per_newton, sideways = new(2, WRENCH_PARTS, len(FINGERS))
@@ -242,9 +247,9 @@ def entries_of(layout: RowLayout) -> Entries:
     entries = Entries(
         index=np.concatenate(parts),
         ends=tuple(np.cumsum([len(part) for part in parts[:-1]]).tolist()),
-        starts=np.searchsorted(finger_of, tendon),
         shares=np.where(layout.shared_by > 0, 1.0 / np.maximum(layout.shared_by, 1), 0.0),
+        sources=numbering.count,
     )
-    for array in (entries.index, entries.starts, entries.shares):
+    for array in (entries.index, entries.shares):
         array.setflags(write=False)
     return entries

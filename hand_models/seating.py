@@ -33,7 +33,7 @@ from hand_models.settling import settle
 if TYPE_CHECKING:
     from hand_models.hand import Grasp, SpinyHand
 
-__all__ = ["CENTRED", "Seating", "propose", "seat", "touches_seat"]
+__all__ = ["CENTRED", "Seating", "propose", "seat", "seating_given", "touches_seat"]
 
 Angle = TypeVar("Angle", float, Array)
 
@@ -58,7 +58,7 @@ TRIES: Final = 24
 
 @dataclass(frozen=True)
 class Seating:
-    """Where a hold is in the hand.
+    """Where a hold is in the hand. Arrays are read-only.
 
     Attributes
     ----------
@@ -70,6 +70,14 @@ class Seating:
 
     pose: Pose
     rule: str
+
+
+def seating_given(pose: Pose) -> Seating:
+    """Return the seating of a hold whose place is given, a copy that nobody can change."""
+    position, rotation = np.array(pose.position, dtype=float), np.array(pose.rotation, dtype=float)
+    position.setflags(write=False)
+    rotation.setflags(write=False)
+    return Seating(Pose(position, rotation), "given")
 
 
 LIKE_HAND: Final = np.eye(3)
@@ -101,22 +109,23 @@ def propose(hand: SpinyHand, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
 
     If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
     """
-    x, y, z = hand.inner_joint.tolist()
-    if isinstance(hold, Plane):
+    _, y, z = hand.inner_place
+    if hold.shape == Plane.shape:
         return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
-    crest = 0.5 * (x + hand.outer_axis.item(0) - hand.outer_reach) if grasp.pinch else None
-    if hold.swept is None:
+    pinch = grasp.pinch
+    crest = hand.pinch_crest if pinch else None
+    circle = hold.crest_circle(y)
+    if circle is None and hold.swept is None:
         section = hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
         if isinstance(section, PolylineSection):
             return _on_outline(hand, section, _Top(hand, hold), crest), False
-    circle = hold.crest_circle(y)
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
         return CENTRED, False
-    possible = place[1] >= 0.0 if grasp.pinch else abs(place[0]) <= 0.5 * hand.palm_length
+    possible = place[1] >= 0.0 if pinch else abs(place[0]) <= 0.5 * hand.palm_length
     if not possible:
         return CENTRED, False
-    return Seating(_shifted(*place), "pinch" if grasp.pinch else "palm_on_rock"), True
+    return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
 
 
 def touches_seat(hand: SpinyHand, kind: str, along: float) -> bool:
@@ -125,12 +134,14 @@ def touches_seat(hand: SpinyHand, kind: str, along: float) -> bool:
 
 
 def _shifted(x: float, z: float) -> Pose:
-    return Pose(np.array([x, 0.0, z]), LIKE_HAND)
+    position = np.array([x, 0.0, z])
+    position.setflags(write=False)
+    return Pose(position, LIKE_HAND)
 
 
 def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) -> Place | None:
     """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
-    x, _, z = hand.inner_joint.tolist()
+    x, _, z = hand.inner_place
     reach = (radius + hand.finger.tile_height) ** 2 + hand.seated_contact**2
     if crest is not None:
         rise = reach - (x - crest) ** 2

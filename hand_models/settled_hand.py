@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -21,6 +21,7 @@ from hand_models.spines import Surface
 
 if TYPE_CHECKING:
     from hand_models.hand import SpinyHand
+    from hand_models.wrench_space import WrenchSpace
 
 __all__ = [
     "CONTACTS",
@@ -104,8 +105,7 @@ class Tile(NamedTuple):
     contact: str
 
 
-@dataclass(frozen=True, eq=False)
-class Palm:
+class Palm(NamedTuple):
     """The palm on its rock.
 
     Attributes
@@ -165,6 +165,8 @@ class SettledHand:
     stops : tuple of (int, int, ndarray)
         Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
     palm : Palm
+    sets : dict of float to WrenchSpace
+        What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
     """
 
     hand: SpinyHand
@@ -184,6 +186,7 @@ class SettledHand:
     nail_rows: tuple[tuple[Array, Array], ...]
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
+    sets: dict[float, WrenchSpace] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def fingers(self) -> tuple[SettledFinger, ...]:

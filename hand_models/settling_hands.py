@@ -1,8 +1,8 @@
 """Many hands closed on their holds at once: seated, with their palms and their fingers on the rock.
 
 What is alike for all hands is worked out for all together, on arrays: where they are in the axes of
-their holds, the gaps under their palms, the places and axes of their tiles. How each finger rests
-is found one by one (`hand_models.closed_fingers`), for those that are mirror images once.
+their holds, the places and axes of their tiles. How each finger rests is found one by one
+(`hand_models.closed_fingers`), for those that are mirror images once.
 """
 
 from __future__ import annotations
@@ -15,25 +15,22 @@ import numpy as np
 from hand_models.closed_fingers import close_fingers
 from hand_models.errors import InvalidInputError
 from hand_models.finger_frames import BASES
-from hand_models.frames import Array
 from hand_models.hooked_nails import hook_nails
 from hand_models.laying import KINDS, Laid
-from hand_models.palm import shear_capacity
-from hand_models.placed_hands import CutKey, PlacedHands, Placement
-from hand_models.seating import CENTRED, Seating, propose, seat, touches_seat
-from hand_models.settled_hand import FINGERS, Palm, SettledHand
-from hand_models.swept_cuts import cut_of
-from hand_models.tiles_on_rock import hand_tiles, parts_on_rock
+from hand_models.palms_on_rock import palms_on_rock
+from hand_models.placed_hands import PlacedHands, Placement
+from hand_models.seating import CENTRED, propose, seat, seating_given, touches_seat
+from hand_models.settled_hand import FINGERS, SettledHand
+from hand_models.swept_cuts import Plane, cut_of
+from hand_models.tiles_on_rock import hand_tiles, tiles_on_rock
 
 if TYPE_CHECKING:
     from hand_models.hand import SpinyHand
 
 __all__ = ["settle_hands"]
 
-NO_CENTRE: Final = np.zeros(3)
-"""Of a palm that is not on rock."""
-
-NO_CENTRE.setflags(write=False)
+Known = list[dict[Plane, list[Laid]]]
+"""Phalanges of each hand's fingers by what those depend on."""
 
 SEATED: Final = FINGERS.index("inner_left")
 """The finger whose proximal contact seats a hand."""
@@ -55,9 +52,8 @@ def settle_hands(
     list of SettledHand or InvalidInputError
         In order; an error in place of a hand that cannot be where it is, see `SpinyHand.settle`.
     """
-    given = [each.grasp.closing_tension for each in placements]
-    tensions = [hand.closing_tension if tension is None else tension for tension in given]
-    outcomes: dict[int, SettledHand | InvalidInputError] = {
+    tensions = [each.grasp.closing_tension or hand.closing_tension for each in placements]
+    refused = {
         i: InvalidInputError(
             f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
             field="grasp.closing_tension",
@@ -65,40 +61,40 @@ def settle_hands(
         for i, tension in enumerate(tensions)
         if tension > hand.maximum_tension
     }
-    closable = [i for i in range(len(placements)) if i not in outcomes]
-    if closable:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            settled = _settle(
-                hand, [placements[i] for i in closable], [tensions[i] for i in closable]
-            )
-        outcomes.update(zip(closable, settled, strict=True))
-    return [outcomes[i] for i in range(len(placements))]
+    if not refused:
+        return _settle(hand, placements, tensions)
+    closable = [i for i in range(len(placements)) if i not in refused]
+    if not closable:
+        return list(refused.values())
+    settled = iter(
+        _settle(hand, [placements[i] for i in closable], [tensions[i] for i in closable])
+    )
+    return [refused[i] if i in refused else next(settled) for i in range(len(placements))]
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def _settle(
     hand: SpinyHand, placements: Sequence[Placement], tensions: list[float]
 ) -> list[SettledHand | InvalidInputError]:
     placed, laid = _placed(hand, placements)
-    gaps = placed.gaps[:, BASES:]
-    gaps.setflags(write=False)
     errors = {
         i: _in_palm(hand, depth)
-        for i, depth in enumerate(gaps.min(axis=1).tolist())
+        for i, depth in enumerate([min(depths[BASES:]) for depths in placed.gaps])
         if depth < -hand.spine_travel
     }
     closed = close_fingers(placed, laid, tensions, errors)
-    parts = parts_on_rock(placed, closed, tensions)
-    clinging = [each.grasp.fingernail for each in placements]
+    tiles = tiles_on_rock(placed, closed, tensions)
     nails = [hand.no_nails] * len(placements)
-    for i, clings in enumerate(clinging):
-        if clings and i not in errors:
+    for i, each in enumerate(placements):
+        if each.grasp.fingernail and i not in errors:
             try:
-                nails[i] = hook_nails(placed, closed, parts, i, tensions[i])
+                nails[i] = hook_nails(placed, closed, i, tensions[i])
             except InvalidInputError as error:
                 errors[i] = error
+    palms = palms_on_rock(placed)
     outcomes: list[SettledHand | InvalidInputError] = []
-    for i, (each, tiles, posture) in enumerate(
-        zip(placements, hand_tiles(parts, clinging), closed.of_hands(), strict=True)
+    for i, (each, of_tiles, posture) in enumerate(
+        zip(placements, hand_tiles(tiles, nails), closed.of_hands(), strict=True)
     ):
         if i in errors:
             outcomes.append(errors[i])
@@ -111,16 +107,16 @@ def _settle(
             closing_tension=tensions[i],
             seating=placed.seatings[i],
             postures=posture,
-            tiles=tiles.tiles,
-            finger_of=tiles.finger_of,
-            positions=tiles.positions,
-            axes=tiles.axes,
-            loads=tiles.loads,
+            tiles=of_tiles.tiles,
+            finger_of=of_tiles.finger_of,
+            positions=of_tiles.positions,
+            axes=of_tiles.axes,
+            loads=of_tiles.loads,
             nail_angles=nails[i].angles,
             nail_normals=nails[i].normals,
             nail_rows=nails[i].rows,
             stops=closed.stops_of(i),
-            palm=_palm(hand, each, gaps[i]),
+            palm=palms[i],
         )
         outcomes.append(settled)
     return outcomes
@@ -136,73 +132,55 @@ def _in_palm(hand: SpinyHand, depth: float) -> InvalidInputError:
 
 def _placed(
     hand: SpinyHand, placements: Sequence[Placement]
-) -> tuple[PlacedHands, list[list[Laid]]]:
+) -> tuple[PlacedHands, list[list[list[Laid]]]]:
     """Return hands at their holds, seated where these have no place, and their fingers laid."""
+    shapes = [each.hold.swept for each in placements]
     seatings, meant = [], []
-    for i, each in enumerate(placements):
+    for i, (each, shape) in enumerate(zip(placements, shapes, strict=True)):
         if each.hold_in_hand is not None:
-            seatings.append(Seating(each.hold_in_hand, "given"))
+            seatings.append(seating_given(each.hold_in_hand))
             continue
         seating, on_contact = propose(hand, each.hold, each.grasp)
-        if on_contact and each.hold.swept is None:
+        if on_contact and shape is None:
             seating, on_contact = seat(hand, each.hold, each.grasp), False
         seatings.append(seating)
         if on_contact:
             meant.append(i)
-    known: dict[CutKey, list[Laid]] = {}
-    placed = PlacedHands(hand, placements, seatings)
+    known: Known = [{} for _ in placements]
+    placed = PlacedHands(hand, placements, seatings, shapes)
     laid = _laid(placed, known)
-    off = [i for i in meant if not _on_seat(hand, laid[len(FINGERS) * i + SEATED])]
+    off = [i for i in meant if not _on_seat(hand, laid[i][SEATED])]
     if off:
         for i in off:
             seatings[i] = CENTRED
-        placed = PlacedHands(hand, placements, seatings)
+        placed = PlacedHands(hand, placements, seatings, shapes)
         laid = _laid(placed, known)
     return placed, laid
 
 
-def _laid(placed: PlacedHands, known: dict[CutKey, list[Laid]]) -> list[list[Laid]]:
-    """Return the phalanges of fingers that rest on smooth rock, those known already and others."""
-    laid: list[list[Laid]] = []
-    for i in range(len(placed.placements)):
-        for finger in range(len(FINGERS)):
-            key = placed.cut_key(i, finger)
-            if key is None:
-                laid.append([])
-                continue
-            phalanges = known.get(key)
+def _laid(placed: PlacedHands, known: Known) -> list[list[list[Laid]]]:
+    """Return the phalanges of the fingers of each hand that rest on smooth rock.
+
+    Of a hand's fingers that are alike the same ones, and those that are known.
+    """
+    laid: list[list[list[Laid]]] = []
+    for i, lain in enumerate(known):
+        cuts = placed.cuts(i)
+        if cuts is None:
+            laid.append([[] for _ in FINGERS])
+            continue
+        shape, planes = cuts
+        fingers: list[list[Laid]] = []
+        for plane in planes:
+            phalanges = lain.get(plane)
             if phalanges is None:
-                cut = cut_of(*key)
-                phalanges = known[key] = [] if cut is None else placed.hand.layer.lay(cut)
-            laid.append(phalanges)
+                cut = cut_of(shape, plane)
+                phalanges = lain[plane] = [] if cut is None else placed.hand.layer.lay(cut)
+            fingers.append(phalanges)
+        laid.append(fingers)
     return laid
 
 
 def _on_seat(hand: SpinyHand, laid: list[Laid]) -> bool:
     """Whether a finger's proximal contact is where a seat meant it to be."""
     return bool(laid) and touches_seat(hand, KINDS[laid[0].kind], laid[0].along)
-
-
-def _palm(hand: SpinyHand, placement: Placement, gaps: Array) -> Palm:
-    """Return the palm of one hand on its rock."""
-    near = [gap if gap <= hand.spine_travel else None for gap in gaps.tolist()]
-    engaged = tuple([i for i, gap in enumerate(near) if gap is not None])
-    if not (engaged and placement.grasp.palm):
-        return Palm(gaps, (), NO_CENTRE, 0.0, 0.0)
-    tiles, count = hand.palm_tiles.tolist(), len(engaged)
-    centre = np.array(
-        [
-            sum([tiles[i][0] for i in engaged]) / count,
-            sum([tiles[i][1] for i in engaged]) / count,
-            sum([gap for gap in near if gap is not None]) / count,
-        ]
-    )
-    centre.setflags(write=False)
-    shear_limit = shear_capacity(
-        tuple([hand.palm_contact[i] for i in engaged]),
-        hand.palm_spring,
-        hand.palm_friction,
-        placement.surface.shear_limit,
-        hand.palm_own_friction,
-    )
-    return Palm(gaps, engaged, centre, shear_limit, hand.palm_pressing * count)

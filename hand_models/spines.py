@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,6 +102,14 @@ class Surface:
             raise InvalidInputError(
                 f"must be a whole number from 1 to 64, got {self.half_planes}", field="half_planes"
             )
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # worked out once: surfaces are keys wherever hands are
+        return hash(tuple([getattr(self, field.name) for field in fields(self)]))
 
     @classmethod
     def named(cls, name: str) -> Surface:
@@ -221,6 +229,7 @@ def _from_ratios(shear_limit: float, section: str) -> Surface:
     )
 
 
+@cache
 def surface_names() -> tuple[str, ...]:
     """Return the names of the surface presets."""
     return tuple(name for name in surface_table().sections if name != "defaults")

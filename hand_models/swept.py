@@ -9,21 +9,19 @@ of the faces, (± sine, 0, cosine):
 - an edge is a log swept along its two faces;
 - a wall is an edge of half a turn whose log has no size, and of which only z counts.
 
-So what many holds ask is the same arithmetic on arrays, whatever their kinds.
+So what many holds ask is the same arithmetic, whatever their kinds.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
-import numpy as np
+__all__ = ["Swept", "Vector3", "entries"]
 
-from hand_models.frames import Array
-
-__all__ = ["Swept", "entries"]
-
-SIDES: Final = np.array([1.0, -1.0]).reshape(2, 1, 1)
-"""Of the faces along x."""
+Vector3 = Sequence[float]
+"""Three numbers."""
 
 
 class Swept(NamedTuple):
@@ -53,39 +51,50 @@ class Swept(NamedTuple):
     grazing: float = 0.0
 
 
-def entries(shapes: Array, points: Array, directions: Array) -> Array:
-    """Return how far from points, along unit directions, the rock of each hold begins.
+def entries(shape: Swept, points: Sequence[Vector3], direction: Vector3) -> list[float]:
+    """Return how far from points, along a unit direction, the rock of a hold begins.
 
     Parameters
     ----------
-    shapes : ndarray, shape (n, 8)
-        Numbers of a `Swept` in each row.
-    points : ndarray, shape (n, k, 3)
-        From the centre of each hold's ball, scaled.
-    directions : ndarray, shape (n, 3)
+    shape : Swept
+    points : sequence of (float, float, float)
+        From the centre of the hold's ball, scaled.
+    direction : (float, float, float)
         Scaled.
 
     Returns
     -------
-    ndarray, shape (n, k)
+    list of float
         Negative where a point is inside; infinite where a line misses the rock [m].
     """
-    radius = shapes[:, 4:5]
-    a = (directions * directions).sum(axis=1)[:, None]
-    b = (points @ directions[:, :, None])[..., 0]
-    discriminant = b * b - a * ((points * points).sum(axis=2) - radius * radius)
-    first = (-b - np.sqrt(discriminant)) / a
-    # the square root of what is negative, or nothing over nothing
-    first[~((discriminant >= 0.0) & (radius > 0.0))] = np.inf
-    if shapes[:, 5].any():
-        sine, cosine, grazing = shapes[:, 5:6], shapes[:, 6:7], shapes[:, 7:8]
-        x, z = points[..., 0], points[..., 2]
-        dx, dz = directions[:, 0:1], directions[:, 2:3]
-        # both faces, each on its side
-        aside, sunk = SIDES * cosine, sine * dz
-        closing = aside * dx - sunk
-        hit = (radius - aside * x + sine * z) / closing
-        beyond = SIDES * sine * (x + hit * dx) + cosine * (z + hit * dz) >= 0.0
-        hit[~(beyond & (closing < -grazing))] = np.inf
-        first = np.minimum(first, np.minimum(hit[0], hit[1]))
-    return np.asarray(first)
+    dx, dy, dz = direction
+    a = dx * dx + dy * dy + dz * dz
+    radius = shape.radius
+    found = []
+    for x, y, z in points:
+        b = x * dx + y * dy + z * dz
+        discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
+        meets = discriminant >= 0.0 and radius > 0.0 and a > 0.0
+        found.append((-b - math.sqrt(discriminant)) / a if meets else math.inf)
+    if shape.sine:
+        faces = [_entries_of_face(shape, points, direction, side) for side in (1.0, -1.0)]
+        found = [min(each) for each in zip(found, *faces, strict=True)]
+    return found
+
+
+def _entries_of_face(
+    shape: Swept, points: Sequence[Vector3], direction: Vector3, side: float
+) -> list[float]:
+    """Do the same for the face of a hold on one side along x."""
+    dx, _, dz = direction
+    sine, cosine = shape.sine, side * shape.cosine
+    closing = cosine * dx - sine * dz
+    found = []
+    for x, _, z in points:
+        hit = math.inf
+        if closing < -shape.grazing:
+            hit = (shape.radius - cosine * x + sine * z) / closing
+            if side * sine * (x + hit * dx) + shape.cosine * (z + hit * dz) < 0.0:
+                hit = math.inf
+        found.append(hit)
+    return found

@@ -10,46 +10,40 @@ import numpy as np
 
 from hand_models.closed_fingers import ClosedFingers
 from hand_models.finger import PHALANGES
-from hand_models.finger_frames import (
-    AXES,
-    BASES,
-    COLUMNS,
-    JOINTS,
-    KIND,
-    NORMAL,
-    OUTER,
-    PARTS,
-    POSITION,
-    SHEAR,
-)
+from hand_models.finger_frames import AXES, BASES, COLUMNS, KIND, NORMAL, OUTER, POSITION, SHEAR
 from hand_models.frames import Array, Indices
-from hand_models.laying import FACE, NONE
+from hand_models.hooked_nails import Nails
+from hand_models.laying import FACE
 from hand_models.placed_hands import PlacedHands
 from hand_models.settled_hand import CONTACTS, FINGERS, NAIL, Tile
 
-__all__ = ["HandTiles", "hand_tiles", "parts_on_rock"]
-
-BASE, BODY = 0, slice(1, 1 + len(PHALANGES))
+__all__ = ["HandTiles", "hand_tiles", "tiles_on_rock"]
 
 
-def _parts(*, nails: bool) -> Indices:
-    outer = range(len(FINGERS))[OUTER]
-    parts = [
-        len(PARTS) * i + k
-        for i in range(len(FINGERS))
-        for k in range(len(PARTS))
-        if (k != BASE or i in outer) and (PARTS[k] != NAIL or nails)
-    ]
-    return np.array(parts)
+def _names() -> list[tuple[str, str]]:
+    """Return finger and phalanx of each tile as they are worked out: base tiles, others, nails."""
+    bases = [(finger, "base") for finger in FINGERS[OUTER]]
+    bodies = [(finger, phalanx) for finger in FINGERS for phalanx in PHALANGES]
+    return [*bases, *bodies, *[(finger, NAIL) for finger in FINGERS]]
 
 
-GRIPPING: Final = _parts(nails=False)
-"""Parts of the four fingers that are tiles of a hand which grips with them."""
+NAMES: Final = _names()
+"""Finger and phalanx of each tile as they are worked out: first the base tiles, last the nails."""
 
-CLINGING: Final = _parts(nails=True)
-"""Those of a hand which clings with its nails."""
 
-FINGER_OF: Final = {nails: _parts(nails=nails) // len(PARTS) for nails in (False, True)}
+def _order(*, nails: bool) -> Indices:
+    tiles = len(NAMES) if nails else len(NAMES) - len(FINGERS)
+    # finger by finger, and of each the base, the phalanges, the nail
+    return np.array(sorted(range(tiles), key=lambda i: FINGERS.index(NAMES[i][0])))
+
+
+ORDER: Final = {nails: _order(nails=nails) for nails in (False, True)}
+"""Finger by finger, and of each from the base outward, the tiles of hands that cling or do not."""
+
+FINGER_OF: Final = {
+    nails: np.array([FINGERS.index(NAMES[i][0]) for i in order.tolist()])
+    for nails, order in ORDER.items()
+}
 """Index of each tile's finger, of hands that cling or do not."""
 
 for finger_of in FINGER_OF.values():
@@ -66,8 +60,8 @@ class HandTiles(NamedTuple):
     loads: Array
 
 
-def parts_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
-    """Return the fingers' `PARTS` of hands that are closed, before nails hook.
+def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
+    """Return the tiles of hands that are closed: the base tiles, then the others.
 
     Parameters
     ----------
@@ -78,55 +72,67 @@ def parts_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
 
     Returns
     -------
-    ndarray, shape (n, 4, 5, `COLUMNS`)
+    ndarray, shape (n, 14, `COLUMNS`)
     """
-    hand, frames, count = placed.hand, placed.frames, len(PHALANGES)
-    parts = frames.parts.copy()
-    body, bases = parts[:, :, BODY], parts[:, OUTER, BASE]
-
-    places = closed.places @ frames.planes
-    np.add(places[:, :, :count], frames.rows[:, JOINTS, None], out=body[..., POSITION])
-    # along and into; across stays as it is
-    body[..., AXES.start : AXES.start + 3] = places[:, :, count : 2 * count]
-    body[..., AXES.start + 3 : AXES.start + 6] = places[:, :, 2 * count :]
-    body[..., SHEAR], body[..., NORMAL] = closed.loads[..., 0, :], closed.loads[..., 1, :]
-    body[..., KIND] = closed.kinds
-
-    gaps = placed.gaps[:, :BASES]
-    engaged = np.abs(gaps) <= hand.spine_travel
-    for i, placement in enumerate(placed.placements):
-        if placement.grasp.fingernail:
-            engaged[i] = False
-    gain = hand.finger.shear_gain
-    at_zero = (hand.finger.base_engagement - gain) * np.array(tensions)[:, None]
-    bases[..., KIND] = np.where(engaged, FACE, NONE)
-    bases[..., POSITION.stop - 1] += np.where(engaged, gaps, 0.0)
-    bases[..., SHEAR.start], bases[..., SHEAR.start + 1] = engaged * at_zero, engaged * gain
-    return parts
+    count, frames = len(tensions), placed.frames
+    # each phalanx's contact, axis of shear and axis of normal load, from the finger's plane to H
+    places = (closed.places @ frames.planes).reshape((*frames.across.shape[:3], 9))
+    bodies = np.concatenate([places, frames.across, closed.tiles], axis=3)
+    bases = _base_tiles(placed, tensions)
+    return np.concatenate([bases, bodies.reshape(count, -1, COLUMNS)], axis=1)
 
 
-def hand_tiles(parts: Array, clinging: Sequence[bool]) -> list[HandTiles]:
+def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
+    """Return the base tiles, which carry shear where rock is within the spines' travel."""
+    model, tiles = placed.hand.finger, placed.frames.base_tiles
+    engaged = [
+        (i, k, depth)
+        for i, (placement, depths) in enumerate(zip(placed.placements, placed.gaps, strict=True))
+        for k, depth in enumerate(depths[:BASES])
+        if abs(depth) <= placed.hand.spine_travel and not placement.grasp.fingernail
+    ]
+    if not engaged:
+        return tiles
+    tiles, gain = tiles.copy(), model.shear_gain
+    for i, k, depth in engaged:
+        tiles[i, k, POSITION.stop - 1] += depth
+        tiles[i, k, SHEAR] = (model.base_engagement - gain) * tensions[i], gain
+        tiles[i, k, KIND] = FACE
+    return tiles
+
+
+def hand_tiles(tiles: Array, nails: Sequence[Nails]) -> list[HandTiles]:
     """Return the tiles of each hand, arrays read-only; of those that cling, their nails too."""
-    count = len(parts)
-    rows = parts.reshape(count, -1, COLUMNS)
-    made: list[HandTiles | None] = [None] * count
-    for nails in set(clinging):
-        chosen = rows.take(CLINGING if nails else GRIPPING, axis=1)
-        chosen.setflags(write=False)
-        kinds = chosen[..., KIND].astype(np.int8)
-        axes = chosen[..., AXES].reshape(count, -1, 3, 3)
-        loads = chosen[..., SHEAR.start : NORMAL.stop].reshape(count, -1, 2, 2)
-        each = zip(kinds, chosen[..., POSITION], axes, loads, strict=True)
-        for i, (codes, *numbers) in enumerate(each):
-            if clinging[i] == nails:
-                made[i] = HandTiles(_named(codes.tobytes(), nails), FINGER_OF[nails], *numbers)
-    return [each for each in made if each is not None]
+    gripping = tiles.take(ORDER[False], axis=1)
+    made = _each_hand(gripping, nails=False)
+    for i, each in enumerate(nails):
+        if each.tiles is not None:
+            clinging = np.concatenate([tiles[i], each.tiles]).take(ORDER[True], axis=0)
+            made[i : i + 1] = _each_hand(clinging[None], nails=True)
+    return made
+
+
+def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
+    """Return the tiles of hands that all cling, or all do not, from their numbers."""
+    count, tiles, _ = numbers.shape
+    numbers.setflags(write=False)
+    kinds = numbers[..., KIND].astype(np.int8)
+    codes = kinds.tobytes()
+    axes = numbers[..., AXES].reshape(count, tiles, 3, 3)
+    loads = numbers[..., SHEAR.start : NORMAL.stop].reshape(count, tiles, 2, 2)
+    return [
+        HandTiles(_named(codes[i : i + tiles], nails), FINGER_OF[nails], *of_hand)
+        for i, *of_hand in zip(
+            range(0, count * tiles, tiles), numbers[..., POSITION], axes, loads, strict=True
+        )
+    ]
 
 
 @lru_cache(maxsize=4096)
 def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
     """Return tiles from the codes of their contacts."""
+    names = [NAMES[i] for i in ORDER[nails].tolist()]
     return tuple(
-        Tile(FINGERS[part // len(PARTS)], PARTS[part % len(PARTS)], CONTACTS[kind])
-        for part, kind in zip((CLINGING if nails else GRIPPING).tolist(), kinds, strict=True)
+        Tile(finger, part, CONTACTS[kind])
+        for (finger, part), kind in zip(names, kinds, strict=True)
     )

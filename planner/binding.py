@@ -111,12 +111,16 @@ class Binding:
         self._spaces = spaces
         self._named = named = _named(Same(*[space.rows for space in spaces]), tuple(limbs))
         duals = joined(multipliers)
-        self._rows = rows = (duals > BINDING).nonzero()[0]
-        self._weights, ids = duals[rows], named.of_row[rows]
-        worth = np.bincount(ids, self._weights, len(named.names)).tolist()
-        # of limits that are worth alike, the one whose row comes first
-        first = {limit: place for place, limit in enumerate(dict.fromkeys(ids.tolist()))}
-        self._worth = {limit: (round(worth[limit], ALIKE), -first[limit]) for limit in first}
+        self._weights = duals * (duals > BINDING)
+        self._worth = np.bincount(named.of_row, self._weights, len(named.names))
+
+    def _rank(self, limit: int) -> tuple[float, int]:
+        """Return what a limit is worth, and for those alike how early its first row that binds."""
+        worth = float(self._worth[limit])
+        if worth == 0.0:
+            return NO_WORTH
+        first = ((self._named.of_row == limit) & (self._weights > 0.0)).argmax()
+        return round(worth, ALIKE), -int(first)
 
     def prices(self, utilisation: float) -> tuple[Price, ...]:
         """Return the price of each limit that binds.
@@ -130,9 +134,9 @@ class Binding:
             At which the rows stand.
         """
         names, capacities = self._named.names, joined([space.s for space in self._spaces])
-        dear = sorted(self._worth, key=self._worth.__getitem__, reverse=True)
-        each = self._weights * utilisation / capacities[self._rows]
-        price = np.bincount(self._named.of_row[self._rows], each, len(names)).tolist()
+        dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
+        each = self._weights * utilisation / capacities
+        price = np.bincount(self._named.of_row, each, len(names)).tolist()
         return tuple(Price(names[i], price[i], unit_of(names[i].limit)) for i in dear)
 
     def limiting(self, used: Array, utilisation: float, idle: Sequence[Used]) -> Used | None:
@@ -151,18 +155,20 @@ class Binding:
         """
         named = self._named
         rows = (used >= close_to(utilisation)).nonzero()[0]
-        best, found = (NO_WORTH, -math.inf), None
-        for row, limit, share in zip(
-            rows.tolist(), named.of_row[rows].tolist(), used[rows].tolist(), strict=True
-        ):
-            own = self._worth.get(limit, NO_WORTH), share
-            if own > best:
-                best, found = own, row
         most = max(idle, key=lambda each: each.utilisation, default=None)
-        if most is not None and (NO_WORTH, most.utilisation) > best:
+        if not len(rows):
             return most
-        if found is None:
-            return None
+        limits, shares = named.of_row.take(rows), used.take(rows)
+        worth = self._worth.take(limits)
+        dear = (worth >= np.maximum.reduce(worth) - 10.0**-ALIKE).nonzero()[0].tolist()
+        tied = set(limits.take(dear).tolist())
+        if len(tied) > 1:
+            first = max(map(self._rank, tied))
+            dear = [i for i in dear if self._rank(int(limits[i])) == first]
+        best = max(dear, key=shares.tolist().__getitem__)
+        if most is not None and worth[best] == 0.0 and most.utilisation > shares[best]:
+            return most
+        found = int(rows[best])
         h = bisect_right(named.first_row, found) - 1
         capacity = float(self._spaces[h].s[found - named.first_row[h]])
         return Used(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)

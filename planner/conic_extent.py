@@ -46,7 +46,7 @@ class Kept(NamedTuple):
 
     mask: Mask
     numbers: Indices
-    count: int
+    total: int
 
     @classmethod
     def of(cls, mask: Mask) -> Kept:
@@ -115,7 +115,7 @@ class Entries:
             hit = hit & filled.mask[self._index]
         index, width = self._index[hit], self._width
         if filled is not None:
-            index, width = filled.numbers[index], filled.count
+            index, width = filled.numbers[index], filled.total
         counts = np.bincount(self._rows[hit], minlength=len(self))[kept]
         return Entries(self._data[hit], index, np.append(0, np.cumsum(counts)), width)
 
@@ -168,7 +168,7 @@ class Part(NamedTuple):
             self.entries.chosen(kept, filled),
             rows.numbers[self.rows[kept]],
             columns.numbers[self.columns[kept]],
-            (rows.count, columns.count),
+            (rows.total, columns.total),
         )
 
 
@@ -258,7 +258,7 @@ class Room:
         starts = [int(filled.numbers[place.start]) for _, place in of.parameters]
         ends = np.cumsum([0, *(cone.dim for cone in of.cones)])
         return Layout(
-            size=filled.count,
+            size=filled.total,
             places=tuple(
                 slice(start, start + math.prod(shape))
                 for start, shape in zip(starts, shapes, strict=True)

@@ -66,21 +66,13 @@ def cut(data: StanceData, outcome: Outcome) -> Cut | None:
         None if the multipliers could not be repaired.
     """
     assert outcome.balance_dual is not None
-    hands = data.hands
     limit, hard = np.concatenate(outcome.limit_duals), np.concatenate(outcome.hard_duals)
     signed = np.concatenate([limit, hard])
     signed[signed < NOTHING] = 0.0
     # stationarity (M rows) and Σ λ = 1, as rows over λ, μ, ν
-    sizes = [len(hand.unit) for hand in hands]
-    ends = np.cumsum(sizes)
-    rows = np.zeros((ends[-1] + 1, len(signed) + len(outcome.balance_dual)))
-    at, below = 0, len(limit)
-    for end, size, hand in zip(ends, sizes, hands, strict=True):
-        mine = slice(end - size, end)
-        rows[mine, at : at + len(hand.l0)] = hand.L.T
-        rows[mine, below : below + len(hand.h)] = hand.H.T
-        rows[mine, len(signed) :] = hand.G.T
-        at, below = at + len(hand.l0), below + len(hand.h)
+    whole, balance = data.rows.whole, len(outcome.balance_dual)
+    rows = np.zeros((whole.shape[1] + 1, len(whole)))
+    rows[:-1] = np.hstack([whole[balance:].T, whole[:balance].T])
     rows[-1, : len(limit)] = 1.0
     goal = np.zeros(len(rows))
     goal[-1] = 1.0
@@ -103,8 +95,7 @@ def cut(data: StanceData, outcome: Outcome) -> Cut | None:
     if not price <= DEAREST:
         return None
     nu = multipliers[len(signed) :]
-    l0, h = (np.concatenate([getattr(hand, name) for hand in hands]) for name in ("l0", "h"))
-    g = np.sum([hand.g for hand in hands], axis=0)
-    constant = float(multipliers[: len(limit)] @ l0 - multipliers[len(limit) : len(signed)] @ h)
+    g = np.sum([hand.g for hand in data.hands], axis=0)
+    constant = -float(multipliers[: len(signed)] @ data.rows.rest)
     constant += float(nu @ g - nu[6:] @ data.wrench[6:]) - price
     return Cut(-nu[:6] / WRENCH_UNIT, constant)

@@ -38,9 +38,9 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
     `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
     ``share``: how much of its weight the second term had.
     """
-    weight, hands = share * tie_weight(data.shape), data.hands
-    z = joined(outcome.loads) / joined([hand.unit for hand in hands])
-    small = weight * joined([hand.tie for hand in hands]) * z
+    rows = data.rows
+    z = joined(outcome.loads) / rows.unit
+    small = share * tie_weight(data.shape) * rows.tie * z
     value = -float(small @ z) - share * TIE * outcome.value**2
     slopes = 2.0 * small
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
@@ -74,18 +74,15 @@ def _dual_bound(
     ``leak``: how far multipliers are from stationary besides.
     """
     assert outcome.balance_dual is not None
-    hands, nu = data.hands, outcome.balance_dual
-    limits, hards = joined(outcome.limit_duals), joined(outcome.hard_duals)
+    nu, rows = outcome.balance_dual, data.rows
+    signed = joined([*outcome.limit_duals, *outcome.hard_duals])
     scale = max(1.0, abs(outcome.value))
-    if min(limits.min(initial=0.0), hards.min(initial=0.0)) < -STATIONARY * scale:
+    if signed.min(initial=0.0) < -STATIONARY * scale:
         return -math.inf
-    pairs = zip(hands, outcome.limit_duals, outcome.hard_duals, strict=True)
-    stationary = joined([hand.L.T @ own + hand.H.T @ hard for hand, own, hard in pairs])
-    stationary += joined([nu @ hand.G for hand in hands])
+    stationary = np.append(nu, signed) @ rows.whole
     if slopes is not None:
         stationary += slopes
     if leak + float(np.abs(stationary).sum()) > STATIONARY * scale:
         return -math.inf
-    given = data.wrench - np.add.reduce([hand.g for hand in hands])
-    at_rest, hard = joined([hand.l0 for hand in hands]), joined([hand.h for hand in hands])
-    return float(limits @ at_rest - hards @ hard - nu @ given) - cap * float(limits.sum())
+    below = float(signed @ rows.rest + nu @ data.offset)
+    return -below - cap * float(signed[: rows.limits].sum())

@@ -27,10 +27,11 @@ from planner.stacked import (
     Places,
     Same,
     Stacked,
+    joined,
     stacked,
 )
 
-__all__ = ["Equilibrium", "equilibrium"]
+__all__ = ["JOINTS", "SIDES", "Equilibrium", "Tendons", "equilibrium", "tendons_of"]
 
 JOINTS: Final = len(PHALANGES)
 
@@ -81,8 +82,8 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
         If contacts do not hold the joints that are free.
     """
     known = stacked(hands)
-    places, model = known.places, hands[0].hand.finger
-    tendons = _tendons_of(places, Same(hands[0].hand))
+    places = known.places
+    tendons = tendons_of(places, Same(hands[0].hand))
     contacts = known.touch.contacts[places.phalanges]
     closing = np.array([hand.closing_tension for hand in hands])
     loads, left = _solved(known, contacts, tendons, closing.repeat(len(FINGERS))[:, None])
@@ -99,8 +100,8 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
     planar[:, :, places.phalanges] = loads
     shear, bases = planar[:, 0], places.bases
     base = known.touch.touches[bases]
-    shear[0, bases] = base * (tendons.base * closing[places.hand[bases]])
-    shear[1, bases] = base * model.shear_gain
+    shear[0, bases] = base * (tendons.engaged[bases] * closing[places.hand[bases]])
+    shear[1, bases] = base * tendons.gain[bases]
     # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
     drawn = rows[:, 2 * count : 2 * count + len(contacts)]
     np.add.reduceat(shear, places.first_of_finger, axis=1, out=drawn)
@@ -113,7 +114,7 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
     return Equilibrium(rows, owners, shear, planar[:, 1], drawn, stops, fingers, joints)
 
 
-class _Tendons(NamedTuple):
+class Tendons(NamedTuple):
     """What the fingers' tendons do at their joints and tiles, all of which touch.
 
     Attributes
@@ -130,8 +131,11 @@ class _Tendons(NamedTuple):
         How much tendon a tile draws in per newton of its spring [m/N].
     drawn : ndarray, shape (2, F)
         How much tiles without shear draw in, at no tension and per newton of it [m].
-    base : float
-        Shear of a base tile at zero tension per newton of closing tension.
+    pull : ndarray, shape (F, 3)
+        M r of the joints [m].
+    gain, engaged : ndarray, shape (T,)
+        Shear of each tile per newton of tension, and at zero tension per newton of closing tension;
+        of nails zero.
     owners : ndarray of int
         Fingers of `Equilibrium.rows`, but stops.
     """
@@ -143,12 +147,14 @@ class _Tendons(NamedTuple):
     radii: Array
     travel: float
     drawn: Array
-    base: float
+    pull: Array
+    gain: Array
+    engaged: Array
     owners: Indices
 
 
 @lru_cache(maxsize=KEPT)
-def _tendons_of(places: Places, key: Same) -> _Tendons:
+def tendons_of(places: Places, key: Same) -> Tendons:
     """Return what the tendons of hands do; ``key``: the `SpinyHand` that all of them are."""
     (hand,) = key.each
     assert isinstance(hand, SpinyHand)
@@ -161,12 +167,16 @@ def _tendons_of(places: Places, key: Same) -> _Tendons:
     radii = np.array(model.pulley_radii)
     per_newton[:, 0::2], per_newton[:, 1::2] = -local * radii, local * model.shear_gain
     at_closing[:, 1::2] = local * (np.array(model.engagement) - model.shear_gain)
+    gain, engaged = np.zeros((2, len(places.hand)))
+    gain[places.phalanges], engaged[places.phalanges] = per_newton[:, 1::2], at_closing[:, 1::2]
+    gain[places.bases] = model.shear_gain
+    engaged[places.bases] = model.base_engagement - model.shear_gain
     travel = drive.pulley_ratio / drive.tile_stiffness
     strands = local.sum(axis=1)
     strands[places.base_fingers] += 1.0
     drawn = np.zeros((2, len(local)))
     drawn[1] = travel * drive.pulley_ratio * strands
-    return _Tendons(
+    return Tendons(
         per_newton=per_newton,
         at_closing=at_closing,
         stiffness=np.array(model.joint_stiffness),
@@ -174,13 +184,15 @@ def _tendons_of(places: Places, key: Same) -> _Tendons:
         radii=radii,
         travel=travel,
         drawn=drawn,
-        base=model.base_engagement - model.shear_gain,
+        pull=local * radii,
+        gain=gain,
+        engaged=engaged,
         owners=np.concatenate((places.finger, places.finger, np.arange(len(local)))),
     )
 
 
 def _solved(
-    known: Stacked, contacts: Indices, tendons: _Tendons, closing: Array
+    known: Stacked, contacts: Indices, tendons: Tendons, closing: Array
 ) -> tuple[Array, Array]:
     """Return what A f_c = b gives.
 
@@ -193,10 +205,11 @@ def _solved(
         out where a phalanx bears nothing.
     """
     model = known.hands[0].hand.finger
+    alongs = joined([hand.postures.alongs for hand in known.hands])
     u = np.exp(1j * known.angles)
     steps = model.joint_spacing * u
     joints = steps.cumsum(axis=1) - steps
-    points = joints + (known.alongs + 1j * model.tile_height) * u
+    points = joints + (alongs + 1j * model.tile_height) * u
     count = len(u)
     A = np.zeros((count, 2 * JOINTS, JOINTS), dtype=complex)
     # a force of the rock on phalanx j turns joint i ≤ j from x toward z (Jᵀ f_c)

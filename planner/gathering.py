@@ -22,6 +22,9 @@ __all__ = ["gather"]
 FREE: Final = np.zeros((0, 6))
 """What is given of a hand's wrench where nothing is given of any."""
 
+NO_AIMS: Final = np.zeros(0)
+"""The values of that."""
+
 
 def gather(
     question: Question, where: Posture | None, wrench: Array
@@ -50,7 +53,7 @@ def gather(
         spaces=tuple(spaces),
         wrists=tuple(wrists),
         transports=wrench_transports(stance.body, [hand.pose for hand in stance.hands]),
-        wrench=np.concatenate([wrench / WRENCH_UNIT, aims]),
+        wrench=np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT,
         held=held,
         added=tuple(added),
     )
@@ -83,6 +86,8 @@ def _added_rows(question: Question, where: Posture | None, index: int) -> AddedR
 def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
     """Return what of each hand's wrench is given, (k, 6) each, and its scaled values (k,)."""
     hands = question.stance.hands
+    if not any(hand.wrench for hand in hands):
+        return (FREE,) * len(hands), NO_AIMS
     given = [
         (i, j, value)
         for i, hand in enumerate(hands)
@@ -90,7 +95,7 @@ def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
         if value is not None
     ]
     if not given:
-        return (FREE,) * len(hands), np.zeros(0)
+        return (FREE,) * len(hands), NO_AIMS
     held = [np.zeros((len(given), 6)) for _ in hands]
     for row, (i, j, _) in enumerate(given):
         held[i][row, j] = 1.0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
+from hand_models.frames import Array
 from planner import dual_bounds, program
 from planner.polish import polished
-from planner.program import Outcome
+from planner.program import TIE, Outcome
 from planner.stance_data import StanceData
 
 __all__ = ["OPTIMAL", "LeastUtilisation", "least_utilisation"]
@@ -23,18 +25,19 @@ class LeastUtilisation(NamedTuple):
     outcome : Outcome
     bound : float
         The least utilisation is not below; −∞ without a solution.
-    exact : Outcome or None
-        With the last digits of the loads; None where they are not found.
+    loads : tuple of ndarray or None
+        y of each hand, exact [N]; None where their last digits are not found.
     """
 
     outcome: Outcome
     bound: float
-    exact: Outcome | None
+    loads: tuple[Array, ...] | None = None
 
     @property
     def proven(self) -> bool:
         """Whether the utilisation is the least, as far as it counts."""
-        return self.outcome.solved and _is_least(self.outcome.value, self.bound)
+        used = self.outcome.value
+        return self.outcome.solved and used - self.bound <= OPTIMAL * max(1.0, used)
 
 
 def least_utilisation(data: StanceData) -> LeastUtilisation:
@@ -44,19 +47,16 @@ def least_utilisation(data: StanceData) -> LeastUtilisation:
     beyond the limits it is asked for again with less weight.
     """
     outcome, share = program.unique(data), 1.0
-    if not outcome.solved:
-        return LeastUtilisation(outcome, -float("inf"), None)
-    bound = dual_bounds.unique_bound(data, outcome)
-    if outcome.value > 1.0 and not _is_least(outcome.value, bound):
+    if outcome.solved and OPTIMAL * outcome.value < TIE * outcome.value**2:
         smaller = outcome.value**-2
         again = program.unique(data, smaller)
         if again.solved:
             outcome, share = again, smaller
-            bound = dual_bounds.unique_bound(data, outcome, share)
-    if not _is_least(outcome.value, bound):
-        return LeastUtilisation(outcome, bound, None)
-    return LeastUtilisation(outcome, bound, polished(data, outcome, share))
-
-
-def _is_least(utilisation: float, bound: float) -> bool:
-    return utilisation - bound <= OPTIMAL * max(1.0, utilisation)
+    if not outcome.solved:
+        return LeastUtilisation(outcome, -math.inf)
+    exact = polished(data, outcome, share)
+    if exact is None:
+        return LeastUtilisation(outcome, dual_bounds.unique_bound(data, outcome, share))
+    # with exact multipliers the bound of `unique_bound` is the optimum itself, but for second terms
+    most = share * TIE * exact.utilisation**2
+    return LeastUtilisation(outcome, exact.utilisation + exact.second - most, exact.loads)

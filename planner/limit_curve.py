@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,9 @@ class LimitCurves:
     """
 
     def __init__(self, surfaces: Sequence[Surface], of_tile: Indices) -> None:
-        self._numbers = _numbers(Same(*surfaces)).take(of_tile, 1)
+        self._numbers = _Numbers(
+            *[numbers.take(of_tile, -1) for numbers in _numbers(Same(*surfaces))]
+        )
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
         """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
@@ -53,32 +55,50 @@ class LimitCurves:
         ndarray, shape (n,)
             Negative inside.
         """
-        most, loss, per_radian, aside, leaves, gain = self._numbers
+        flat, loss, per_radian, gain = self._numbers
         along = np.hypot(shear, lateral)
         pull = np.minimum(normal, 0.0)
         # pressed, a tile holds what it does in its own plane, and more by the gain
         size = np.hypot(along, pull)
         ratio = np.minimum(np.arctan2(pull, along) * per_radian, 1.0)
-        turned = (along - shear) / np.maximum(size, SMALL)
-        strength = (most - loss * ratio) * (1.0 - (aside + leaves * ratio) * turned)
+        straight, aside = flat - loss * ratio
+        strength = straight * (1.0 - aside * ((along - shear) / (size + SMALL)))
         return np.asarray(size - gain * (normal - pull) - (1.0 + relative) * strength)
 
 
+class _Numbers(NamedTuple):
+    """The numbers of some surfaces.
+
+    Attributes
+    ----------
+    flat, loss : ndarray, shape (2, n)
+        f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max.
+    per_radian : ndarray, shape (n,)
+        −1 / φ_max.
+    gain : ndarray, shape (n,)
+        γ.
+    """
+
+    flat: Array
+    loss: Array
+    per_radian: Array
+    gain: Array
+
+
 @lru_cache(maxsize=KEPT_NAMES)
-def _numbers(key: Same) -> Array:
-    """Return f_max, f_max − f_min, −1 / φ_max, 1 − λ(0), λ(0) − λ(φ_max) and γ of surfaces."""
+def _numbers(key: Same) -> _Numbers:
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
-    shares = [surface.lateral_limit / surface.shear_limit for surface in surfaces]
-    return np.array(
-        [
-            (
-                surface.shear_limit,
-                surface.shear_limit - surface.pull_off_limit,
-                -1.0 / surface.pull_off_angle,
-                1.0 - share,
-                share * (1.0 - surface.lateral_pull_off_ratio),
-                surface.compression_gain,
-            )
-            for surface, share in zip(surfaces, shares, strict=True)
-        ]
-    ).T
+    flat, loss = np.zeros((2, 2, len(surfaces)))
+    for i, surface in enumerate(surfaces):
+        share = surface.lateral_limit / surface.shear_limit
+        flat[:, i] = surface.shear_limit, 1.0 - share
+        loss[:, i] = (
+            surface.shear_limit - surface.pull_off_limit,
+            share * (surface.lateral_pull_off_ratio - 1.0),
+        )
+    return _Numbers(
+        flat,
+        loss,
+        np.array([-1.0 / surface.pull_off_angle for surface in surfaces]),
+        np.array([surface.compression_gain for surface in surfaces]),
+    )

@@ -22,6 +22,7 @@ from planner.limit_curve import LimitCurves
 from planner.link_tree import LinkTree
 from planner.posture import Posture, torque_limits
 from planner.question import Question
+from planner.recomputing import PULLING
 from planner.stance import HandOnHold
 from planner.verify import BALANCE, LOAD, UTILISATION
 from planner.verify_limbs import check_limbs
@@ -29,9 +30,6 @@ from planner.verify_limbs import check_limbs
 __all__ = ["LoadsCheck"]
 
 NOTHING: Final = np.zeros(6)
-
-PULLING: Final = np.array([np.inf, np.inf, 0.0])
-"""Of a hand's force, what does not press."""
 
 most = np.maximum.reduce
 

@@ -21,10 +21,10 @@ Wright, Numerical Optimization, algorithm 16.3), begun next to its end.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from hand_models.frames import Array
@@ -32,7 +32,9 @@ from planner.program import Outcome, tie_weight
 from planner.stacked import joined
 from planner.stance_data import StanceData
 
-__all__ = ["polished"]
+__all__ = ["Polished", "polished"]
+
+Mask = npt.NDArray[np.bool_]
 
 SURE: Final = (1e-6, 1.0)
 """How many times a row's multiplier may be less than its room for the row to be active at first."""
@@ -43,7 +45,7 @@ ROUNDS: Final = 12
 HOLDS: Final = 1e-9
 """By how much a row may be broken, scaled."""
 
-PUSHES: Final = 1e-12
+PUSHES: Final = 1e-14
 """How far below zero a multiplier may be, those of the limits adding up to one."""
 
 SOFT: Final = 1e-13
@@ -80,30 +82,37 @@ class _Rows(NamedTuple):
 
     @classmethod
     def of(cls, data: StanceData) -> _Rows:
-        """Write the hands' rows below each other: balance, limits, hard rows."""
-        hands, nb = data.hands, len(data.wrench)
-        rest, hard = joined([hand.l0 for hand in hands]), joined([hand.h for hand in hands])
-        limits = len(rest)
-        C = np.zeros((nb + limits + len(hard), sum(len(hand.unit) for hand in hands)))
-        left, limit, below = 0, nb, nb + limits
-        for hand in hands:
-            m, nl, nh, _ = hand.shape
-            right = left + m
-            C[:nb, left:right] = hand.G
-            C[limit : limit + nl, left:right] = hand.L
-            C[below : below + nh, left:right] = hand.H
-            left, limit, below = right, limit + nl, below + nh
+        """Return those of a stance: balance, limits, hard rows."""
+        C, rest, limits, *_ = data.rows
+        nb = len(data.wrench)
         d = np.zeros(len(C))
         d[nb : nb + limits] = 1.0
-        return cls(C, d, np.concatenate([data.offset, -rest, hard]), nb)
+        return cls(C, d, np.concatenate([data.offset, rest]), nb)
 
     def room(self, z: Array, u: float) -> Array:
         """Return by how much each row holds."""
         return np.asarray(self.b + self.d * u - self.C @ z)
 
 
-def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Outcome | None:
-    """Return the outcome of `program.unique` with its loads exact; None if that is not found.
+class Polished(NamedTuple):
+    """The optimum of `program.Unique`, exact.
+
+    Attributes
+    ----------
+    loads : tuple of ndarray
+        y of each hand [N].
+    utilisation : float
+    second : float
+        The second term of the objective, ½ zᵀ Q z.
+    """
+
+    loads: tuple[Array, ...]
+    utilisation: float
+    second: float
+
+
+def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Polished | None:
+    """Return the exact optimum of `program.unique` from its outcome; None if that is not found.
 
     Parameters
     ----------
@@ -115,8 +124,8 @@ def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Outcome 
     """
     assert outcome.balance_dual is not None
     hands, rows = data.hands, _Rows.of(data)
-    unit = joined([hand.unit for hand in hands])
-    Q = 2.0 * share * tie_weight(data.shape) * joined([hand.tie for hand in hands])
+    unit = data.rows.unit
+    Q = 2.0 * share * tie_weight(data.shape) * data.rows.tie
     multipliers = joined([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
     start = _Point(joined(outcome.loads) / unit, outcome.value, multipliers)
     room = rows.room(start.z, start.u)
@@ -127,11 +136,11 @@ def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Outcome 
         if found is not None:
             ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
             loads = tuple(np.split(found.z * unit, ends))
-            return replace(outcome, value=found.u, loads=loads)
+            return Polished(loads, found.u, 0.5 * float(Q @ found.z**2))
     return None
 
 
-def _optimum(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | None:
+def _optimum(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | None:
     """Return the optimum, by the active-set method; None if it is not found in some rounds."""
     z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
     for _ in range(ROUNDS):
@@ -156,7 +165,7 @@ def _optimum(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | No
     return None
 
 
-def _meeting(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | None:
+def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | None:
     """Return the least point where active rows meet; None where they do not."""
     C, d, b = rows.C[active], rows.d[active], rows.b[active]
     z, u, multipliers = start.z, start.u, start.multipliers[active]
@@ -171,9 +180,12 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Array) -> _Point | No
         return None
     across = dpotrs(factor, d * scale, lower=1)[0] * scale
     stiffness = float(d @ across)
-    for _ in range(STEPS):
+    if not stiffness > 0.0:
+        return None
+    for taken in range(STEPS):
         r1, r2, r3 = -Q * z - multipliers @ C, b + d * u - C @ z, 1.0 - float(d @ multipliers)
-        if np.abs(r2).max() <= MET and np.abs(r1).max() <= STILL and abs(r3) <= WHOLE:
+        missing = np.abs(r1).max() > STILL or np.abs(r2).max() > MET or abs(r3) > WHOLE
+        if taken and not missing:
             whole = np.zeros(len(active))
             whole[active] = multipliers
             return _Point(z, u, whole)

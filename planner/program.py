@@ -47,7 +47,7 @@ from hand_models.hand import FINGERS
 from planner import deadline
 from planner.compiled import OUT_OF_TIME, Compiled
 from planner.conic_extent import Extent
-from planner.stance_data import Shape, StanceData
+from planner.stance_data import ROOM, Shape, StanceData
 
 __all__ = [
     "SETTINGS",
@@ -63,6 +63,7 @@ __all__ = [
     "Reached",
     "TieBreak",
     "Unique",
+    "build_ahead",
     "tie_weight",
 ]
 
@@ -481,6 +482,17 @@ class Nearest(_Program):
 @lru_cache(maxsize=128)
 def _built(kind: type[_Program], shape: Shape, *further: int) -> Future[_Program]:
     return _builders[0].submit(kind, shape, *further)
+
+
+def build_ahead(hands: int) -> None:
+    """Begin to build what plans of up to so many hands with fixed wrists need; do not wait for it.
+
+    So the first of them need not wait for it either.
+    """
+    for count in range(hands, 0, -1):
+        room = Shape(6, (ROOM,) * count)
+        for kind in (Unique, LoadFactor):
+            _built(kind, room)
 
 
 def _after_fork() -> None:

@@ -153,6 +153,8 @@ class Limits:
             if most is not None and not (math.isfinite(most) and most > 0.0):
                 raise InvalidInputError(f"must be above 0 N, got {most:g}", field=name)
         torque = self.joint_torque
+        if torque is None:
+            return
         if isinstance(torque, Mapping):
             torque = {
                 limb: tuple(most) if isinstance(most, Sequence) else most

@@ -13,7 +13,7 @@ from hand_models.finger import PHALANGES
 from hand_models.frames import Array, Indices
 from hand_models.hand import FINGERS, NAIL, SettledHand, SpinyHand, Tile
 from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
-from hand_models.spines import HalfPlane
+from hand_models.spines import HalfPlane, Surface
 from hand_models.wrench_space import Row, WrenchSpace
 from planner.carried import Carried
 from planner.hand_plan import HandPlan, PalmPlan
@@ -45,6 +45,9 @@ OWN: Final = (
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Which way a palm shears and presses along x and z."""
+
+WRENCH: Final = 6
+"""Rows of a wrench."""
 
 SIGNED: Final = ("/lateral", f"/{NAIL}")
 """Loads that may be negative."""
@@ -89,11 +92,9 @@ class Reader:
 
     def __init__(self, settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> None:
         self._spaces = spaces
-        scaled = [scaled_rows(space) for space in spaces]
-        self._limits = [rows.L for rows in scaled]
         self._known = known = stacked(tuple(settled))
         names = [name for space in spaces for name in (space.columns, space.rows)]
-        pieces = tuple([hand.surface.pieces() for hand in settled])
+        pieces = _pieces_of(Same(*[hand.surface for hand in settled]))
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
         tiles = [hand.tiles for hand in settled]
@@ -105,9 +106,17 @@ class Reader:
         self._slope[:, 2] = known.touch.shares
         if len(layout.hooked):
             self._slope[layout.hooked, 0] = 1.0
-        self._used_at_rest = np.concatenate([rows.l0 for rows in scaled])
-        self._origins = np.array([space.origin for space in spaces])
-        self._drive, self._drawn = settled[0].hand.drive, drawn_tendons(known)
+        # rows of all hands, each of as many, and as long, as the largest has: wrench, then limits
+        self._rows = np.zeros((*layout.shape, layout.columns.shape[1]))
+        self._at_rest = np.zeros(layout.shape)
+        for mine, rest, space in zip(self._rows, self._at_rest, spaces, strict=True):
+            own = scaled_rows(space)
+            end, columns = WRENCH + len(own.L), own.L.shape[1]
+            mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
+            rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
+        joints, _, nails = drawn_tendons(known)
+        self._drives, self._per_shear = _drives_of(known.places, Same(settled[0].hand))
+        self._winches = (joints + nails) / settled[0].hand.drive.winch_radius
         self._fixed = (
             tuple(tiles),
             pieces,
@@ -123,34 +132,32 @@ class Reader:
         known, layout = self._known, self._layout
         y = np.concatenate([ZERO, *loads])
         np.maximum(y, layout.least, out=y)
-        scaled = y / LOAD_UNIT
-        limits = zip(self._limits, layout.parts, strict=True)
-        used = np.concatenate([L @ scaled[part] for L, part in limits])
-        used += self._used_at_rest
+        scaled = y.take(layout.columns)
+        scaled /= LOAD_UNIT
+        rows = (self._rows @ scaled[:, :, None])[:, :, 0]
+        rows += self._at_rest
+        wrenches, used = rows[:, :WRENCH], rows.take(layout.limits)
         efforts = used.take(layout.efforts)
-        parts = zip(self._spaces, layout.parts, strict=True)
-        wrenches = np.array([space.generators @ y[part] for space, part in parts])
-        wrenches += self._origins
 
         tensions, palms = y.take(layout.tensions), y.take(layout.palms)
         of_tiles = y.take(layout.of_tile)
         of_tiles *= self._slope
         of_tiles += self._at_zero
-        tile_used = np.zeros(len(of_tiles))
-        tile_used[known.touch.touching] = np.maximum.reduceat(used, layout.begins)[layout.kept]
+        tile_used = np.maximum.reduceat(used, layout.begins).take(layout.kept)
+        tile_used *= known.touch.touches
         shears = of_tiles[:, 0]
         if len(layout.hooked):
             tile_used[layout.hooked] = used[layout.nail_limits].max(axis=1)
             shears = shears.copy()
             shears[layout.hooked] = 0.0
         drawn = np.add.reduceat(shears, known.places.first_of_finger)
-        drives = np.empty((3, len(tensions)))
-        drives[0] = self._drive.torque(tensions)
-        drives[1] = self._drive.current(tensions)
-        joints, losses, nails = self._drawn
-        drives[2] = self._drive.winch_angle(joints, tensions, drawn, losses, nails)
+        at_zero, per_newton = self._drives
+        drives = per_newton * tensions
+        drives += at_zero
+        drives[2] += self._winches
+        drives[2] += self._per_shear * drawn
         forces = np.zeros((len(known.points), 3))
-        np.einsum("tk,tkx->tx", of_tiles, known.axes, out=forces[: len(of_tiles)])
+        forces[: len(of_tiles)] = (of_tiles[:, None] @ known.axes)[:, 0]
         forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
         palm_used = palms / known.palm_limits
         carried = Carried(
@@ -167,7 +174,7 @@ class Reader:
             np.maximum(np.maximum.reduceat(used, layout.first_row), 0.0),
             *self._fixed,
         )
-        return Reading(carried, used, float(efforts @ efforts))
+        return Reading(carried, used, float(efforts.dot(efforts)))
 
     def hands(self, limbs: Sequence[str], carried: Carried) -> tuple[HandPlan, ...]:
         """Return what was read, hand by hand; its arrays are parts of those."""
@@ -229,6 +236,36 @@ def drawn_tendons(known: Stacked) -> tuple[Array, Array, Array]:
     radii, losses = _losses(known.places, Same(hand))
     nails = hand.nail.pulley_radius * joined([each.nail_angles for each in known.hands])
     return known.bends @ radii, losses, nails
+
+
+@lru_cache(maxsize=KEPT)
+def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
+    """Return what tensions and tiles' shears do to motors and winches, affine in them.
+
+    Returns
+    -------
+    drives : ndarray, shape (2, 3, F)
+        Torque [N·m] and current [A] of each motor, angle of each winch [rad]: at zero tension,
+        straight fingers and without shear; then per newton of tension.
+    per_shear : float
+        Of the winches' angles, per newton of the shears of a tendon's tiles [rad/N].
+    """
+    (hand,) = key.each
+    assert isinstance(hand, SpinyHand)
+    drive, (_, losses) = hand.drive, _losses(places, key)
+    none, one = np.zeros_like(losses), np.ones_like(losses)
+    at_zero, at_one = (
+        np.array([drive.torque(f), drive.current(f), drive.winch_angle(none, f, none, losses)])
+        for f in (none, one)
+    )
+    return np.array([at_zero, at_one - at_zero]), drive.winch_angle(0.0, 0.0, 1.0, 0.0)
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _pieces_of(key: Same) -> tuple[tuple[HalfPlane, ...], ...]:
+    """Return the half-planes of tiles on these surfaces."""
+    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
+    return tuple([surface.pieces() for surface in surfaces])
 
 
 @lru_cache(maxsize=KEPT)
@@ -314,8 +351,12 @@ class _Layout(NamedTuple):
 
     Attributes
     ----------
-    parts : tuple of slice
-        Of the loads, by hand; before all of them is one that is zero.
+    columns : ndarray of int, shape (H, most m)
+        Each hand's loads among all; before all of them is one that is zero.
+    shape : tuple of int
+        (H, 6 + most limits): so many rows of so many hands.
+    limits : ndarray of int, shape (sum of nl,)
+        The limit rows among all hands' rows, of which the first six of each hand are its wrench.
     least : ndarray, shape (1 + m,)
         What each load may be at least [N].
     tensions : ndarray of int, shape (F,)
@@ -326,8 +367,8 @@ class _Layout(NamedTuple):
         Of the limit rows, by hand.
     begins : ndarray of int
         Where the limit rows of each tile on rock begin, and where those of a hand's last one end.
-    kept : ndarray of int
-        Those of them where a tile's begin.
+    kept : ndarray of int, shape (T,)
+        Which of them each tile's are; the first for those that are not on rock.
     hooked : ndarray of int
         Nails that hook.
     nail_limits : ndarray of int, shape (number of them, 2)
@@ -336,7 +377,9 @@ class _Layout(NamedTuple):
         Limit rows whose utilisation counts as effort.
     """
 
-    parts: tuple[slice, ...]
+    columns: Indices
+    shape: tuple[int, int]
+    limits: Indices
     least: Array
     tensions: Indices
     palms: Indices
@@ -378,15 +421,28 @@ def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
     hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
     of_tile[hooked, 0] = axials[places.finger[hooked]]
     pairs = list(zip(first_row, hands, strict=True))
+    columns = np.zeros((count, max(len(hand.least) for hand in hands)), dtype=np.intp)
+    for own, end, hand in zip(columns, ends, hands, strict=False):
+        own[: len(hand.least)] = end + np.arange(len(hand.least))
+    shape = count, WRENCH + max(hand.rows for hand in hands)
+    kept = np.zeros(len(places.hand), dtype=np.intp)
+    kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
     return _Layout(
-        parts=tuple(map(slice, ends, ends[1:])),
+        columns=columns,
+        shape=shape,
+        limits=joined(
+            [
+                shape[1] * h + WRENCH + np.arange(hand.rows, dtype=np.intp)
+                for h, hand in enumerate(hands)
+            ]
+        ),
         least=np.concatenate([ZERO, *[hand.least for hand in hands]]),
         tensions=tensions,
         palms=found[:, 3 * COUNT :],
         of_tile=of_tile,
         first_row=np.array(first_row),
         begins=joined([at + hand.begins for at, hand in pairs]),
-        kept=places.hand[touch.touching] + np.arange(len(touch.touching)),
+        kept=kept,
         hooked=hooked,
         nail_limits=joined([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
         efforts=joined([at + hand.efforts for at, hand in pairs]),

@@ -1,11 +1,16 @@
 """What a plan's tensions, or where its wrists go, do to the hands: recomputed for the check.
 
-From the full equilibrium of Eq. 6 (`equilibrium`), the plan's half-planes, Eq. 21 itself
-(`limit_curve`), the forces one by one and the published figures of motors and structure.
+From the plan's forces one by one: the balance of joints and tendons that they must keep (Eqs. 4–8,
+`joint_balance`), the plan's half-planes, Eq. 21 itself (`limit_curve`), and the published figures
+of motors and structure. Only where something is off, Eq. 6 is solved to say what would be right
+(`equilibrium`).
+
+What hangs on the hands alone is worked out when `Recomputing` is made, before there is a plan.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
@@ -17,19 +22,45 @@ from hand_models.hand import FINGERS
 from hand_models.structure import HELD
 from planner.carried import Carried
 from planner.equilibrium import equilibrium
-from planner.limit_curve import LimitCurves
+from planner.joint_balance import LEVER, JointBalance
 from planner.stacked import KEPT, Same, Stacked
-from planner.verify_arrays import LOAD, UTILISATION, Limits, arms_of, limits_of, roles_of
+from planner.verify_arrays import (
+    DRIVEN,
+    LOAD,
+    SHEAR,
+    TIP,
+    UTILISATION,
+    WINCH,
+    arms_of,
+    limits_of,
+    planes_of,
+    roles_of,
+    uses_of,
+)
 from planner.verify_floating import Said, check_finger, check_palm
 from planner.verify_nails import check_nails, nail_angles
 from planner.verify_words import Recomputed
 
-__all__ = ["Recomputing", "recomputing_of"]
+__all__ = ["PULLING", "STOP", "Recomputing", "recomputing_of"]
+
+STOP: Final = 1e-6
+"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
+
+NEAR: Final = LOAD * LEVER
+"""Error of balances [N, N·m], drives and utilisations below which nothing can be off."""
+
+PULLING: Final = np.array([np.inf, np.inf, 0.0])
+"""Of a hand's force, what does not press."""
 
 COUNT: Final = len(FINGERS)
 
-PALM_SIGNS: Final = np.array([-1.0, 1.0])
-"""Which way a palm shears and presses along x and z."""
+least, most = np.minimum.reduce, np.maximum.reduce
+
+PALM_SIDES: Final = np.array([-1.0, 0.0, 1.0])
+"""Which way a palm carries along x, y and z."""
+
+PALM_SIGNS: Final = PALM_SIDES[::2]
+"""The same along x and z: of its shear and pressing."""
 
 
 @lru_cache(maxsize=KEPT)
@@ -57,31 +88,31 @@ class Recomputing:
     def __init__(
         self, known: Stacked, limbs: tuple[str, ...], strength: float, preloads: Same
     ) -> None:
-        self.known, self.limbs = known, limbs
+        hands, places, body = known.hands, known.places, Same(known.hands[0].hand)
+        self.known, self.limbs, self._body = known, limbs, known.hands[0].hand
         self._preloads: tuple[Array | None, ...] = preloads.each  # type: ignore[assignment]
-        self._roles, self._body = roles_of(known.places), known.hands[0].hand
-        self._equilibrium = equilibrium(known.hands)
-        surfaces = [hand.surface for hand in known.hands]
-        self._curves = LimitCurves(surfaces, known.places.hand)
-        self._limits = limits_of(Same(*surfaces))
-        self._planes = self._limits.on(known)
+        self._balance = JointBalance(known)
+        self._limits = limits_of(Same(*[hand.surface for hand in hands]), known)
         self._arms = arms_of(known.points)
-        # of each tendon: torque and current of its motor, then what its strength and these use
-        drive = self._body.drive
-        torque = drive.winch_radius / drive.gear_ratio / drive.efficiency
-        current, idle = torque / drive.torque_constant, drive.no_load_current
-        use = 1.0 / strength, torque / drive.maximum_torque, current / drive.maximum_current
-        self._per_newton = np.array([torque, current, *use])[:, None]
-        self._at_zero = np.array([0.0, idle, 0.0, 0.0, idle / drive.maximum_current])[:, None]
+        self._palm_shares = PALM_SIGNS / known.palm_limits
+        self._uses = uses = uses_of(places, body, strength)
+        self._at_zero = uses.at_zero.copy()
+        self._at_zero[WINCH] += known.bends @ uses.per_bend
+        self._tiles = tuple([hand.tiles for hand in hands])
+        self._engaged = tuple([hand.palm.engaged for hand in hands])
+        self._off = [h for h, engaged in enumerate(self._engaged) if not engaged]
 
     def allowed(self, carried: Carried) -> Array:
         """Return the error that loads of each hand may have, shape (H,), at least `LOAD` [N]."""
-        largest = np.fmax.reduceat(np.abs(carried.loads).ravel(), self._roles.first_component)
+        first = roles_of(self.known.places).first_component
+        largest = np.fmax.reduceat(np.abs(carried.loads).ravel(), first)
         most = np.fmax(largest, np.abs(carried.palms).max(axis=1))
         return np.asarray(LOAD * np.fmax(most, 1.0))
 
     def of(self, found: list[str], carried: Carried, bears: Array | None) -> Recomputed:
         """Return what a plan's numbers do to the hands.
+
+        The tiles' loads are what the plan says, as long as these balance; see `near`.
 
         Parameters
         ----------
@@ -91,103 +122,141 @@ class Recomputing:
         bears : ndarray, shape (H,), or None
             Utilisation of each hand by what its stance adds: joints, caps.
         """
-        known, eq, f, loads = self.known, self._equilibrium, carried.tensions, carried.loads
-        places, tiles, fingers = known.places, len(loads), len(f)
-        # of a floating hand the motors stand still where they have tightened its tendons
-        floats = [h for h, wrist in enumerate(carried.wrists) if wrist is not None]
-        wound = self._wound(f, floats) if floats else f
-        rows = eq.rows[1] * wound.take(eq.fingers)
-        rows += eq.rows[0]
-        shear, normal = planar = rows[: 2 * tiles].reshape(2, tiles)
-        drawn, stops = rows[2 * tiles : 2 * tiles + fingers], rows[2 * tiles + fingers :]
-        for h in floats:
-            self._float(found, carried, h, (wound, shear, normal, stops))
-        apart, aside = np.abs(loads[:, :2].T - planar), np.abs(loads[:, 2])
+        known, balance, f = self.known, self._balance, carried.tensions
+        places, loads, tiles = known.places, carried.loads, len(carried.loads)
+        shear, normal, floats = balance.shears(f), loads[:, 1], self._floats(carried)
+        same = carried.points is known.points
+        each = (self._arms if same else arms_of(carried.points)) @ carried.forces[:, :, None]
+        each = each[:, :, 0]
+        left = balance.left(f, each)
+        stops = balance.stops(left)
+        drawn = np.add.reduceat(shear, places.first_of_finger)
+        again = loads
+        if floats:
+            shear, normal, stops, drawn = self._floated(found, carried, floats)
+            again = np.column_stack((shear, normal, loads[:, 2]))
+        uses = self._uses.per_newton * f
+        uses += self._at_zero
+        uses += self._uses.per_shear * drawn
+        uses[TIP] = normal.take(places.tips) * self._uses.per_press
+        if floats:
+            uses[WINCH] += self._uses.per_newton[WINCH] * (self._wound(f, floats) - f)
+            uses[SHEAR] = self._uses.per_shear[SHEAR] * np.add.reduceat(
+                shear, places.first_of_finger
+            )
 
-        same = carried.half_planes == self._limits.pieces
-        planes = self._planes if same else Limits.of(carried.half_planes).on(known)
-        used = np.einsum("pkt,kt->pt", planes, np.concatenate((planar, aside[None])))
-        used = np.maximum.reduce(used)
-        curve = self._curves.excess(shear, normal, aside, UTILISATION)
-        curve[(used > 1.0) | known.touch.away] = -np.inf
+        limits, told = self._limits, carried.half_planes
+        planes = limits.planes if told == limits.pieces else planes_of(told, known)
+        used = most(planes @ again[:, :, None], axis=(1, 2))
+        curve = limits.curves.excess(again[:, 0], again[:, 1], again[:, 2], UTILISATION)
+        if not most(curve) <= LOAD:
+            # beyond its half-planes a tile may be outside the surface, too
+            curve[(used > 1.0) | known.touch.away] = -np.inf
         if len(places.nails):
-            apart[:, places.nails] = 0.0
             used += check_nails(found, known, self.limbs, carried, self.allowed(carried))
-        forces = carried.forces[:tiles] - np.einsum("tk,tkx->tx", loads, carried.axes)
+            turned = nail_angles(known, carried) - self._body.nail.retraction
+            uses[WINCH] += self._uses.per_nail * turned
+        used = np.maximum(used, 0.0)
 
-        palm, force = carried.palms, carried.wrenches[:, :3]
-        by_rows = np.maximum.reduce(HELD @ force.T)
-        held = force.copy()
-        np.minimum(force[:, 2], 0.0, out=held[:, 2])
-        held = np.sqrt(np.einsum("hx,hx->h", held, held))
-        pressed = palm[:, ::2] * PALM_SIGNS / known.palm_limits
-        pressed = np.maximum(pressed[:, 0], pressed[:, 1])
-        motors = self._per_newton * f
-        motors += self._at_zero
-        whole = self._hand_use(motors[2:], shear, normal, used)
-        whole = np.maximum(np.maximum(whole, pressed), by_rows / self._body.structure.hand_load)
+        wrenches = np.add.reduceat(each[:tiles], places.first)
+        wrenches += each[tiles:]
+        wrenches[:, 3:] += carried.palm_moments
+        force = carried.wrenches[:, :3]
+        by_rows = most(HELD @ force.T)
+        held = np.minimum(force, PULLING)
+        palms = carried.palms[:, ::2] * self._palm_shares
+        pressed = most(palms, axis=1)
+        # of all four tendons, motors, fingers and tips
+        whole = most(uses[DRIVEN:].reshape(-1, len(palms), COUNT), axis=(0, 2))
+        whole = np.maximum(whole, np.maximum.reduceat(used, places.first))
+        whole = np.maximum(np.maximum(whole, pressed), by_rows / self._uses.hand_load)
         if bears is not None:
             whole = np.maximum(whole, bears)
-        wrenches = self._summed(carried) - carried.wrenches
         return Recomputed(
-            self.limbs,
-            known,
-            carried,
-            shear,
-            normal,
-            stops,
-            eq.stop_fingers,
-            held,
-            by_rows,
-            float(whole.max()),
-            np.concatenate(
-                (motors[0], motors[1], self._turned(carried, drawn), used, pressed, whole)
-            ),
-            np.concatenate(
-                (
-                    # NaN, and so off, where a tension is infinite
-                    0.5 * (np.abs(f) - f),
-                    apart.ravel(),
-                    -shear,
-                    -normal * known.touch.framed,
-                    np.abs(forces).ravel(),
-                    curve,
-                    palm[:, 0],
-                    -palm[:, 2],
-                    np.abs(wrenches).ravel(),
-                    held - by_rows,
-                )
-            ),
+            limbs=self.limbs,
+            known=known,
+            carried=carried,
+            shear=shear,
+            normal=normal,
+            left=left,
+            stops=stops,
+            stop_fingers=balance.stop_fingers,
+            curves=curve,
+            forces=carried.forces[:tiles] - (loads[:, None] @ carried.axes)[:, 0],
+            wrenches=wrenches - carried.wrenches,
+            held=np.sqrt(np.add.reduce(held * held, axis=1)),
+            by_rows=by_rows,
+            drives=uses[:DRIVEN],
+            tiles=used,
+            palms=pressed,
+            hands=whole,
         )
 
-    def _hand_use(self, motors: Array, shear: Array, normal: Array, used: Array) -> Array:
-        """Return how much each hand's tendons, motors, fingers and tiles are used, shape (H,)."""
-        structure, places = self._body.structure, self.known.places
-        fingers = np.add.reduceat(shear, places.first_of_finger) / structure.finger_shear
-        tips = normal.take(places.tips) / structure.fingertip_force
-        fingers = np.maximum(np.maximum(fingers, tips), np.maximum.reduce(motors))
-        by_finger = np.maximum.reduceat(fingers, places.first_finger)
-        return np.maximum(by_finger, np.maximum.reduceat(used, places.first))
+    def near(self, again: Recomputed) -> bool:
+        """Whether all numbers of fixed hands are so near that none can be off by what it may.
 
-    def _turned(self, carried: Carried, drawn: Array) -> Array:
-        """Return the winches' angles, by what tiles and joints draw in and where nails hook."""
-        drive, nail = self._body.drive, self._body.nail
-        angles: float | Array = nail.retraction
+        By the Euclidean norm of all, which none of them exceeds. Numbers that are not finite are
+        not near.
+        """
+        carried, touch, normal = again.carried, self.known.touch, again.normal
+        apart, left, palms = again.shear - carried.loads[:, 0], again.left, carried.palms
+        if self._floats(carried):
+            return False
         if len(self.known.places.nails):
-            angles = nail_angles(self.known, carried)
-        return np.asarray((drawn + nail.pulley_radius * angles) / drive.winch_radius)
+            apart[self.known.places.nails] = 0.0
+        if self._balance.held is not None:
+            left = np.where(self._balance.held, 0.0, left)
+        off = np.concatenate(
+            (
+                apart,
+                left.ravel(),
+                normal.take(self.known.places.bases),
+                again.forces.ravel(),
+                again.wrenches.ravel(),
+                (again.drives - carried.drives).ravel(),
+                again.tiles - carried.tile_utilisations,
+                again.palms - carried.palm_utilisations,
+                again.hands - carried.utilisations,
+            )
+        )
+        return bool(
+            math.sqrt(off.dot(off)) <= NEAR
+            and least(carried.tensions) >= 0.0
+            and least(again.shear) >= -LOAD
+            and most(again.curves) <= LOAD
+            and least(again.by_rows - again.held) >= -LOAD
+            and least(palms * PALM_SIDES, axis=None) >= 0.0
+            and not palms[:, 1].any()
+            and not (self._off and palms[self._off].any())
+            and (
+                len(touch.touching) == len(touch.contacts)
+                or (least(normal * touch.framed) >= -LOAD and not carried.forces[touch.idle].any())
+            )
+            and (not len(again.stops) or least(again.stops) >= -STOP)
+            and carried.tiles == self._tiles
+            and carried.engaged == self._engaged
+        )
 
-    def _summed(self, carried: Carried) -> Array:
-        """Return the hands' wrenches, force by force, shape (H, 6)."""
-        tiles, same = len(carried.loads), carried.points is self.known.points
-        arms = self._arms if same else arms_of(carried.points)
-        each = np.einsum("nwx,nx->nw", arms, carried.forces)
-        found = np.add.reduceat(each[:tiles], self.known.places.first)
-        found += each[tiles:]
-        found[:, 3:] += carried.palm_moments
-        return found
+    def solved(self, again: Recomputed) -> Recomputed:
+        """Return the numbers with the loads that fixed hands' tensions give by Eq. 6."""
+        carried = again.carried
+        if self._floats(carried):
+            return again
+        shear, normal, _ = self._solved(carried.tensions)
+        return again._replace(shear=shear, normal=normal)
+
+    def _solved(self, tensions: Array) -> tuple[Array, Array, Array]:
+        """Return shear and normal of each tile (T,), and what presses on stops (k,), by Eq. 6."""
+        solved = equilibrium(self.known.hands)
+        rows = solved.rows[0] + solved.rows[1] * tensions[solved.fingers]
+        tiles, fingers, _ = self.known.places.shape
+        shear, normal = rows[: 2 * tiles].reshape(2, tiles)
+        return shear, normal, rows[2 * tiles + fingers :]
 
     # Floating wrists ----------------------------------------------------------------------------
+
+    def _floats(self, carried: Carried) -> list[int]:
+        return [h for h, wrist in enumerate(carried.wrists) if wrist is not None]
 
     def _wound(self, tensions: Array, floats: Sequence[int]) -> Array:
         """Return to which tensions winches have drawn the tendons: of floating hands, preloads."""
@@ -197,6 +266,21 @@ class Recomputing:
             own = wound[COUNT * h : COUNT * (h + 1)]
             own[:] = self.known.hands[h].closing_tension if preload is None else preload
         return wound
+
+    def _floated(
+        self, found: list[str], carried: Carried, floats: Sequence[int]
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return shears, normals and stops of hands of which some float, and sums of shears.
+
+        The motors of those stand still where they have tightened their tendons; the sums are of
+        these tensions.
+        """
+        wound = self._wound(carried.tensions, floats)
+        shear, normal, stops = self._solved(wound)
+        drawn = np.add.reduceat(shear, self.known.places.first_of_finger)
+        for h in floats:
+            self._float(found, carried, h, (wound, shear, normal, stops))
+        return shear, normal, stops, drawn
 
     def _float(
         self,
@@ -211,7 +295,7 @@ class Recomputing:
         """
         hand, limb, wrist = self.known.hands[h], self.limbs[h], carried.wrists[h]
         assert wrist is not None
-        (preloads, shear, normal, stops), eq = loads, self._equilibrium
+        (preloads, shear, normal, stops), eq = loads, equilibrium(self.known.hands)
         allowed = float(self.allowed(carried)[h])
         for i, name in enumerate(FINGERS):
             finger = COUNT * h + i

@@ -27,7 +27,6 @@ from planner.explain import (
     limit_sentence,
     overload_sentence,
     shortfall_sentence,
-    warnings,
 )
 from planner.floating import Settled
 from planner.floating_effort import least_effort, with_room
@@ -47,13 +46,13 @@ from planner.plan import (
     Times,
 )
 from planner.posture import Posture, posture
+from planner.prepared import Prepared, prepare
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
-from planner.reading import Reader, reader_of
+from planner.reading import reader_of
 from planner.reading_floating import read_floating_hand
 from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
 from planner.unfinished import Unfinished, late_sentence
-from planner.verify import Check
 
 __all__ = ["Ground", "ground_of", "plan", "plan_on"]
 
@@ -230,10 +229,10 @@ class _Answer:
         self.outcome = found.outcome
         if found.proven:
             self.bound = found.bound
-            if found.exact is None:
+            if found.loads is None:
                 self._settle_tie()
             else:
-                self._take(found.exact.loads)
+                self._take(found.loads)
             if not self.wrong:
                 return
         one, bound = self.outcome, self.bound
@@ -298,28 +297,23 @@ class _Answer:
     def _take(self, loads: tuple[Array, ...]) -> None:
         """Read these loads, and check them."""
         self.loads = loads
-        if self.parts.floating:
+        reader, check, _ = self._prepared
+        if reader is None:
             self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
             self.carried = Carried.of(self.hands)
             self.used = stance_data.used(self.data, loads)
             self.effort = stance_data.used_effort(self.data, loads)
         else:
             self.hands = ()
-            self.carried, self.used, self.effort = self._reader.read(loads)
-        self.utilisation = float(self.carried.utilisations.max())
-        self.wrong = self._check.problems(
-            self.carried, self._whole_utilisation, self.wrench, self.effort
-        )
+            self.carried, self.used, self.effort = reader.read(loads)
+        self.utilisation = float(np.maximum.reduce(self.carried.utilisations))
+        self.wrong = check.problems(self.carried, self._whole_utilisation, self.wrench, self.effort)
 
     @cached_property
-    def _reader(self) -> Reader:
-        """Reads loads of fixed hands."""
-        return reader_of(self.settled, self.spaces)
-
-    @cached_property
-    def _check(self) -> Check:
-        """What every plan must pass."""
-        return Check(self.question, self.settled, self.where)
+    def _prepared(self) -> Prepared:
+        """What reads and checks plans."""
+        spaces = None if self.parts.floating else self.spaces
+        return prepare(self.question, self.where, self.settled, spaces)
 
     def _read_hand(self, index: int, y: Array) -> HandPlan:
         """Read one hand of a stance of which some float."""
@@ -441,8 +435,8 @@ class _Answer:
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
             else:
-                if not self.hands:
-                    self.hands = self._reader.hands(self.limbs, self.carried)
+                if self._prepared.reader is not None:
+                    self.hands = self._prepared.reader.hands(self.limbs, self.carried)
                 verified, hands = True, self.hands
                 utilisation = self._whole_utilisation
                 cap = self.question.limits.utilisation
@@ -515,7 +509,7 @@ class _Answer:
             self.path_unknown = "path" not in self.unfinished
 
     def _warnings(self) -> tuple[str, ...]:
-        found = warnings(self.question.stance, self.settled)
+        found = self._prepared.oddities
         seconds = deadline.seconds()
         if self.unfinished and seconds is not None:
             found += (late_sentence(seconds, self.unfinished),)
@@ -565,8 +559,8 @@ class _Answer:
 
     def _residual(self) -> Array:
         """Return the body wrench of the hands' wrenches less the one planned for."""
-        carried = np.einsum("hij,hj->i", self.parts.transports, self.carried.wrenches)
-        return np.asarray(-self.wrench - carried)
+        carried = self.parts.transports @ self.carried.wrenches[:, :, None]
+        return np.asarray(-self.wrench - np.add.reduce(carried).ravel())
 
     @property
     def _floating(self) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -210,12 +210,10 @@ class Stacked:
     points : ndarray, shape (T + H, 3)
         Where all tiles are, then all palms.
     axes : ndarray, shape (T, 3, 3)
-    angles, alongs : ndarray, shape (F, 3)
-        Of each phalanx [rad], and of its contact along it [m].
+    angles : ndarray, shape (F, 3)
+        Of each phalanx [rad].
     bends : ndarray, shape (F, 3)
         Of each joint, relative to the phalanx before it [rad].
-    stops : ndarray of int8, shape (F, 3)
-        Codes of `STOPS`.
     palm_limits : ndarray, shape (H, 2)
         Of each palm's shear and pressing; infinite where it touches nothing [N].
     """
@@ -226,10 +224,13 @@ class Stacked:
     points: Array
     axes: Array
     angles: Array
-    alongs: Array
     bends: Array
-    stops: NDArray[np.int8]
     palm_limits: Array
+
+    @cached_property
+    def stops(self) -> NDArray[np.int8]:
+        """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
+        return joined([hand.postures.stops for hand in self.hands])
 
 
 @lru_cache(maxsize=KEPT)
@@ -257,9 +258,7 @@ def stacked(hands: tuple[SettledHand, ...]) -> Stacked:
         points,
         axes,
         angles,
-        joined([posture.alongs for posture in postures]),
         bends,
-        joined([posture.stops for posture in postures]),
         np.array(limits),
     )
 

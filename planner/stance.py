@@ -60,39 +60,37 @@ def moderate(wrench: Array, field: str | None) -> Array:
 
 def _possible(pose: Pose, field: str) -> None:
     """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
-    position = finite_vector(pose.position, 3, f"{field}.position").tolist()
+    if pose.proper:
+        position = pose.position.tolist()
+    else:
+        position = finite_vector(pose.position, 3, f"{field}.position").tolist()
     if max(map(abs, position)) > FARTHEST:
         raise InvalidInputError(
             f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"
         )
-    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation")
-    if not _right_handed(axes.reshape(3, 3)):
+    if pose.proper:
+        return
+    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").tolist()
+    if not _right_handed(*axes):
         raise InvalidInputError(
             "orthonormal right-handed axes are needed", field=f"{field}.orientation"
         )
 
 
-def _right_handed(axes: Array) -> bool:
-    """Whether the columns are orthonormal, and the third is the first times the second."""
-    x, y, z = axes.T.tolist()
-    third = (
-        x[1] * y[2] - x[2] * y[1],
-        x[2] * y[0] - x[0] * y[2],
-        x[0] * y[1] - x[1] * y[0],
+def _right_handed(
+    a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, i: float
+) -> bool:
+    """Whether columns x = (a, d, g), y and z are orthonormal, and z is x × y."""
+    off = (
+        a * a + d * d + g * g - 1.0,
+        b * b + e * e + h * h - 1.0,
+        c * c + f * f + i * i - 1.0,
+        a * b + d * e + g * h,
+        b * c + e * f + h * i,
+        c * a + f * d + i * g,
+        c * (d * h - g * e) + f * (g * b - a * h) + i * (a * e - d * b) - 1.0,
     )
-    products = (
-        (x, x, 1.0),
-        (y, y, 1.0),
-        (z, z, 1.0),
-        (x, y, 0.0),
-        (y, z, 0.0),
-        (z, x, 0.0),
-        (z, third, 1.0),
-    )
-    return all(
-        abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - product) <= ORTHONORMAL
-        for a, b, product in products
-    )
+    return max(off) <= ORTHONORMAL and min(off) >= -ORTHONORMAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,10 +216,11 @@ class Stance:
         _possible(self.body, "body")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, 3, "gravity"))
         seen: set[str] = set()
+        limbs, reach, origin = self.robot.limbs, self.robot.reach, self.body.position.tolist()
         for i, hand in enumerate(self.hands):
-            if hand.limb not in self.robot.limbs:
+            if hand.limb not in limbs:
                 raise InvalidInputError(
-                    f"unknown limb {hand.limb!r}; known are {', '.join(self.robot.limbs)}",
+                    f"unknown limb {hand.limb!r}; known are {', '.join(limbs)}",
                     field=f"hands[{i}].limb",
                 )
             if hand.limb in seen:
@@ -229,10 +228,10 @@ class Stance:
                     f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
                 )
             seen.add(hand.limb)
-            away = math.dist(hand.pose.position.tolist(), self.body.position.tolist())
-            if away > TOO_FAR * self.robot.reach:
+            away = math.dist(hand.pose.position.tolist(), origin)
+            if away > TOO_FAR * reach:
                 raise InvalidInputError(
                     f"the hand is {away:.3g} m from the body; its limb reaches about "
-                    f"{self.robot.reach:.2g} m (positions are in metres)",
+                    f"{reach:.2g} m (positions are in metres)",
                     field=f"hands[{i}].pose.position",
                 )

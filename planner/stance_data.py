@@ -28,10 +28,12 @@ from planner.scaled_rows import (
 __all__ = [
     "JOINT_TORQUE",
     "LOAD_UNIT",
+    "ROOM",
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
     "HandData",
+    "HandRows",
     "Shape",
     "StanceData",
     "beyond",
@@ -129,6 +131,45 @@ def with_held(carried: Array, held: Array) -> Array:
     return np.vstack([carried, held / WRENCH_UNIT]) if len(held) else carried
 
 
+class HandRows(NamedTuple):
+    """All hands' rows in all their loads z (M,): G z of the balance, limits L z, hard rows H z.
+
+    Attributes
+    ----------
+    whole : ndarray, shape (nb + Σ nl + Σ nh, M)
+        G above L above H.
+    rest : ndarray, shape (Σ nl + Σ nh,)
+        −l0 above h.
+    limits : int
+        Σ nl.
+    unit, tie : ndarray, shape (M,)
+        Of `HandData`.
+    """
+
+    whole: Array
+    rest: Array
+    limits: int
+    unit: Array
+    tie: Array
+
+    @classmethod
+    def of(cls, hands: Sequence[HandData], balance: int) -> HandRows:
+        """Write the rows of hands below each other."""
+        unit = np.concatenate([hand.unit for hand in hands])
+        rest = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
+        limits = sum(len(hand.l0) for hand in hands)
+        whole = np.zeros((balance + len(rest), len(unit)))
+        left, limit, below = 0, balance, balance + limits
+        for hand in hands:
+            m, nl, nh, _ = hand.shape
+            right = left + m
+            whole[:balance, left:right] = hand.G
+            whole[limit : limit + nl, left:right] = hand.L
+            whole[below : below + nh, left:right] = hand.H
+            left, limit, below = right, limit + nl, below + nh
+        return cls(whole, rest, limits, unit, np.concatenate([hand.tie for hand in hands]))
+
+
 class Shape(NamedTuple):
     """What a program is built for: rows of balance, and (m, nl, nh, ne) of each hand."""
 
@@ -173,9 +214,18 @@ class StanceData:
         """Return the stance with limits at a utilisation as hard rows, and no others."""
         return StanceData(tuple(hand.capped(utilisation) for hand in self.hands), self.wrench)
 
+    @cached_property
+    def rows(self) -> HandRows:
+        """All hands' rows below each other."""
+        return HandRows.of(self.hands, len(self.wrench))
+
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
-        return StanceData(self.hands, wrench)
+        turned = StanceData(self.hands, wrench)
+        for name in ("shape", "rows"):
+            if name in self.__dict__:
+                turned.__dict__[name] = self.__dict__[name]
+        return turned
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:

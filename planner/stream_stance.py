@@ -132,16 +132,18 @@ class StreamStance:
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""
         data = self._data.turned(self._scaled(body_wrench))
-        outcome, bound, exact = found = least_utilisation(data)
+        outcome, bound, loads = found = least_utilisation(data)
         if not found.proven:
+            loads = None
             outcome = program.margin(data)
             if not outcome.solved:
                 return None
             bound = dual_bounds.least_bound(data, outcome)
             if outcome.value - bound > OPTIMAL * max(1.0, outcome.value):
                 return None
-        tidy = exact or program.least_tensions(data, outcome.value)
-        loads = tidy.loads if tidy.solved else outcome.loads
+        if loads is None:
+            tidy = program.least_tensions(data, outcome.value)
+            loads = tidy.loads if tidy.solved else outcome.loads
         return Solved(self._stacked(loads), outcome, bound)
 
     def cut(self, body_wrench: Array, solved: Solved) -> Cut | None:

@@ -1,14 +1,15 @@
 """The check that every plan passes before it leaves: from its numbers back to the rock.
 
-Nothing here is shared with the way the plan was found. Tile loads are recomputed from the tensions
-by solving the full equilibrium of Eq. 6 (`equilibrium`), not by the affine maps of Eq. 14, motors
-and winches from those; wrenches are summed force by force; limits are Eq. 21 itself
-(`limit_curve`), the plan's half-planes and the structure's published figures; balance is added up
-in the body frame. What is different where a wrist floats is in `verify_floating`, what nails need
-in `verify_nails`, what joints and callers ask in `verify_limbs`.
+Nothing here is shared with the way the plan was found. The plan's own forces must balance every
+joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors and
+winches must fit; wrenches are summed force by force; limits are Eq. 21 itself (`limit_curve`), the
+plan's half-planes and the structure's published figures; balance is added up about the body's
+origin. What is different where a wrist floats is in `verify_floating`, what nails need in
+`verify_nails`, what joints and callers ask in `verify_limbs`.
 
-All hands are checked at once, in arrays: by how much everything is off, and how much it may be.
-Where something is more, `verify_words` says so.
+All hands are checked at once, in arrays. What hangs on the hands alone is worked out when a `Check`
+is made, before there is a plan. Where numbers are not near enough to be right whatever their size,
+it is worked out by how much each is off, and how much it may be; `verify_words` says so.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from typing import Final
 import numpy as np
 
 from hand_models.frames import Array
-from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.hand import FINGERS, SettledHand
 from planner.carried import Carried
 from planner.hand_plan import HandPlan
 from planner.posture import Posture
 from planner.question import Question
-from planner.recomputing import recomputing_of
-from planner.stacked import CONTACTS, TOUCHING, Same, stacked
-from planner.verify_arrays import DRIVE, LOAD, UTILISATION, roles_of
+from planner.recomputing import STOP, recomputing_of
+from planner.stacked import Same, stacked
+from planner.verify_arrays import CROSS, LOAD, UTILISATION, roles_of
 from planner.verify_limbs import LimbUse, check_asked, check_limbs, force_use
 from planner.verify_words import Recomputed
 
@@ -35,9 +36,6 @@ __all__ = ["BALANCE", "LOAD", "STOP", "UTILISATION", "Check", "problems"]
 
 BALANCE: Final = 1e-6
 """Largest error of the balance, relative to the body wrench (moments over a metre)."""
-
-STOP: Final = 1e-6
-"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
 
 EFFORT: Final = 1e-6
 """How far the effort may be from what the plan says, relative."""
@@ -108,24 +106,26 @@ class Check:
         self.strength = most if cap is None else min(most, cap)
         preloads = Same(*[place.tendon_preload for place in stance.hands])
         self.again = recomputing_of(known, self.limbs, self.strength, preloads)
-        self.roles = roles_of(known.places)
         self.floating = [h for h, place in enumerate(stance.hands) if place.wrist == "floating"]
         self.asked = [
             h
             for h, place in enumerate(stance.hands)
             if place.wrench or place.limb in question.present or place.limb in limits.per_hand
         ]
-        self.off = [h for h, hand in enumerate(hands) if not hand.palm.engaged]
         self.drawing = self._drawing() if hands[0].hand.finger.friction > 0.0 else []
-        self.turns = np.array([place.pose.rotation for place in stance.hands])
-        self.at = np.array([place.pose.position for place in stance.hands]) - stance.body.position
+        poses = [place.pose for place in stance.hands]
+        turns = np.concatenate([pose.rotation for pose in poses])
+        self.turns = turns.reshape(-1, 3, 3).transpose(0, 2, 1)
+        self.at = np.array([pose.position for pose in poses]).T - stance.body.position[:, None]
 
     def _drawing(self) -> list[int]:
         """Return fingers of fixed hands whose tendon draws a tile or a nail along rock."""
-        holds = np.isin(self.known.touch.contacts, (TOUCHING, CONTACTS[NAIL]))
-        fingers = np.unique(self.known.places.finger[holds]).tolist()
         places = self.question.stance.hands
-        return [i for i in fingers if places[i // COUNT].wrist == "fixed"]
+        return [
+            i
+            for i, holds in enumerate(self.known.touch.holding)
+            if holds and places[i // COUNT].wrist == "fixed"
+        ]
 
     # Checking -----------------------------------------------------------------------------------
 
@@ -157,68 +157,58 @@ class Check:
                 wrenches = dict(zip(self.limbs, carried.wrenches, strict=True))
                 limbs = check_limbs(found, self.question, wrenches, body_wrench, self.where)
             again = self.again.of(found, carried, self._asked_for(found, carried, limbs))
-            self._look(found, again)
-            worst = max([again.worst, *limbs.utilisation.values()])
+            if not self.again.near(again):
+                self._look(found, again)
+            if self.drawing:
+                self._stick(found, again)
+            worst = max([float(np.maximum.reduce(again.hands)), *limbs.utilisation.values()])
             if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
             error, size = self._off_balance(carried.wrenches, body_wrench)
             if not error <= BALANCE * max(size, 1.0):
                 found.append(f"balance is off by {error:.3g} of {size:.3g}")
             if effort is not None:
-                relative = float(carried.tensions @ carried.tensions) / self.strength**2
+                relative = float(carried.tensions.dot(carried.tensions)) / self.strength**2
                 relative += sum(limbs.effort[limb] for limb in self.limbs if limb in limbs.effort)
                 if not abs(relative - effort) <= EFFORT * max(1.0, relative):
                     found.append(f"plan: effort is {relative:.8g}, not {effort:.8g}")
         return list(dict.fromkeys(found))
 
     def _look(self, found: list[str], again: Recomputed) -> None:
-        """Say what is off by more than it may be, after a look whether it could be."""
-        carried, roles = again.carried, self.roles
-        if not again.off.max() <= LOAD:
-            most = self.again.allowed(carried).take(roles.hand)
-            found.extend(again.loads_off(np.flatnonzero(~(again.off <= most)), roles.ends))
-        told = np.concatenate(
-            (
-                carried.drives.ravel(),
-                carried.tile_utilisations,
-                carried.palm_utilisations,
-                carried.utilisations,
-            )
-        )
-        used = np.maximum(again.used, roles.least)
-        apart = np.abs(used - told)
-        if not apart.max() <= DRIVE:
-            most = roles.relative * np.maximum(np.abs(used), 1.0)
-            beyond = np.flatnonzero(~(apart <= most)).tolist()
-            found.extend(again.use(i, float(used[i]), float(told[i])) for i in beyond)
-        if len(again.stops) and not again.stops.min() >= -STOP:
-            found.extend(map(again.stop, np.flatnonzero(~(again.stops >= -STOP)).tolist()))
-        palm, idle = carried.palms, self.known.touch.idle
-        if (
-            palm[:, 1].any()
-            or (self.off and palm[self.off].any())
-            or (len(idle) and carried.forces[idle].any())
-        ):
-            found.extend(again.idle())
-        for finger in self.drawing:
-            hand = self.known.hands[finger // COUNT]
-            slack = hand.closing_tension - carried.tensions[finger]
-            if not slack <= self.again.allowed(carried)[finger // COUNT]:
-                found.append(again.slack(finger))
+        """Say what is off by more than it may be."""
+        again = self.again.solved(again)
+        carried, roles = again.carried, roles_of(self.known.places)
+        most = self.again.allowed(carried).take(roles.hand)
+        beyond = np.flatnonzero(~(again.off <= most))
+        found.extend(again.loads_off(beyond, roles.ends))
+        used, told = again.used, again.told
+        most = roles.relative * np.maximum(np.abs(used), 1.0)
+        wrong = np.flatnonzero(~(np.abs(used - told) <= most)).tolist()
+        found.extend(again.use(i, float(used[i]), float(told[i])) for i in wrong)
+        found.extend(map(again.stop, np.flatnonzero(~(again.stops >= -STOP)).tolist()))
+        found.extend(again.idle())
         for h, hand in enumerate(self.known.hands):
             if carried.tiles[h] is not hand.tiles or carried.engaged[h] != hand.palm.engaged:
                 found.extend(again.contacts_told(h))
 
+    def _stick(self, found: list[str], again: Recomputed) -> None:
+        """Say which tendons friction would hold, where they were slackened."""
+        allowed = self.again.allowed(again.carried)
+        for finger in self.drawing:
+            hand = self.known.hands[finger // COUNT]
+            slack = hand.closing_tension - again.carried.tensions[finger]
+            if not slack <= allowed[finger // COUNT]:
+                found.append(again.slack(finger))
+
     def _off_balance(self, wrenches: Array, body_wrench: Array) -> tuple[float, float]:
         """Return how far the reactions of the rock are from a body wrench, and its size."""
-        # about the body's origin in axes of W, then in those of B
-        in_world = self.turns @ wrenches.reshape(-1, 2, 3).transpose(0, 2, 1)
-        products = (self.at.T @ in_world[:, :, 0]).tolist()
-        (_, xy, xz), (yx, _, yz), (zx, zy, _) = products
-        reaction = np.add.reduce(in_world).T
-        reaction[1] += (yz - zy, zx - xz, xy - yx)
-        error = body_wrench + (reaction @ self.question.stance.body.rotation).ravel()
-        return math.sqrt(error @ error), math.sqrt(body_wrench @ body_wrench)
+        # forces and moments about the body's origin, in axes of W
+        off = body_wrench.reshape(2, 3) @ self.question.stance.body.rotation.T
+        in_world = wrenches.reshape(-1, 2, 3) @ self.turns
+        off += np.add.reduce(in_world)
+        off[1] += (self.at @ in_world[:, 0]).ravel() @ CROSS
+        error = off.ravel()
+        return math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
 
     def _asked_for(self, found: list[str], carried: Carried, limbs: LimbUse) -> Array | None:
         """Check what a question asks of its hands; return how much of joints and caps they use."""

@@ -29,19 +29,23 @@ class Recomputed(NamedTuple):
         The plan's numbers.
     shear, normal : ndarray, shape (T,)
         Of each tile [N]; of nails zero.
+    left : ndarray, shape (F, 3)
+        What is left of each joint's balance [N·m].
     stops : ndarray, shape (k,)
         Torque on each joint's stop [N·m].
     stop_fingers : ndarray of int, shape (k,)
         Whose they are.
+    curves : ndarray, shape (T,)
+        By how much each tile is beyond its limit curve [N].
+    forces, wrenches : ndarray, shapes (T, 3), (H, 6)
+        By how much each tile's force is not that of its loads, and each hand's wrench not the sum
+        of forces.
     held, by_rows : ndarray, shape (H,)
         What each hand holds, and what its rows say of that [N].
-    worst : float
-        Largest utilisation of a hand.
-    used : ndarray, shape (3 F + T + 2 H,)
-        Torque and current of each motor, angle of each winch, then the utilisation of each tile,
-        palm and hand.
-    off : ndarray
-        By how much loads are off, as of `loads_off` [N].
+    drives : ndarray, shape (3, F)
+        Torque and current of each motor, angle of each winch.
+    tiles, palms, hands : ndarray, shapes (T,), (H,), (H,)
+        Utilisations.
     """
 
     limbs: tuple[str, ...]
@@ -49,13 +53,55 @@ class Recomputed(NamedTuple):
     carried: Carried
     shear: Array
     normal: Array
+    left: Array
     stops: Array
     stop_fingers: Indices
+    curves: Array
+    forces: Array
+    wrenches: Array
     held: Array
     by_rows: Array
-    worst: float
-    used: Array
-    off: Array
+    drives: Array
+    tiles: Array
+    palms: Array
+    hands: Array
+
+    # Numbers ------------------------------------------------------------------------------------
+
+    @property
+    def used(self) -> Array:
+        """Drives and utilisations, one kind after another, shape (3 F + T + 2 H,)."""
+        return np.concatenate((self.drives.ravel(), self.tiles, self.palms, self.hands))
+
+    @property
+    def told(self) -> Array:
+        """What the plan says of them."""
+        carried = self.carried
+        used = carried.tile_utilisations, carried.palm_utilisations, carried.utilisations
+        return np.concatenate((carried.drives.ravel(), *used))
+
+    @property
+    def off(self) -> Array:
+        """By how much loads are off, as of `loads_off` [N]."""
+        carried, touch = self.carried, self.known.touch
+        f, palm = carried.tensions, carried.palms
+        apart = np.abs(carried.loads[:, :2].T - (self.shear, self.normal))
+        apart[:, self.known.places.nails] = 0.0
+        return np.concatenate(
+            (
+                # NaN, and so off, where a tension is infinite
+                0.5 * (np.abs(f) - f),
+                apart.ravel(),
+                -self.shear,
+                -self.normal * touch.framed,
+                np.abs(self.forces).ravel(),
+                self.curves,
+                palm[:, 0],
+                -palm[:, 2],
+                np.abs(self.wrenches).ravel(),
+                self.held - self.by_rows,
+            )
+        )
 
     # Names --------------------------------------------------------------------------------------
 

@@ -88,6 +88,11 @@ class Planners:
         if self._workers is not None:
             self._workers.__exit__(kind, error, traceback)
 
+    def wait(self) -> None:
+        """Wait until all processes have started, if that is better than to begin without them."""
+        if self._workers is not None and not self._closed:
+            self._workers.wait()
+
     def plan_many(
         self,
         requests: Sequence[PlanRequest],

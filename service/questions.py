@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, cast, get_args, overload
+from functools import lru_cache
+from typing import Final, Literal, cast, get_args, overload
 
 import msgspec
 import numpy as np
@@ -24,6 +25,9 @@ from service import requests
 from service.own_robot import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]
+
+GRASPS: Final = 64
+"""Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
 
 
 class _within:  # noqa: N801 (reads as the statement it makes)
@@ -170,14 +174,13 @@ def _range(axis: requests.AxisForce) -> tuple[float, float]:
 
 def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnHold:
     with _within(path):
-        with _within("grasp"):
-            grasp = Grasp(**msgspec.structs.asdict(message.grasp))
-        with _within("surface"):
-            surface = _surface(message.surface)
-        with _within("hold"):
+        grasp, surface = _grasp(message.grasp), _surface(message.surface)
+        try:
             hold = _hold(message.hold, numbers)
             hold_pose = _pose(message.hold.pose, "pose")
             hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
+        except InvalidInputError as error:
+            raise error.within("hold") from None
         return HandOnHold(
             limb=message.limb,
             pose=_pose(message.pose, "pose"),
@@ -201,15 +204,28 @@ def _pose(message: requests.Pose | None, field: str) -> Pose | None: ...
 def _pose(message: requests.Pose | None, field: str) -> Pose | None:
     if message is None:
         return None
-    with _within(field):
+    try:
         return Pose.from_quaternion(message.position, message.orientation)
+    except InvalidInputError as error:
+        raise error.within(field) from None
+
+
+@lru_cache(maxsize=GRASPS)
+def _grasp(message: requests.Grasp) -> Grasp:
+    try:
+        return Grasp(**msgspec.structs.asdict(message))
+    except InvalidInputError as error:
+        raise error.within("grasp") from None
 
 
 def _surface(message: str | requests.Surface) -> Surface:
-    if isinstance(message, str):
-        return Surface.named(message)
-    given = msgspec.structs.asdict(message)
-    return Surface.from_values({name: v for name, v in given.items() if v is not None})
+    try:
+        if isinstance(message, str):
+            return Surface.named(message)
+        given = msgspec.structs.asdict(message)
+        return Surface.from_values({name: v for name, v in given.items() if v is not None})
+    except InvalidInputError as error:
+        raise error.within("surface") from None
 
 
 def _hold(message: requests.Hold, numbers: ParameterTable) -> holds.Hold:

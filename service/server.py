@@ -21,10 +21,11 @@ import zenoh
 from zenoh.handlers import FifoChannel, Handler
 
 from hand_models.parameters import ParameterTable
+from planner.program import build_ahead
 from planner.robot_file import RobotFile
 from service.dispatch import SERVICES, handle
 from service.keys import ALIVE, service_key
-from service.own_robot import robots_of
+from service.own_robot import builder_of, robots_of
 from service.streams import Streams
 
 __all__ = ["PlanService", "prepare_zenoh"]
@@ -95,6 +96,8 @@ class PlanService:
             self._queryables.append(queryable)
             self._threads.append(thread)
         self._token = self._session.liveliness().declare_token(self._alive)
+        robot = builder_of(None, self._robots)(None)
+        build_ahead(len(robot.shoulders))
         return self
 
     def __exit__(

@@ -11,13 +11,15 @@ import math
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
+from queue import SimpleQueue
 from types import TracebackType
-from typing import Final, Generic, Self, TypeVar
+from typing import Any, Final, Generic, Self, TypeVar
 
 __all__ = ["Lost", "Workers", "cores"]
 
@@ -29,8 +31,9 @@ R = TypeVar("R")
 CHUNK: Final = 8
 """Most items that go out together."""
 
-ROUNDS: Final = 8
-"""Chunks for each process at least, so that none waits long for the last one."""
+SHARE: Final = 4
+"""What goes out together is what is left by this and by the processes: less and less, so that none
+waits long for the last one."""
 
 FLUSH: Final = 0.05
 """How long results wait for the rest of their chunk [s]."""
@@ -104,6 +107,15 @@ class Workers(Generic[T, R]):
             worker.end(until)
         self._all.clear()
 
+    def wait(self) -> None:
+        """Wait until all processes are ready, or have died."""
+        self._hire()
+        for worker in [worker for worker in self._all if not worker.ready]:
+            if worker.take() is None:
+                self._dismiss(worker)
+            else:
+                self._stillborn = 0
+
     def each(
         self, items: Sequence[T], here: Callable[[T], R] | None = None
     ) -> Iterator[tuple[int, R | Lost]]:
@@ -116,25 +128,27 @@ class Workers(Generic[T, R]):
             What this process turns items into results with meanwhile, so that nothing waits for
             processes to start; it does not try what has cost a process. By default it does none.
         """
-        size = max(1, min(CHUNK, math.ceil(len(items) / (self._count * ROUNDS))))
-        todo = deque(range(i, min(i + size, len(items))) for i in range(0, len(items), size))
+        todo = deque(range(len(items)))
         tried: set[int] = set()
-        again: deque[range] = deque()
+        again: deque[int] = deque()
         try:
             while todo or again or any(worker.hand for worker in self._all):
                 self._hire()
                 if not self._all and (here is None or not todo):
-                    for i in (i for chunk in (*todo, *again) for i in chunk):
+                    for i in (*todo, *again):
                         yield i, Lost(NO_START)
                     return
                 for worker in self._all:
-                    if worker.idle and (todo or again):
-                        worker.give([(i, items[i]) for i in (todo or again).popleft()])
+                    if worker.idle and again and not todo:
+                        worker.give([(i := again.popleft(), items[i])])
+                    # the next ones are there before these are done
+                    while worker.wants and todo:
+                        size = min(CHUNK, math.ceil(len(todo) / (SHARE * self._count)))
+                        chunk = [todo.popleft() for _ in range(size)]
+                        worker.give([(i, items[i]) for i in chunk])
                 if here is not None and todo:
-                    first, *rest = todo.popleft()
-                    if rest:
-                        todo.appendleft(range(rest[0], rest[-1] + 1))
-                    yield first, here(items[first])
+                    i = todo.popleft()
+                    yield i, here(items[i])
                 if not self._all:
                     continue
                 owed = bool(again) or any(worker.hand for worker in self._all)
@@ -152,7 +166,7 @@ class Workers(Generic[T, R]):
                             yield i, Lost("its process died, twice")
                         else:
                             tried.add(i)
-                            again.append(range(i, i + 1))
+                            again.append(i)
         finally:
             # what nobody waits for any more
             for worker in [worker for worker in self._all if worker.hand]:
@@ -185,15 +199,22 @@ class _Worker(Generic[T, R]):
         other.close()
         self.ready = False
         self.hand: set[int] = set()
+        self._last: set[int] = set()
 
     @property
     def idle(self) -> bool:
         """Whether it waits for work."""
         return self.ready and not self.hand
 
+    @property
+    def wants(self) -> bool:
+        """Whether it has no more in hand than the chunk that it was given last."""
+        return self.ready and self.hand <= self._last
+
     def give(self, chunk: list[tuple[int, T]]) -> None:
         """Send a chunk of work."""
-        self.hand = {i for i, _ in chunk}
+        self._last = {i for i, _ in chunk}
+        self.hand |= self._last
         # of a process that has died, its pipe tells next
         with suppress(OSError):
             self.pipe.send(chunk)
@@ -222,18 +243,31 @@ def _work(pipe: Connection, make: Callable[[], Callable[[T], R]]) -> None:
     # Ctrl-C is the caller's to answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     turn = make()
-    with suppress(EOFError, OSError):
+    chunks: SimpleQueue[list[tuple[int, T]] | None] = SimpleQueue()
+    # who sends must not wait for the chunk before to be done, nor for its results to be taken
+    threading.Thread(target=_receive, args=(pipe, chunks), daemon=True).start()
+    with suppress(OSError):
         pipe.send([])
-        while True:
+        while (chunk := chunks.get()) is not None:
             done: list[tuple[int, R]] = []
             flushed = time.monotonic()
-            for i, item in pipe.recv():
+            for i, item in chunk:
                 done.append((i, turn(item)))
                 if time.monotonic() > flushed + FLUSH:
                     pipe.send(done)
                     done, flushed = [], time.monotonic()
             if done:
                 pipe.send(done)
+
+
+def _receive(pipe: Connection, chunks: SimpleQueue[Any]) -> None:
+    """Take chunks in as they come, and nothing at their end."""
+    try:
+        with suppress(EOFError, OSError):
+            while True:
+                chunks.put(pipe.recv())
+    finally:
+        chunks.put(None)
 
 
 @contextmanager

@@ -20,8 +20,8 @@ QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 def honest_outcome() -> Outcome:
     found = {}
 
-    def keep(data):
-        found["outcome"] = original(data)
+    def keep(data, share=1.0):
+        found["outcome"] = original(data, share)
         return found["outcome"]
 
     original, program.unique = program.unique, keep
@@ -49,7 +49,7 @@ LIES = {
 def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
     outcome = lie(honest_outcome())
     for name in ("unique", "margin"):
-        monkeypatch.setattr(program, name, lambda data: outcome)
+        monkeypatch.setattr(program, name, lambda *_: outcome)
     answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
     assert answer.status == "failed"
     assert not answer.verified
@@ -90,7 +90,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
         hard_duals=tuple(np.zeros(len(hand.h)) for hand in hands),
     )
     for name in ("unique", "margin"):
-        monkeypatch.setattr(program, name, lambda data: lie)
+        monkeypatch.setattr(program, name, lambda *_: lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is
     truth = plan(question)
     assert truth.status == "infeasible"
@@ -106,7 +106,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
     nothing = Outcome(False, word, 0, float("nan"))
     for name in ("unique", "margin"):
-        monkeypatch.setattr(program, name, lambda data: nothing)
+        monkeypatch.setattr(program, name, lambda *_: nothing)
     answer = plan(QUESTION)
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -117,7 +117,7 @@ def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, wo
 
 def test_an_infeasible_stance_whose_distance_is_not_found_gets_failed(monkeypatch):
     nothing = Outcome(False, "solver_error", 0, float("nan"))
-    monkeypatch.setattr(program, "nearest", lambda data: nothing)
+    monkeypatch.setattr(program, "nearest", lambda *_: nothing)
     answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -152,7 +152,7 @@ def test_a_tie_break_that_fails_or_lies_leaves_the_plan_of_least_utilisation(mon
 @pytest.mark.parametrize("value", [0.0, 5.0, float("nan")])
 def test_a_load_factor_that_its_loads_do_not_give_is_left_out(monkeypatch, value):
     lie = replace(honest_outcome(), value=value)
-    monkeypatch.setattr(program, "load_factor", lambda data: lie)
+    monkeypatch.setattr(program, "load_factor", lambda *_: lie)
     answer = plan(replace(QUESTION, want=frozenset({"load_factor"})))
     assert answer.load_factor is None
     assert not answer.load_factor_unbounded

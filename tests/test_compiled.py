@@ -5,6 +5,7 @@ import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -12,10 +13,14 @@ import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from stances import ask, on_wall, program_data
+from hypothesis import given
+from hypothesis import strategies as st
+from stances import PLACES, ask, on_wall, program_data
 
-from planner import compiled, cvxpy_internals, deadline, program
+from planner import compiled, cvxpy_internals, deadline, program, stance_data
 from planner.program import SETTINGS
+from planner.question import Load
+from planner.solve import plan
 from planner.stance_data import Shape
 
 FIXED = (10, 95, 20, 4)
@@ -315,3 +320,33 @@ def test_a_forked_process_builds_programs_of_its_own():
         check=False,
     )
     assert ended.returncode == 0
+
+
+def test_what_is_built_ahead_is_what_plans_need():
+    program._built.cache_clear()
+    program.build_ahead(4)
+    before = program._built.cache_info().misses
+    for count in (4, 3):
+        question = ask(on_wall(limbs=tuple(PLACES)[:count]), load=Load(50.0))
+        answer = plan(replace(question, want=frozenset(["load_factor"])))
+        assert answer.status == "optimal"
+    assert program._built.cache_info().misses == before
+
+
+@given(
+    st.lists(
+        st.tuples(*(st.integers(0, 3 * most) for most in stance_data.ROOM)),
+        min_size=1,
+        max_size=6,
+    )
+)
+def test_there_is_room_for_every_hand_of_a_shape(hands):
+    shape = Shape(6, tuple(hands))
+    room = shape.with_room()
+    assert len(room.hands) == len(hands)
+    for k, least in enumerate(stance_data.ROOM):
+        largest = max(hand[k] for hand in hands)
+        for most in (hand[k] for hand in room.hands):
+            assert most >= largest
+            assert most == least or most < 2 * largest
+    assert room.with_room() == room

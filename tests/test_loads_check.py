@@ -141,7 +141,7 @@ def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes():
     known = StreamStance(WALL)
     loads, _ = honest()
     weak = replace(known._known.ground.settled[0].surface, shear_limit=20.0, pull_off_limit=2.0)
-    count = len(known.check._curves._numbers.T)
+    count = len(known.check._curves._numbers.gain)
     known.check._curves = LimitCurves([weak], np.zeros(count, dtype=int))
     assert fault(known, loads, known.first) == "a tile's limit curve"
 

@@ -43,8 +43,8 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
         if exact is None:
             continue
         count += 1
-        assert exact.value == pytest.approx(program.margin(data).value, abs=1e-6)
-        assert stance_data.beyond(data, exact.loads, exact.value) <= 1e-8
+        assert exact.utilisation == pytest.approx(program.margin(data).value, abs=1e-6)
+        assert stance_data.beyond(data, exact.loads, exact.utilisation) <= 1e-8
         balance = stance_data.body_wrench(data, exact.loads)
         np.testing.assert_allclose(balance, data.wrench, atol=1e-8)
         other = program.tie_break(data, outcome.value + 1e-10)
@@ -52,7 +52,7 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
             continue
         for mine, theirs in zip(exact.loads, other.loads, strict=True):
             np.testing.assert_allclose(mine[:4], theirs[:4], atol=0.02)
-    assert count >= len(data_of_all) // 3
+    assert count >= 0.9 * len(data_of_all)
 
 
 def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
@@ -65,7 +65,7 @@ def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
         loads=tuple(np.full_like(y, 1e3) for y in outcome.loads),
     )
     found = polished(data, lost)
-    assert found is None or found.value == pytest.approx(outcome.value, abs=1e-6)
+    assert found is None or found.utilisation == pytest.approx(outcome.value, abs=1e-6)
 
 
 def test_tensions_change_continuously_where_plans_become_overloaded():

@@ -68,6 +68,17 @@ def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
     assert first not in done(nappers, [0.0] * 4).values()
 
 
+def test_all_processes_are_ready_once_they_are_waited_for():
+    with Workers(workshop.naps, 2) as workers:
+        workers.wait()
+        assert [worker.ready for worker in workers._all] == [True, True]
+        workers.wait()
+        assert len(set(done(workers, [0.2] * 4).values())) == 2
+    with Workers(workshop.nothing, 2) as workers:
+        workers.wait()
+        assert workers._all == []
+
+
 def test_who_stops_listening_leaves_no_work_behind(nappers):
     for _ in nappers.each([0.0, *[60.0] * 5]):
         break
@@ -124,3 +135,11 @@ def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
         assert set(done(workers, list(THREADS)).values()) == {"1"}
     assert os.environ[THREADS[0]] == "7"
     assert THREADS[1] not in os.environ
+
+
+def test_neither_side_waits_for_the_other_to_take_what_is_large():
+    """More than a pipe takes: chunks go out while results come back."""
+    items = [bytes([i, 0]) * 400_000 for i in range(24)]
+    with Workers(workshop.reversers, 1) as workers:
+        found = done(workers, items)
+    assert [found[i] for i in range(24)] == [item[::-1] for item in items]

@@ -309,3 +309,13 @@ def test_a_cap_must_leave_some_tension(cap):
 
 def test_no_hands_have_no_sets():
     assert wrench_spaces([]) == []
+
+
+@given(st.lists(st.integers(0, 60), min_size=2, max_size=5))
+def test_a_set_is_the_same_to_the_last_bit_whatever_other_hands_there_are(seeds):
+    # copies, of which no set is known
+    hands = [replace(hand) for hand in map(random_hand, seeds) if hand is not None]
+    for hand, together in zip(hands, wrench_spaces(hands), strict=True):
+        alone = wrench_space(replace(hand))
+        for name in ("origin", "generators", "L", "l0", "s", "H", "h"):
+            np.testing.assert_array_equal(getattr(together, name), getattr(alone, name))

@@ -54,3 +54,8 @@ def sleepers() -> Callable[[int], int]:
 def threads() -> Callable[[str], str | None]:
     """Looks up what its environment says."""
     return os.environ.get
+
+
+def reversers() -> Callable[[bytes], bytes]:
+    """Turns bytes around."""
+    return lambda item: item[::-1]

@@ -16,7 +16,7 @@ from service.many import Planners
 
 __all__ = ["batch_tables", "batches", "rates"]
 
-BATCH = 32
+BATCH = 128
 """Stances in a batch, all of them new."""
 
 PROCESSES = "`plan_many`, processes"
@@ -38,6 +38,7 @@ def batches(rounds: int, tick: Callable[[], object]) -> Race:
     with ExitStack() as stack:
         for workers in counts():
             planners = stack.enter_context(Planners(workers))
+            planners.wait()
             pool = stack.enter_context(ThreadPoolExecutor(workers))
             # twins, since one worker is this process, as are all threads
             requests = [

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from measured_stances import question_of
 from plain_programs import Clarabel, scaled, unique
-from race import WARM, race
+from race import TURN, WARM, race
 from results import Table, lines
 
 from planner import program
@@ -51,6 +51,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
             },
             rounds,
             tick,
+            TURN,
         )
     for number, points in enumerate(given[WARM:]):
         used = known.plan(wrenches[number]).utilisation or np.nan

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from cvxpy_users import Parametrised, Query, rebuilt
 from measured_stances import payload, question_of, request
 from plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
-from race import WARM, Way, race
+from race import TURN, WARM, Way, race
 from results import Line, Table, lines, span
 
 from planner import program
@@ -147,7 +147,7 @@ def plan_tables(rounds: int, few: int, tick: Callable[[], object]) -> list[Table
     for number in range(min(rounds, 5)):
         rivals.check(number)
     plans, others = _plans(rivals, rounds, tick), _others(rivals, rounds, tick)
-    plans.lines.append(_first(few, tick))
+    plans.lines.extend(_seldom(rivals, few, tick))
     return [plans, others]
 
 
@@ -178,6 +178,7 @@ def _plans(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
         },
         rounds,
         tick,
+        TURN,
     )
     return Table(
         "A plan of four hands, each time another stance",
@@ -195,13 +196,15 @@ def _plans(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
             ("request bytes → reply bytes", "bytes"),
             ("new stance with load factor and prices", "extras"),
         ),
+        f"Each way answers {TURN} queries in a row, then it is the next one's turn.",
     )
 
 
-def _first(rounds: int, tick: Callable[[], object]) -> Line:
-    """Stances of a shape that there was not before, each tile of each hand with other limits."""
+def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Line]:
+    """What a plan takes where less is at hand than in a loop."""
 
-    def asked(number: int) -> Question:
+    def shaped(number: int) -> Question:
+        """Return a question whose tiles have other limits in each hand."""
         question = question_of(number, twin=5)
         hands = tuple(
             replace(hand, surface=replace(hand.surface, half_planes=2 + number // 3**i % 3))
@@ -209,12 +212,31 @@ def _first(rounds: int, tick: Callable[[], object]) -> Line:
         )
         return replace(question, stance=replace(question.stance, hands=hands))
 
-    questions = [asked(number) for number in range(rounds + WARM)]
-    timed = race({"first": lambda k: plan(questions[k])}, rounds, tick)
-    return Line(
-        "first stance of a shape, for which programs are compiled",
-        (span(timed.median("first")), "", "", ""),
+    def compiled(number: int) -> None:
+        program._built.cache_clear()
+        plan(late[number])
+
+    count = range(rounds + WARM)
+    requests = [request(number, twin=6) for number in count]
+    shapes, late = [shaped(number) for number in count], [question_of(k, twin=7) for k in count]
+    alone = race({"shape": lambda k: plan(shapes[k]), "compiled": compiled}, rounds)
+    among = race(
+        {
+            "plan": lambda k: plan(question(requests[k])),
+            "work": lambda k: rebuilt(rivals.queries[k]),
+        },
+        rounds,
+        tick,
     )
+    blank = ("", "", "")
+    return [
+        Line("new stance, after 20 ms of other work", (span(among.median("plan")), *blank)),
+        Line("new stance of a shape that is new, too", (span(alone.median("shape")), *blank)),
+        Line(
+            "first stance of so many hands: programs are compiled",
+            (span(alone.median("compiled")), *blank),
+        ),
+    ]
 
 
 def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
@@ -240,7 +262,7 @@ def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
         "dpp": lambda k: rivals.parametrised.solve(rivals.queries[k]),
         "rebuilt": lambda k: rebuilt(rivals.queries[k]),
     }
-    timed = race(ways, rounds, tick)
+    timed = race(ways, rounds, tick, TURN)
     return Table(
         "The same program by other ways: from the hands' sets to the loads",
         ("median", "× floor", "× ours"),

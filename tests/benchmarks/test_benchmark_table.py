@@ -22,6 +22,14 @@ def test_ways_take_turns_and_ratios_are_of_the_same_round():
     # two rounds to warm up, then three that count
     assert [k for _, k in order] == [3, 3, 3, 4, 4, 4, 0, 0, 0, 1, 1, 1, 2, 2, 2]
     assert [name for name, _ in order[6:]] == ["a", "b", "c", "b", "c", "a", "c", "a", "b"]
+    order.clear()
+    ticks = []
+    race(ways, 3, lambda: ticks.append(1), turn=2)
+    assert order[6:] == [
+        *(("a", 0), ("a", 1), ("b", 0), ("b", 1), ("c", 0), ("c", 1)),
+        *(("b", 2), ("c", 2), ("a", 2)),
+    ]
+    assert len(ticks) == 3
     timed.times.update(a=np.array([1.0, 2.0, 4.0]), b=np.array([3.0, 2.0, 2.0]))
     assert timed.median("a") == 2.0
     assert timed.ratio("b", "a") == 1.0
