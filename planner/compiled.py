@@ -27,7 +27,7 @@ import cvxpy as cp
 import numpy as np
 
 from hand_models.frames import Array
-from planner import deadline
+from planner import beside, deadline
 from planner.conic_extent import Extent, Layout, Room
 from planner.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
 
@@ -319,6 +319,7 @@ class _Solver:
 
     def solve(self) -> Solution:
         """Solve with the values taken last."""
+        beside.begin()
         if deadline.left() is None:
             return self._read(self._solver.solve())
         caught: list[BaseException] = []

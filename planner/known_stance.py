@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from hand_models.frames import Array, finite_vector
 from planner.plan import Plan
+from planner.prepared import prepare
 from planner.question import Question
 from planner.solve import ground_of, plan_on
 from planner.stance import moderate
@@ -33,7 +34,14 @@ class KnownStance:
     """
 
     def __init__(self, question: Question) -> None:
-        self.ground = ground_of(question)
+        ground = ground_of(question)
+        hands = ground.hands
+        # what joints bear changes with the wrench
+        if ground.where is None and question.stance.joints is None and not hands.floating:
+            spaces, _ = hands.sets(hands.at_rest(hands.idle))
+            prepared = prepare(question, None, ground.settled, spaces)
+            ground = ground._replace(prepared=prepared)
+        self.ground = ground
 
     def plan(self, body_wrench: Array) -> Plan:
         """Answer for another body wrench, as `planner.solve.plan` would.

@@ -15,6 +15,7 @@ from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
 from hand_models.hand import SettledHand
 from planner import deadline, dual_bounds, program, stance_data
+from planner.beside import Beside
 from planner.binding import Binding, Used, joint_name, unit_of
 from planner.budget import Budget
 from planner.carried import Carried
@@ -34,7 +35,7 @@ from planner.floating_warnings import far_wrists, idle_preloads, strained_preloa
 from planner.gathering import gather
 from planner.hand_plan import HandPlan, WristPlan
 from planner.hand_sets import Hands
-from planner.least_utilisation import OPTIMAL, least_utilisation
+from planner.least_utilisation import OPTIMAL, LeastUtilisation, least_utilisation
 from planner.plan import (
     Certificate,
     LimitName,
@@ -108,6 +109,8 @@ class Ground(NamedTuple):
         What the programs need of them.
     wrench : ndarray, shape (6,)
         The body wrench that is planned for, in B [N, N·m].
+    prepared : Prepared or None
+        What reads and checks its plans; by default it is made with each.
     """
 
     question: Question
@@ -115,6 +118,7 @@ class Ground(NamedTuple):
     settled: Sequence[SettledHand]
     hands: Hands
     wrench: Array
+    prepared: Prepared | None = None
 
 
 def plan_on(ground: Ground, start: float) -> Plan:
@@ -150,6 +154,7 @@ class _Answer:
         settled: Sequence[SettledHand],
         hands: Hands,
         wrench: Array,
+        prepared: Prepared | None,
     ) -> None:
         self.question = question
         self.where = where
@@ -183,6 +188,8 @@ class _Answer:
         self.path: TensionPath | None = None
         self.path_unknown = False
         self.unfinished: list[Unfinished] = []
+        self._ready = prepared
+        self._preparing: Beside[Prepared] | None = None
 
     # Solving ------------------------------------------------------------------------------------
 
@@ -225,7 +232,7 @@ class _Answer:
         One solve has its utilisation, and mostly its active rows, which give its last digits; else
         a second solve has these.
         """
-        found = least_utilisation(self.data)
+        found = self._least()
         self.outcome = found.outcome
         if found.proven:
             self.bound = found.bound
@@ -241,6 +248,13 @@ class _Answer:
             self.outcome, self.bound = one, bound
             self._take(one.loads)
             self._mind_time("least_utilisation")
+
+    def _least(self) -> LeastUtilisation:
+        """Solve, and prepare meanwhile what reads and checks the loads."""
+        if self._ready is not None:
+            return least_utilisation(self.data)
+        with Beside(self._prepare) as self._preparing:
+            return least_utilisation(self.data)
 
     def _settle_in_two(self) -> None:
         """Take the plan of least effort among those of the very least utilisation."""
@@ -312,6 +326,11 @@ class _Answer:
     @cached_property
     def _prepared(self) -> Prepared:
         """What reads and checks plans."""
+        if self._ready is not None:
+            return self._ready
+        return self._prepare() if self._preparing is None else self._preparing.result()
+
+    def _prepare(self) -> Prepared:
         spaces = None if self.parts.floating else self.spaces
         return prepare(self.question, self.where, self.settled, spaces)
 

@@ -1,0 +1,73 @@
+"""Work that is done while a solver runs, which leaves the interpreter to another thread."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import ContextVar
+from types import TracebackType
+from typing import Any, Final, Generic, Self, TypeVar
+
+__all__ = ["Beside", "begin"]
+
+T = TypeVar("T")
+
+_waiting: Final[ContextVar[Beside[Any] | None]] = ContextVar("waiting", default=None)
+
+
+class Beside(Generic[T]):
+    """Work for the first solver that runs while this is entered; without one it is done after.
+
+    Parameters
+    ----------
+    work : callable
+        Safe to call from another thread.
+    """
+
+    def __init__(self, work: Callable[[], T]) -> None:
+        self._work = work
+        self._begun: Future[T] | None = None
+
+    def __enter__(self) -> Self:
+        _waiting.set(self)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        _waiting.set(None)
+
+    def result(self) -> T:
+        """Return what comes of it; raises what it raises."""
+        begun = self._begun
+        # what still waits for the other thread is sooner done here
+        return self._work() if begun is None or begun.cancel() else begun.result()
+
+
+def begin() -> None:
+    """Begin what waits for a solver to run, which is just about to."""
+    waiting = _waiting.get()
+    if waiting is not None:
+        _waiting.set(None)
+        waiting._begun = _threads[0].submit(waiting._work)
+
+
+def _new() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(1, "beside")
+
+
+_threads = [_new()]
+"""The one thread: the interpreter is its own as long as all others wait."""
+
+
+def _after_fork() -> None:
+    """Begin anew in a forked process, which the thread did not come along to."""
+    _threads[0] = _new()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

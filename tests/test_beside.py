@@ -1,0 +1,83 @@
+"""Work beside a solver: in another thread if there is time for it, and by its own caller if not."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from stances import ask, on_wall, program_data
+
+from planner import beside, program, solve
+from planner.beside import Beside
+from planner.known_stance import KnownStance
+
+
+def me() -> str:
+    return threading.current_thread().name
+
+
+def test_a_solver_that_runs_has_the_work_done_by_another_thread():
+    data = program_data(ask(on_wall()))
+    program.unique(data)
+    with Beside(me) as work:
+        assert work._begun is None
+        program.unique(data)
+        begun = work._begun
+        # the first solver has taken it
+        program.unique(data)
+        assert work._begun is begun
+    assert begun.result() == work.result() != me()
+
+
+def test_without_a_solver_the_caller_does_it():
+    with Beside(me) as work:
+        pass
+    # it is over: no later solver begins it
+    beside.begin()
+    assert work._begun is None
+    assert work.result() == me()
+
+
+def test_who_finds_the_other_thread_busy_does_it_alone():
+    free = threading.Event()
+    with Beside(free.wait) as long:
+        beside.begin()
+    with Beside(me) as work:
+        beside.begin()
+    assert work.result() == me()
+    free.set()
+    assert long.result()
+
+
+def test_what_the_work_raises_is_raised_to_its_caller():
+    def fails() -> None:
+        raise ZeroDivisionError
+
+    with Beside(fails) as work:
+        beside.begin()
+    with pytest.raises(ZeroDivisionError):
+        work.result()
+    # the thread goes on
+    with Beside(me) as after:
+        beside.begin()
+    after._begun.result()
+
+
+def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):
+    threads = []
+    prepare = solve.prepare
+
+    def noted(*given):
+        threads.append(me())
+        return prepare(*given)
+
+    monkeypatch.setattr(solve, "prepare", noted)
+    question = ask(on_wall())
+    answer = solve.plan(question)
+    assert answer.verified
+    assert len(threads) == 1
+    assert threads[0] != me()
+    # of a stance that is known, it is known, too
+    known = KnownStance(question)
+    assert known.plan(known.ground.wrench).utilisation == answer.utilisation
+    assert len(threads) == 1
