@@ -22,7 +22,7 @@ Way = Callable[[int], object]
 WARM = 2
 """Rounds before the ones that count, for what is built on first use."""
 
-TURN = 10
+TURN = 20
 """Queries in a row, where they are those of a loop."""
 
 
