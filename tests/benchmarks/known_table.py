@@ -10,6 +10,7 @@ from measured_stances import question_of
 from plain_programs import Clarabel, scaled, unique
 from race import TURN, WARM, race
 from results import Table, lines
+from whole_blocks import WholeBlocks
 
 from planner import program
 from planner.gathering import gather
@@ -35,17 +36,19 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     places = [number if number < rounds else 0 for number in range(rounds + WARM)]
     wrenches = [needed + place * way for place in places]
     _, hands = gather(question, None, needed)
-    data = scaled(hands.sets(hands.at_rest(hands.idle)))
+    sets = hands.sets(hands.at_rest(hands.idle))
+    data, goals = scaled(sets), [wrench / WRENCH_UNIT for wrench in wrenches]
     raw = Clarabel(
-        [unique(data._replace(wrench=wrench / WRENCH_UNIT)) for wrench in wrenches],
-        program.Unique.settings[0],
+        [unique(data._replace(wrench=goal)) for goal in goals], program.Unique.settings[0]
     )
+    whole = WholeBlocks([sets.data.turned(goal) for goal in goals])
     known = KnownStance(question)
     given: list[SetPoints] = []
     with WrenchStream(question) as stream:
         timed = race(
             {
                 "floor": raw.turned,
+                "whole": whole.turned,
                 "plan": lambda k: known.plan(wrenches[k]),
                 "stream": lambda k: given.append(stream.set_points(wrenches[k])),
             },
@@ -62,11 +65,12 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     return [
         Table(
             "A known stance of four hands, its body wrench drifting",
-            ("median", "× floor"),
+            ("median", "× floor", "× whole"),
             lines(
                 timed,
-                ["floor"],
+                ["floor", "whole"],
                 ("raw Clarabel, right-hand side updated, and solve (the floor)", "floor"),
+                ("raw Clarabel on CVXPY's own data, zeros kept (whole)", "whole"),
                 ("**verified plan, `KnownStance`**", "plan"),
                 ("**verified set-points, `WrenchStream`**", "stream"),
             ),

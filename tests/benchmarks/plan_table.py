@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import clarabel
 import numpy as np
-import scipy.sparse as sp
 from cvxpy_users import Parametrised, Query, rebuilt
 from measured_stances import payload, question_of, request
 from plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
 from race import TURN, WARM, Way, race
 from results import Line, Table, lines, span
+from whole_blocks import WholeBlocks
 
 from planner import program
 from planner.gathering import gather
@@ -50,44 +49,6 @@ def known(number: int) -> Known:
     return Known(asked, hands, sets, program.unique(sets.data).value)
 
 
-class WholeBlocks:
-    """Raw Clarabel on the data as CVXPY writes them: whole blocks, with their zeros."""
-
-    def __init__(self, stances: Sequence[Known]) -> None:
-        built = program.Unique(stances[0].sets.data.shape)
-        of = built.compiled.map
-        assert of is not None
-        self._places, self._new = of.variables, []
-        for each in stances:
-            ties = (hand.tie for hand in each.sets.data.hands)
-            values = built.values(each.sets.data, *ties)
-            for parameter, value in zip(built.compiled.parameters, values, strict=True):
-                parameter.value = value
-            p = of.vector()
-            new = {"P": of.P.values @ p, "A": of.A.values @ p, "b": of.b.values @ p}
-            self._new.append({name: part.tolist() for name, part in new.items()})
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        for name, value in program.Unique.settings[0].items():
-            setattr(settings, name, value)
-        P, A = (
-            sp.csc_matrix((part.values @ p, part.indices, part.indptr), part.shape)
-            for part in (of.P, of.A)
-        )
-        self._solver = clarabel.DefaultSolver(
-            P, of.q.values @ p, A, of.b.values @ p, of.cones, settings
-        )
-
-    def used(self, number: int) -> float:
-        """Return the utilisation that it comes to."""
-        return float(self._places.of(self.updated(number).x)[-1])
-
-    def updated(self, number: int) -> Any:
-        """Solve with all data of that stance new."""
-        self._solver.update(**self._new[number % len(self._new)])
-        return self._solver.solve()
-
-
 class Rivals:
     """Other ways to the plans of some stances, each a function of the stance's number."""
 
@@ -98,7 +59,7 @@ class Rivals:
         used = [each.utilisation for each in stances]
         settings = program.Unique.settings[0]
         self.unique = Clarabel([unique(data) for data in own], settings)
-        self.whole = WholeBlocks(stances)
+        self.whole = WholeBlocks([each.sets.data for each in stances])
         self.least = Clarabel([least(data) for data in own], program.SETTINGS)
         self.tie = Clarabel(
             [tie(data, u) for data, u in zip(own, used, strict=True)], program.SETTINGS
