@@ -187,6 +187,9 @@ def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
     if force > 0.0 and load > 0.0:
         load, capacity = force, force * capacity / load
     carried, most = (_spoken_load(name.limit, value) for value in (load, capacity))
+    if carried == most and not held:
+        # so near that only further digits tell
+        carried = f"{_spoken_load(name.limit, capacity)} and a little more"
     manner = MANNERS.get(name.limit, "")
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
 
@@ -272,7 +275,9 @@ def _missing(shortfall: Array) -> str:
     units = ("N",) * 3 + ("N·m",) * 3
     size = np.abs(shortfall / WRENCH_UNIT)
     order = [int(i) for i in np.argsort(-size) if size[i] >= NOTABLE * size.max()]
-    return ", ".join(f"{AXES[i]} {shortfall[i]:+.3g} {units[i]}" for i in order)
+    # three digits, and no exponents
+    values = [f"{x:+.0f}" if abs(x) >= 1000.0 else f"{x:+.3g}" for x in shortfall.tolist()]
+    return ", ".join(f"{AXES[i]} {values[i]} {units[i]}" for i in order)
 
 
 def barriers_sentence(names: Sequence[LimitName]) -> str:
@@ -315,7 +320,7 @@ def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
         yield "no finger touches rock, only the palm does"
     idle = [name for name, holds in zip(FINGERS, by_finger, strict=True) if not holds]
     if tiles and idle and not hand.grasp.fingernail:
-        yield f"{', '.join(idle)} touch no rock"
+        yield f"{', '.join(idle)} {'touch' if len(idle) > 1 else 'touches'} no rock"
     if hand.grasp.fingernail and 0 < tiles < len(FINGERS):
         yield f"{tiles} of {len(FINGERS)} nails hook"
     if hand.grasp.palm and not hand.palm.engaged and tiles:

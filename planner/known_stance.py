@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, finite_vector
 from planner.plan import Plan
 from planner.prepared import prepare
@@ -34,6 +35,8 @@ class KnownStance:
     """
 
     def __init__(self, question: Question) -> None:
+        if not isinstance(question, Question):
+            raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
         ground = ground_of(question)
         hands = ground.hands
         # what joints bear changes with the wrench

@@ -178,6 +178,9 @@ OBJECTIVES: Final = get_args(Objective)
 
 Want = Literal["load_factor", "prices", "model"]
 
+WANTS: Final = get_args(Want)
+"""What may be wanted beside a plan."""
+
 
 @dataclass(frozen=True, eq=False)
 class Question:
@@ -220,6 +223,13 @@ class Question:
                 f"unknown objective {self.objective!r}; known are {', '.join(OBJECTIVES)}",
                 field="objective",
             )
+        unknown = sorted(set(self.want) - set(WANTS))
+        if isinstance(self.want, str) or unknown:
+            raise InvalidInputError(
+                f"a set of extras is needed, got {self.want!r}; known are {', '.join(WANTS)}",
+                field="want",
+            )
+        object.__setattr__(self, "want", frozenset(self.want))
         deadline.possible(self.deadline)
         self._check_limits()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}

@@ -80,6 +80,8 @@ def plan(question: Question) -> Plan:
         If its deadline comes before anything is found that passes the checks.
     """
     start = time.perf_counter()
+    if not isinstance(question, Question):
+        raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
     with deadline.within(question.deadline, started=start):
         return plan_on(ground_of(question), start)
 
@@ -137,7 +139,7 @@ def plan_on(ground: Ground, start: float) -> Plan:
     """
     with deadline.within(ground.question.deadline, started=start):
         modelled = time.perf_counter()
-        deadline.check("a plan was found")
+        deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
         answer = _Answer(*ground)
         answer.solve()
         solved = time.perf_counter()

@@ -181,13 +181,14 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(solve, "gather", "a plan was found"), (program, "unique", "a plan was found")],
+    [(solve, "gather", "the hands were closed"), (program, "unique", "a plan was found")],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
     with pytest.raises(DeadlineError) as caught:
         late(QUESTION)
-    assert (caught.value.seconds, caught.value.missing) == (LONG, missing)
+    assert caught.value.seconds == LONG
+    assert caught.value.missing.startswith(missing)
 
 
 def test_joint_angles_that_are_not_found_in_time_are_not_called_out_of_reach(monkeypatch, clock):
@@ -479,7 +480,9 @@ def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path,
     assert run(["plan", str(path), "--json"]) == 1
     out, err = capfd.readouterr()
     assert out == ""
-    assert err == "crux: deadline: 1e-06 s were over before a plan was found; allow longer\n"
+    assert err.startswith("crux: deadline: 1e-06 s were over before the hands were closed")
+    assert err.endswith("; allow longer\n")
+    assert err.count("\n") == 1
 
 
 def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, capfd, monkeypatch):

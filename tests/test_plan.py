@@ -5,9 +5,12 @@ import peer
 import pytest
 from stances import SANDPAPER, ask, on_wall, random_answer
 
+from hand_models.errors import InvalidInputError
 from hand_models.hand import FINGERS
 from hand_models.holds import Cylinder, Plane
 from hand_models.structure import HELD
+from planner.deadline import DeadlineError
+from planner.known_stance import KnownStance
 from planner.plan import Plan
 from planner.question import Limits, Question
 from planner.solve import SLACK, plan
@@ -272,3 +275,23 @@ def test_times_add_up():
     assert time.model > 0.0
     assert time.solve > 0.0
     assert time.model + time.solve <= time.total
+
+
+@pytest.mark.parametrize("want", [{"loadfactor"}, "prices", ["prices", "price"]])
+def test_extras_that_there_are_not_are_refused(want):
+    with pytest.raises(InvalidInputError, match="known are load_factor, prices, model") as caught:
+        Question(on_wall(), want=want)
+    assert caught.value.field == "want"
+    assert Question(on_wall(), want=["prices"]).want == {"prices"}
+
+
+@pytest.mark.parametrize("asks", [plan, KnownStance])
+def test_a_stance_alone_is_no_question(asks):
+    with pytest.raises(InvalidInputError, match="a Question is needed, got a Stance"):
+        asks(on_wall())
+
+
+def test_a_deadline_before_the_hands_are_closed_says_what_they_took():
+    words = r"closed on their holds, which took [0-9.e-]+ s; allow longer"
+    with pytest.raises(DeadlineError, match=words):
+        plan(ask(on_wall(), deadline=1e-6))

@@ -167,6 +167,9 @@ def _with_tiles(space: WrenchSpace, count: int) -> WrenchSpace:
     )
 
 
+SPAN = 8.0
+"""Least ratio of the ends of a logarithmic axis."""
+
 COLOURS = {PLAN: "tab:blue", DATA: "tab:green", OURS: "tab:orange", RAW: "0.3"}
 
 
@@ -188,6 +191,10 @@ def _draw_curve(ax: Axes, curve: Curve) -> None:
     ax.set_yscale("log")
     ax.set_xticks(curve.sizes, [str(size) for size in curve.sizes])
     ax.minorticks_off()
+    # most of a decade at least, so that there are ticks to read, and noise looks as small as it is
+    low, high = ax.get_ylim()
+    wider = max(1.0, SPAN * low / high) ** 0.5
+    ax.set_ylim(low / wider, high * wider)
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.set_title(curve.title)
