@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,10 @@ class Pose:
     position: Array
     rotation: Array
     proper: bool = field(default=False, init=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a copy's arrays can be written, so nothing is known of it
+        return Pose, (self.position, self.rotation)
 
     @classmethod
     def identity(cls) -> Pose:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
@@ -53,7 +54,9 @@ def begin() -> None:
     waiting = _waiting.get()
     if waiting is not None:
         _waiting.set(None)
-        waiting._begun = _threads[0].submit(waiting._work)
+        # at the interpreter's end there are no more threads
+        with suppress(RuntimeError):
+            waiting._begun = _threads[0].submit(waiting._work)
 
 
 def _new() -> ThreadPoolExecutor:

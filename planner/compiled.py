@@ -153,10 +153,11 @@ class Compiled:
 
     def _fast(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> Solution:
         solver = self._ready(values, extent, settings)
-        try:
-            return solver.solve()
-        finally:
+        solution = solver.solve()
+        # one that has met what is no number, or was interrupted, may not forget it
+        if solution.status != cp.SOLVER_ERROR:
             self._put_back(solver)
+        return solution
 
     def _ready(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> _Solver:
         """Return a solver that has taken the values over."""

@@ -14,6 +14,9 @@ from planner.stance_data import StanceData
 
 __all__ = ["least_bound", "least_effort_bound", "unique_bound"]
 
+ROUNDED: Final = 1e-9
+"""What rounding may add to a bound, relative."""
+
 STATIONARY: Final = 1e-5
 """How far multipliers may be from stationary, and below zero, to count as a bound."""
 
@@ -84,5 +87,5 @@ def _dual_bound(
         stationary += slopes
     if leak + float(np.abs(stationary).sum()) > STATIONARY * scale:
         return -math.inf
-    below = float(signed @ rows.rest + nu @ data.offset)
+    below = float(signed @ rows.rest + nu @ data.offset) + ROUNDED * scale
     return -below - cap * float(signed[: rows.limits].sum())

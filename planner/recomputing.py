@@ -196,11 +196,11 @@ class Recomputing:
         """Whether all numbers of fixed hands are so near that none can be off by what it may.
 
         By the Euclidean norm of all, which none of them exceeds. Numbers that are not finite are
-        not near.
+        not near, nor are those of a plan that has tiles elsewhere than the hands.
         """
         carried, touch, normal = again.carried, self.known.touch, again.normal
         apart, left, palms = again.shear - carried.loads[:, 0], again.left, carried.palms
-        if self._floats(carried):
+        if self._floats(carried) or not self._at_home(carried):
             return False
         if len(self.known.places.nails):
             apart[self.known.places.nails] = 0.0
@@ -254,6 +254,11 @@ class Recomputing:
         return shear, normal, rows[2 * tiles + fingers :]
 
     # Floating wrists ----------------------------------------------------------------------------
+
+    def _at_home(self, carried: Carried) -> bool:
+        """Whether tiles and palms are where the settled hands have them, and turned so."""
+        pairs = (carried.points, self.known.points), (carried.axes, self.known.axes)
+        return all(told is own or np.array_equal(told, own) for told, own in pairs)
 
     def _floats(self, carried: Carried) -> list[int]:
         return [h for h, wrist in enumerate(carried.wrists) if wrist is not None]

@@ -108,8 +108,7 @@ class Workers(Generic[T, R]):
         self._all.clear()
 
     def wait(self) -> None:
-        """Wait until all processes are ready, or have died."""
-        self._hire()
+        """Wait until all processes that have been started are ready, or have died."""
         for worker in [worker for worker in self._all if not worker.ready]:
             if worker.take() is None:
                 self._dismiss(worker)

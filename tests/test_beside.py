@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 from stances import ask, on_wall, program_data
@@ -61,6 +65,32 @@ def test_what_the_work_raises_is_raised_to_its_caller():
     with Beside(me) as after:
         beside.begin()
     after._begun.result()
+
+
+AT_THE_END = """
+import atexit
+from stances import ask, on_wall
+from planner.solve import plan
+asked = ask(on_wall())
+first = plan(asked).utilisation
+@atexit.register
+def last():
+    print(plan(asked).utilisation == first)
+"""
+
+
+def test_plans_are_made_while_the_interpreter_ends():
+    here = Path(__file__).parent
+    path = os.pathsep.join([str(here), str(here.parent)])
+    ended = subprocess.run(
+        [sys.executable, "-c", AT_THE_END],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True\n", "")
 
 
 def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):

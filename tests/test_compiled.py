@@ -182,6 +182,13 @@ def test_numbers_that_are_none_cost_only_their_own_question(data):
     assert not lost.solved
     assert np.isnan(lost.value)
     assert built.solve(data).value == honest.value
+    # in the weights, too: what a solver keeps of them it takes along
+    for number in (np.nan, np.inf):
+        hands = tuple(hand._replace(tie=hand.tie * number) for hand in data.hands)
+        assert not built.solve(type(data)(hands, data.wrench)).solved
+        again = built.solve(data)
+        for one, two in zip(again.loads, honest.loads, strict=True):
+            np.testing.assert_array_equal(one, two)
 
 
 def test_a_solver_is_stopped_at_the_deadline_and_goes_on_after(data):

@@ -1,6 +1,9 @@
 """Poses compose as rigid motions, and wrenches are carried so that power stays the same."""
 
+import copy
 import math
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,3 +157,15 @@ def test_quaternions_are_those_of_scipy():
             assert same.magnitude() == pytest.approx(0.0, abs=1e-14)
             if abs(angle - math.pi) > 1e-9:
                 np.testing.assert_allclose(got, turn.as_quat(canonical=True), atol=1e-14)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda pose: pickle.loads(pickle.dumps(pose))])
+def test_nothing_is_known_of_a_pose_whose_arrays_can_be_written(copied):
+    pose = Pose.from_quaternion([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8])
+    assert pose.proper
+    with pytest.raises(ValueError, match="read-only"):
+        pose.rotation[0, 0] = 5.0
+    other = copied(pose)
+    assert not other.proper
+    np.testing.assert_array_equal(other.rotation, pose.rotation)
+    assert not replace(pose, position=np.zeros(3)).proper

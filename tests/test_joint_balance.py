@@ -1,14 +1,21 @@
 """Whether forces balance joints and tendons, against Eq. 6 solved in full and by hand."""
 
+import time
+
 import numpy as np
 import pytest
-from stances import on_wall, random_stance
+from scipy.spatial.transform import Rotation
+from stances import ask, on_wall, random_stance
 
+from hand_models.frames import wrench_transport
 from hand_models.holds import Cylinder
+from planner.carried import Carried
 from planner.equilibrium import equilibrium
 from planner.joint_balance import LEVER, JointBalance
 from planner.settling import settle
+from planner.solve import ground_of, plan_on
 from planner.stacked import NOTHING, Stacked, stacked
+from planner.verify import Check
 
 STANCES = {
     "pinches": on_wall,
@@ -94,3 +101,51 @@ def test_a_balance_off_by_little_tells_loads_that_are_off_by_little(stance):
     for finger in np.flatnonzero(free.any(axis=1)):
         own = turns[finger][np.ix_(free[finger], bears[finger])]
         assert np.linalg.svd(own, compute_uv=False).min() > LEVER
+
+
+@pytest.mark.parametrize("what", ["moved", "turned"])
+def test_tiles_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agree(what):
+    """A distal tile 10 mm off, or turned, and normals, forces, wrench and shares that fit it."""
+    question = ask(on_wall())
+    ground = ground_of(question)
+    answer = plan_on(ground, time.perf_counter())
+    check = Check(question, ground.settled, None)
+    honest = Carried.of(answer.hands)
+    tiles = [
+        t
+        for t, tile in enumerate(answer.hands[0].tiles)
+        if tile.finger == "inner_left" and tile.phalanx != "base"
+    ]
+    points, axes = honest.points.copy(), honest.axes.copy()
+    if what == "moved":
+        points[tiles[-1], 0] -= 0.01
+    else:
+        axes[tiles[-1]] = axes[tiles[-1]] @ Rotation.from_rotvec([0.0, 0.3, 0.0]).as_matrix()
+
+    def told(normals):
+        loads, forces = honest.loads.copy(), honest.forces.copy()
+        loads[tiles, 1] = normals
+        forces[tiles] = np.einsum("tk,tkx->tx", loads[tiles], axes[tiles])
+        return honest._replace(points=points, axes=axes, loads=loads, forces=forces)
+
+    def left(normals):
+        return check.again.of([], told(normals), None).left[1]
+
+    start = honest.loads[tiles, 1]
+    slopes = np.column_stack([left(start + e) - left(start) for e in np.eye(3)])
+    lie = told(start - np.linalg.solve(slopes, left(start)))
+    for _ in range(2):
+        again = check.again.of([], lie, None)
+        lie = lie._replace(
+            wrenches=lie.wrenches + again.wrenches,
+            tile_utilisations=again.tiles,
+            utilisations=again.hands,
+        )
+    assert np.abs(check.again.of([], lie, None).left).max() < 1e-9
+    reactions = -sum(
+        wrench_transport(question.stance.body.inverse() @ place.pose) @ wrench
+        for place, wrench in zip(question.stance.hands, lie.wrenches, strict=True)
+    )
+    wrong = check.problems(lie, float(lie.utilisations.max()), reactions)
+    assert any("distal tile of inner_left" in words for words in wrong)
+    assert check.problems(honest, answer.utilisation, ground.wrench) == []

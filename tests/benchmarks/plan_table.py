@@ -28,6 +28,12 @@ __all__ = ["plan_tables"]
 AGREEMENT = 1e-5
 """How far another way's utilisation may be from a plan's."""
 
+HEAVY = 160.0
+"""Mass that overloads the stances [kg]."""
+
+SOON = 5e-3
+"""A deadline after which there is a plan, and no explanation yet [s]."""
+
 FEW = 4
 """Stances that are asked for again and again, where caches count."""
 
@@ -177,10 +183,19 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         program._built.cache_clear()
         plan(late[number])
 
+    def heavy(number: int, twin: int, deadline: float | None) -> Question:
+        asked = question_of(number, twin)
+        return replace(asked, load=replace(asked.load, mass=HEAVY), deadline=deadline)
+
     count = range(rounds + WARM)
     requests = [request(number, twin=6) for number in count]
     shapes, late = [shaped(number) for number in count], [question_of(k, twin=7) for k in count]
+    overloaded = [heavy(number, 8, None) for number in count]
+    hurried = [heavy(number, 9, SOON) for number in count]
     alone = race({"shape": lambda k: plan(shapes[k]), "compiled": compiled}, rounds)
+    beyond = race(
+        {"explained": lambda k: plan(overloaded[k]), "soon": lambda k: plan(hurried[k])}, rounds
+    )
     among = race(
         {
             "plan": lambda k: plan(question(requests[k])),
@@ -193,6 +208,14 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
     return [
         Line("new stance, after 20 ms of other work", (span(among.median("plan")), *blank)),
         Line("new stance of a shape that is new, too", (span(alone.median("shape")), *blank)),
+        Line(
+            "overloaded stance, with what is in the way proven and named",
+            (span(beyond.median("explained")), *blank),
+        ),
+        Line(
+            f"… the same with a deadline of {span(SOON)}: the explanation is left out",
+            (span(beyond.median("soon")), *blank),
+        ),
         Line(
             "first stance of so many hands: programs are compiled",
             (span(alone.median("compiled")), *blank),
