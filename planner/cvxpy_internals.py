@@ -13,6 +13,8 @@ CVXPY `WRITTEN_FOR`; `cone_map` compares with the public `Problem.get_problem_da
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
@@ -54,7 +56,8 @@ class Affine(NamedTuple):
     values: Any
 
 
-class Places(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Places:
     """Where variables, or the multipliers of constraints, are in x or z.
 
     Attributes
@@ -69,9 +72,17 @@ class Places(NamedTuple):
     factors: Array
     parts: tuple[tuple[slice, tuple[int, ...]], ...]
 
+    @cached_property
+    def straight(self) -> bool:
+        """Whether they are the first of x or z as they stand there."""
+        first = np.arange(len(self.entries))
+        return bool((self.entries == first).all() and (self.factors == 1.0).all())
+
     def of(self, solution: Sequence[float]) -> tuple[Array, ...]:
         """Return their values."""
-        found = np.asarray(solution)[self.entries] * self.factors
+        found = np.asarray(solution)
+        if not self.straight:
+            found = found[self.entries] * self.factors
         return tuple(
             found[part] if len(shape) == 1 else found[part].reshape(shape, order="F")
             for part, shape in self.parts

@@ -21,6 +21,7 @@ Wright, Numerical Optimization, algorithm 16.3), begun next to its end.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -148,8 +149,9 @@ def _optimum(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
         if found is None:
             return None
         after = rows.room(found.z, found.u)
-        broken = np.flatnonzero(~active & (after < -HOLDS))
-        if len(broken):
+        after[active] = 0.0
+        if after.min() < -HOLDS:
+            broken = np.flatnonzero(after < -HOLDS)
             room = np.maximum(rows.room(z, u)[broken], 0.0)
             way = room / (room - after[broken])
             first = int(way.argmin())
@@ -184,8 +186,7 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
         return None
     for taken in range(STEPS):
         r1, r2, r3 = -Q * z - multipliers @ C, b + d * u - C @ z, 1.0 - float(d @ multipliers)
-        missing = np.abs(r1).max() > STILL or np.abs(r2).max() > MET or abs(r3) > WHOLE
-        if taken and not missing:
+        if taken and _size(r1) <= STILL and _size(r2) <= MET and abs(r3) <= WHOLE:
             whole = np.zeros(len(active))
             whole[active] = multipliers
             return _Point(z, u, whole)
@@ -194,3 +195,8 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
         step -= rise * across
         z, u, multipliers = z + (r1 - step @ C) / Q, u + rise, multipliers + step
     return None
+
+
+def _size(missing: Array) -> float:
+    """Return the Euclidean norm, which none of what is missing exceeds."""
+    return math.sqrt(missing.dot(missing))

@@ -68,8 +68,10 @@ class Load:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-            wrench = np.concatenate([force, np.cross(com, force)])
-        return moderate(wrench, None)
+        x, y, z = com.tolist()
+        fx, fy, fz = force.tolist()
+        moment = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        return moderate(np.array([fx, fy, fz, *moment]), None)
 
 
 @dataclass(frozen=True)
