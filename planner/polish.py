@@ -43,6 +43,12 @@ SURE: Final = (1e-6, 1.0)
 ROUNDS: Final = 12
 """Sets of active rows that are tried at most."""
 
+MANY: Final = 96
+"""Rows that may break on the way to where active ones meet; with more, it is sooner solved anew."""
+
+LARGE: Final = 64
+"""Loads of a stance up to which so many systems are worth it: fewer for more, by their cube."""
+
 HOLDS: Final = 1e-9
 """By how much a row may be broken, scaled."""
 
@@ -133,25 +139,33 @@ def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Polished
     for sure in SURE:
         active = multipliers > sure * room
         active[: rows.equations] = True
-        found = _optimum(rows, Q, start, active)
-        if found is not None:
-            ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
-            loads = tuple(np.split(found.z * unit, ends))
-            return Polished(loads, found.u, 0.5 * float(Q @ found.z**2))
+        try:
+            found = _optimum(rows, Q, start, active)
+        except _ApartError:
+            continue
+        if found is None:
+            break
+        ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
+        loads = tuple(np.split(found.z * unit, ends))
+        return Polished(loads, found.u, 0.5 * float(Q @ found.z**2))
     return None
 
 
+class _ApartError(Exception):
+    """Active rows do not meet."""
+
+
 def _optimum(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | None:
-    """Return the optimum, by the active-set method; None if it is not found in some rounds."""
+    """Return the optimum, by the active-set method; None if it is too far away."""
     z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
-    for _ in range(ROUNDS):
+    for _ in range(min(ROUNDS, int(ROUNDS * (LARGE / len(Q)) ** 3))):
         found = _meeting(rows, Q, _Point(z, u, multipliers), active)
-        if found is None:
-            return None
         after = rows.room(found.z, found.u)
         after[active] = 0.0
         if after.min() < -HOLDS:
             broken = np.flatnonzero(after < -HOLDS)
+            if len(broken) > MANY:
+                return None
             room = np.maximum(rows.room(z, u)[broken], 0.0)
             way = room / (room - after[broken])
             first = int(way.argmin())
@@ -167,8 +181,8 @@ def _optimum(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
     return None
 
 
-def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | None:
-    """Return the least point where active rows meet; None where they do not."""
+def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point:
+    """Return the least point where active rows meet; raises `_ApartError` where they do not."""
     C, d, b = rows.C[active], rows.d[active], rows.b[active]
     z, u, multipliers = start.z, start.u, start.multipliers[active]
     flexible = C / Q
@@ -179,11 +193,11 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
     S.flat[:: len(S) + 1] += SOFT
     factor, failed = dpotrf(S, lower=1)
     if failed:
-        return None
+        raise _ApartError
     across = dpotrs(factor, d * scale, lower=1)[0] * scale
     stiffness = float(d @ across)
     if not stiffness > 0.0:
-        return None
+        raise _ApartError
     for taken in range(STEPS):
         r1, r2, r3 = -Q * z - multipliers @ C, b + d * u - C @ z, 1.0 - float(d @ multipliers)
         if taken and _size(r1) <= STILL and _size(r2) <= MET and abs(r3) <= WHOLE:
@@ -194,7 +208,7 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point | Non
         rise = (float(d @ step) - r3) / stiffness
         step -= rise * across
         z, u, multipliers = z + (r1 - step @ C) / Q, u + rise, multipliers + step
-    return None
+    raise _ApartError
 
 
 def _size(missing: Array) -> float:

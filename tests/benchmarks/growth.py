@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from measured_stances import question_of, twin_of
 from plain_programs import Clarabel, scaled, unique
-from race import WARM, Way, race
+from race import TURN, WARM, Way, race
 from test_many_hands import crawler_in
 from test_many_hands import question as crawler_question
 
@@ -122,7 +122,7 @@ def _raced(
     tick: Callable[[], object],
 ) -> Curve:
     """Time all ways of all sizes in turns, so that noise does not bend the curve."""
-    timed = race(ways, rounds, tick)
+    timed = race(ways, rounds, tick, TURN)
     names = dict.fromkeys(name for name, _ in ways)
     medians = {name: [timed.median((name, size)) for size in sizes] for name in names}
     return Curve(title, axis, tuple(sizes), medians)
