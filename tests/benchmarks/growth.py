@@ -122,7 +122,7 @@ def _raced(
     tick: Callable[[], object],
 ) -> Curve:
     """Time all ways of all sizes in turns, so that noise does not bend the curve."""
-    timed = race(ways, rounds, tick, TURN)
+    timed = race(ways, rounds, tick, TURN // 4)
     names = dict.fromkeys(name for name, _ in ways)
     medians = {name: [timed.median((name, size)) for size in sizes] for name in names}
     return Curve(title, axis, tuple(sizes), medians)
