@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from hand_models.errors import InvalidInputError
 from hand_models.frames import Array, finite_vector
+from planner.ground import asked, ground_of
 from planner.plan import Plan
 from planner.prepared import prepare
 from planner.question import Question
-from planner.solve import ground_of, plan_on
+from planner.solve import plan_on
 from planner.stance import moderate
 
 __all__ = ["KnownStance"]
@@ -35,9 +35,7 @@ class KnownStance:
     """
 
     def __init__(self, question: Question) -> None:
-        if not isinstance(question, Question):
-            raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
-        ground = ground_of(question)
+        ground = ground_of(asked(question))
         hands = ground.hands
         # what joints bear changes with the wrench
         if ground.where is None and question.stance.joints is None and not hands.floating:

@@ -7,11 +7,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from hand_models.errors import InvalidInputError
 from hand_models.frames import Array
 from hand_models.hand import SettledHand
 from planner import deadline, dual_bounds, program, stance_data
@@ -32,7 +31,7 @@ from planner.explain import (
 from planner.floating import Settled
 from planner.floating_effort import least_effort, with_room
 from planner.floating_warnings import far_wrists, idle_preloads, strained_preloads
-from planner.gathering import gather
+from planner.ground import Ground, asked, ground_of
 from planner.hand_plan import HandPlan, WristPlan
 from planner.hand_sets import Hands
 from planner.least_utilisation import OPTIMAL, LeastUtilisation, least_utilisation
@@ -46,7 +45,7 @@ from planner.plan import (
     TensionPath,
     Times,
 )
-from planner.posture import Posture, posture
+from planner.posture import Posture
 from planner.prepared import Prepared, prepare
 from planner.program import SLACK, SOLVER, Outcome
 from planner.question import Question
@@ -55,7 +54,7 @@ from planner.reading_floating import read_floating_hand
 from planner.tension_path import UNKNOWN, tension_path, unsafe_sentence
 from planner.unfinished import Unfinished, late_sentence
 
-__all__ = ["Ground", "ground_of", "plan", "plan_on"]
+__all__ = ["plan", "plan_on"]
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
@@ -80,47 +79,8 @@ def plan(question: Question) -> Plan:
         If its deadline comes before anything is found that passes the checks.
     """
     start = time.perf_counter()
-    if not isinstance(question, Question):
-        raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
-    with deadline.within(question.deadline, started=start):
+    with deadline.within(asked(question).deadline, started=start):
         return plan_on(ground_of(question), start)
-
-
-def ground_of(question: Question) -> Ground:
-    """Return what is known of a question before a solver is asked; raises as `plan`."""
-    where = posture(question)
-    try:
-        wrench = question.needed_wrench(None if where is None else where.body_wrench)
-    except InvalidInputError as error:
-        raise error.within("load") from None
-    settled, hands = gather(question, where, wrench)
-    return Ground(question, where, settled, hands, wrench)
-
-
-class Ground(NamedTuple):
-    """All that is known of a question before a solver is asked.
-
-    Attributes
-    ----------
-    question : Question
-    where : Posture or None
-        The joints; None if the question says nothing of them.
-    settled : sequence of SettledHand
-        The hands on their holds.
-    hands : Hands
-        What the programs need of them.
-    wrench : ndarray, shape (6,)
-        The body wrench that is planned for, in B [N, N·m].
-    prepared : Prepared or None
-        What reads and checks its plans; by default it is made with each.
-    """
-
-    question: Question
-    where: Posture | None
-    settled: Sequence[SettledHand]
-    hands: Hands
-    wrench: Array
-    prepared: Prepared | None = None
 
 
 def plan_on(ground: Ground, start: float) -> Plan:

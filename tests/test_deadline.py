@@ -33,6 +33,7 @@ from planner import (
     program,
     solve,
 )
+from planner import ground as grounds
 from planner.barriers import vertex
 from planner.budget import Budget
 from planner.deadline import DeadlineError
@@ -181,7 +182,7 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(solve, "gather", "the hands were closed"), (program, "unique", "a plan was found")],
+    [(grounds, "gather", "the hands were closed"), (program, "unique", "a plan was found")],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
@@ -425,7 +426,7 @@ def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question():
 
 
 def ground_shape():
-    ground = solve.ground_of(QUESTION)
+    ground = grounds.ground_of(QUESTION)
     return ground.hands.sets(ground.hands.at_rest(ground.hands.idle)).data.shape
 
 

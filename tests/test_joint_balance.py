@@ -11,9 +11,10 @@ from hand_models.frames import wrench_transport
 from hand_models.holds import Cylinder
 from planner.carried import Carried
 from planner.equilibrium import equilibrium
+from planner.ground import ground_of
 from planner.joint_balance import LEVER, JointBalance
 from planner.settling import settle
-from planner.solve import ground_of, plan_on
+from planner.solve import plan_on
 from planner.stacked import NOTHING, Stacked, stacked
 from planner.verify import Check
 
