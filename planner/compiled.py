@@ -18,7 +18,6 @@ from __future__ import annotations
 import operator
 import threading
 import warnings
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -27,6 +26,7 @@ import cvxpy as cp
 import numpy as np
 
 from hand_models.frames import Array
+from hand_models.recent import Recent
 from planner import beside, deadline
 from planner.conic_extent import Extent, Layout, Room
 from planner.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
@@ -110,7 +110,7 @@ class Compiled:
         self._variables, self._constraints = variables, constraints
         self._lock = threading.Lock()
         self._idle: list[_Solver] = []
-        self._layouts: OrderedDict[Extent, Layout] = OrderedDict()
+        self._layouts: Recent[Extent, Layout] = Recent(LAYOUTS)
         self.map: ConeMap | None = None
         try:
             self.map = cone_map(problem, parameters, variables, constraints)
@@ -194,16 +194,10 @@ class Compiled:
 
     def _layout(self, values: Values, extent: Extent) -> Layout:
         """Return the conic program of an extent, found once."""
-        with self._lock:
-            found = self._layouts.pop(extent, None)
-            if found is not None:
-                self._layouts[extent] = found
-                return found
-        found = self._room.layout(extent, [np.shape(value) for value in values])
-        with self._lock:
-            self._layouts[extent] = found
-            while len(self._layouts) > LAYOUTS:
-                self._layouts.popitem(last=False)
+        (found,) = self._layouts.find([extent])
+        if found is None:
+            found = self._room.layout(extent, [np.shape(value) for value in values])
+            self._layouts.keep([(extent, found)])
         return found
 
     def _slowly(self, values: Values, settings: Mapping[str, Any]) -> Solution:

@@ -11,10 +11,15 @@ from planner.polish import polished
 from planner.program import TIE, Outcome
 from planner.stance_data import StanceData
 
-__all__ = ["OPTIMAL", "LeastUtilisation", "least_utilisation"]
+__all__ = ["LeastUtilisation", "is_least", "least_utilisation"]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
+
+
+def is_least(value: float, bound: float) -> bool:
+    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
+    return value - bound <= OPTIMAL * max(1.0, value)
 
 
 class LeastUtilisation(NamedTuple):
@@ -36,8 +41,7 @@ class LeastUtilisation(NamedTuple):
     @property
     def proven(self) -> bool:
         """Whether the utilisation is the least, as far as it counts."""
-        used = self.outcome.value
-        return self.outcome.solved and used - self.bound <= OPTIMAL * max(1.0, used)
+        return self.outcome.solved and is_least(self.outcome.value, self.bound)
 
 
 def least_utilisation(data: StanceData) -> LeastUtilisation:

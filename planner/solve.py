@@ -34,7 +34,7 @@ from planner.floating_warnings import far_wrists, idle_preloads, strained_preloa
 from planner.ground import Ground, asked, ground_of
 from planner.hand_plan import HandPlan, WristPlan
 from planner.hand_sets import Hands
-from planner.least_utilisation import OPTIMAL, LeastUtilisation, least_utilisation
+from planner.least_utilisation import LeastUtilisation, is_least, least_utilisation
 from planner.plan import (
     Certificate,
     LimitName,
@@ -527,14 +527,14 @@ class _Answer:
         if bound is None:
             bound = dual_bounds.least_bound(data, self.outcome)
         used = self.utilisation if self.least_effort is None else self.outcome.value
-        if used - bound > OPTIMAL * max(1.0, used):
+        if not is_least(used, bound):
             return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
         if self.least_effort is not None:
             effort = self.least_effort.value
             if self.search is not None:
                 effort = self.search.measure.effort
             bound = dual_bounds.least_effort_bound(self.data, self.least_effort, self.cap)
-            if effort - bound > OPTIMAL * max(1.0, effort):
+            if not is_least(effort, bound):
                 return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
         return []
 

@@ -19,7 +19,7 @@ from hand_models.row_layout import PALM_PRESSING, PALM_SHEAR
 from planner import dual_bounds, program
 from planner.cuts import Cut, cut
 from planner.known_stance import KnownStance
-from planner.least_utilisation import OPTIMAL, least_utilisation
+from planner.least_utilisation import is_least, least_utilisation
 from planner.loads_check import LoadsCheck
 from planner.plan import Plan
 from planner.program import Outcome
@@ -139,7 +139,7 @@ class StreamStance:
             if not outcome.solved:
                 return None
             bound = dual_bounds.least_bound(data, outcome)
-            if outcome.value - bound > OPTIMAL * max(1.0, outcome.value):
+            if not is_least(outcome.value, bound):
                 return None
         if loads is None:
             tidy = program.least_tensions(data, outcome.value)
