@@ -1,0 +1,1 @@
+"""Questions with known answers: what `crux` said before, to be said again."""

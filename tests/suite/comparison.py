@@ -1,0 +1,152 @@
+"""How far two answers are apart: numbers by the largest of their kind, sets without order."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+__all__ = ["Difference", "differences", "worst"]
+
+KINDS = {
+    "shear": "force",
+    "normal": "force",
+    "lateral": "force",
+    "gap": "utilisation",
+}
+"""Fields that are measured as others are."""
+
+SMALLEST = 1e-2
+"""Least size that a kind's numbers are measured by, in SI units: below it all is rounding."""
+
+SETS = {
+    *("vertices", "half_spaces", "inner", "outer", "hull_vertices", "full_hull_vertices"),
+    *("prices", "effort_prices", "blocking", "irreducible", "sufficient", "limiting"),
+}
+"""Fields whose rows have no order."""
+
+MISSING = "(missing)"
+
+
+class Difference(NamedTuple):
+    """What differs between two answers.
+
+    ``size`` is relative to the largest number of its kind; infinite for what is no number.
+    """
+
+    path: str
+    expected: Any
+    got: Any
+    size: float
+
+    @property
+    def names(self) -> list[str]:
+        """Of the fields that it is in."""
+        return re.split(r"[.\[]", self.path)
+
+    def __str__(self) -> str:
+        return f"{self.path}: expected {self.expected!r}, got {self.got!r} ({self.size:.1e})"
+
+
+def differences(expected: Any, got: Any) -> list[Difference]:
+    """Return all that differs between two answers, however little.
+
+    Parameters
+    ----------
+    expected, got : dict
+        Of `answers.told`.
+    """
+    scales: dict[str, float] = defaultdict(lambda: SMALLEST)
+    for path, value in _leaves(expected):
+        if _is_number(value):
+            kind = _kind(path)
+            scales[kind] = max(scales[kind], abs(value))
+    return list(_apart(expected, got, (), scales))
+
+
+def worst(found: list[Difference]) -> float:
+    """Return the size of the largest difference; zero where there is none."""
+    return max((each.size for each in found), default=0.0)
+
+
+Path = tuple[str | int, ...]
+
+
+def _apart(expected: Any, got: Any, path: Path, scales: dict[str, float]) -> Iterator[Difference]:
+    if isinstance(expected, dict) and isinstance(got, dict):
+        for key in sorted({*expected, *got}):
+            if key in expected and key in got:
+                yield from _apart(expected[key], got[key], (*path, key), scales)
+            else:
+                pair = expected.get(key, MISSING), got.get(key, MISSING)
+                yield Difference(_dotted((*path, key)), *pair, math.inf)
+    elif isinstance(expected, list) and isinstance(got, list):
+        if path and path[-1] in SETS:
+            yield from _unmatched(expected, got, path, scales, "got")
+            yield from _unmatched(got, expected, path, scales, "expected")
+        elif len(expected) != len(got):
+            yield Difference(_dotted(path) + ".length", len(expected), len(got), math.inf)
+        else:
+            for i, pair in enumerate(zip(expected, got, strict=True)):
+                yield from _apart(*pair, (*path, i), scales)
+    elif _is_number(expected) and _is_number(got):
+        if expected != got:
+            size = abs(expected - got) / scales[_kind(path)]
+            yield Difference(_dotted(path), expected, got, size)
+    elif type(expected) is not type(got) or expected != got:
+        yield Difference(_dotted(path), expected, got, math.inf)
+
+
+def _unmatched(
+    rows: list[Any], others: list[Any], path: Path, scales: dict[str, float], where: str
+) -> Iterator[Difference]:
+    """Tell how far each row is from the nearest one of the other set that has its names."""
+    known = defaultdict(list)
+    for row in others:
+        names, numbers = _split(row, path, scales)
+        known[names].append(numbers)
+    for i, row in enumerate(rows):
+        names, numbers = _split(row, path, scales)
+        near = [np.abs(other - numbers).max(initial=0.0) for other in known[names]]
+        size = float(min(near, default=math.inf))
+        if size > 0.0:
+            pair = (row, f"no such row in what was {where}")
+            yield Difference(_dotted((*path, i)), *(pair if where == "got" else pair[::-1]), size)
+
+
+def _split(row: Any, path: Path, scales: dict[str, float]) -> tuple[tuple[Any, ...], np.ndarray]:
+    """Return what a row says in words, with where it says so, and its scaled numbers."""
+    leaves = [((*path, *below), value) for below, value in _leaves(row)]
+    numbers = [value / scales[_kind(place)] for place, value in leaves if _is_number(value)]
+    names = tuple(
+        (place[len(path) :], None if _is_number(value) else value) for place, value in leaves
+    )
+    return names, np.array(numbers)
+
+
+def _leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    if isinstance(value, dict):
+        for key in sorted(value):
+            yield from _leaves(value[key], (*path, key))
+    elif isinstance(value, list):
+        for i, part in enumerate(value):
+            yield from _leaves(part, (*path, i))
+    else:
+        yield path, value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _kind(path: Path) -> str:
+    name = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
+    return KINDS.get(name, name)
+
+
+def _dotted(path: Path) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)[1:]

@@ -1,0 +1,45 @@
+"""Every question of the suite is answered as it is recorded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from suite.answers import read_answers
+from suite.problems import Problem, problems
+from suite.table import answer
+
+ANSWERS: dict[str, dict[str, Any]] = {}
+
+
+def known(problem: Problem) -> dict[str, Any]:
+    """What is recorded of a problem; each file is read once."""
+    if problem.kind not in ANSWERS:
+        ANSWERS[problem.kind] = read_answers(problem.kind)
+    return ANSWERS[problem.kind][problem.name]
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        pytest.param(each, id=each.label, marks=[pytest.mark.slow] if each.slow else [])
+        for each in problems()
+    ],
+)
+def test_the_answer_is_as_recorded(problem: Problem) -> None:
+    assert [str(each) for each in problem.changes(known(problem), answer(problem))[:10]] == []
+
+
+def test_every_problem_has_an_answer_and_every_answer_a_problem() -> None:
+    names: dict[str, list[str]] = {}
+    for each in problems():
+        names.setdefault(each.kind, []).append(each.name)
+    for kind, expected in names.items():
+        assert list(read_answers(kind)) == expected
+
+
+def test_there_are_many_questions_and_the_loose_ones_say_why() -> None:
+    everything = list(problems())
+    assert len(everything) >= 300
+    assert all(reason for each in everything for _, reason in each.loose.values())
