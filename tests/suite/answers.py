@@ -21,11 +21,15 @@ WORDS = {
 }
 """Fields that are left out: sentences, clocks, counts of steps, remainders of rounding."""
 
+PLACE = {"position", "force", "shear_axis", "normal_axis", "lateral_axis"}
 DETAIL = {
-    *("position", "force", "shear_axis", "normal_axis", "lateral_axis"),
-    *("motor_torque", "motor_current"),
+    "tiles": PLACE,
+    "contacts": PLACE,
+    "fingers": {"motor_torque", "motor_current", "winch_angle"},
+    "rows": {"finger", "phalanx", "limit", "joint"},
 }
-"""Fields of fingers, tiles and contacts that only a problem marked ``full`` keeps."""
+"""Fields that only a problem marked ``full`` keeps: of tiles and contacts, of fingers (they follow
+from tensions), of a set's rows (their names have them)."""
 
 DIRECTIONS = np.cos(np.arange(1.0, 241.0) ** 2).reshape(40, 6) * [1, 1, 1, 0.1, 0.1, 0.1]
 """Along which large sets of wrenches are measured, moments over 0.1 m."""
@@ -55,8 +59,8 @@ def _kept(value: Any, full: bool, name: str = "") -> Any:
     value = {key: part for key, part in value.items() if key not in WORDS}
     if not isinstance(value.get("error", {}), dict):
         del value["error"]  # of a linearisation; not an error reply
-    if name in ("fingers", "tiles", "contacts") and not full:
-        value = {key: part for key, part in value.items() if key not in DETAIL}
+    left_out = set() if full else DETAIL.get(name, set())
+    value = {key: part for key, part in value.items() if key not in left_out}
     if value.get("half_spaces") is not None:
         value = _measured(value, full)
     return {key: _kept(part, full, key) for key, part in value.items()}

@@ -10,6 +10,8 @@ from suite.answers import read_answers
 from suite.problems import Problem, problems
 from suite.table import answer
 
+SLOW = (pytest.mark.slow, pytest.mark.timeout(1800))
+
 ANSWERS: dict[str, dict[str, Any]] = {}
 
 
@@ -22,10 +24,7 @@ def known(problem: Problem) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     "problem",
-    [
-        pytest.param(each, id=each.label, marks=[pytest.mark.slow] if each.slow else [])
-        for each in problems()
-    ],
+    [pytest.param(each, id=each.label, marks=SLOW if each.slow else ()) for each in problems()],
 )
 def test_the_answer_is_as_recorded(problem: Problem) -> None:
     assert [str(each) for each in problem.changes(known(problem), answer(problem))[:10]] == []
