@@ -79,6 +79,83 @@ def test_reaches_of_a_box():
     np.testing.assert_allclose(away, [90.0, np.nan, np.nan])
 
 
+# A hull with the origin on its boundary -----------------------------------------------------------
+
+ROUNDING = (-1e-12, -1e-15, 0.0, 1e-15, 1e-12)
+"""By how much rounding may move a hull of this size."""
+
+HALF = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)])
+"""The box without its upper part: the origin is in the middle of a face."""
+
+
+@pytest.mark.parametrize("tilt", ROUNDING)
+@pytest.mark.parametrize("shift", ROUNDING)
+def test_reaches_along_a_face_do_not_jump_with_rounding(shift, tilt):
+    """F_x runs along the face the origin is on, which rounding tilts and shifts."""
+    moved = HALF + np.outer(shift + tilt * HALF[:, 0], (0.0, 1.0, 0.0))
+    directions = np.array([[1.0, 0, 0], [-1.0, 0, 0], [80.0, 0, 1.0], [0, -1.0, 0], [1.0, -1.0, 0]])
+    expected = [40.0, 40.0, 0.5, 20.0, 20.0]
+    np.testing.assert_allclose(reach(moved, directions), expected, rtol=1e-11)
+    # out of the face, there is nothing
+    assert reach(moved, np.array([[0.0, 1.0, 0.0]]))[0] == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("shift", ROUNDING)
+def test_reaches_along_an_edge_and_from_a_corner_do_not_jump_with_rounding(shift):
+    edge = HALF - (40.0, 0.0, 0.0) + shift
+    directions = np.array([[0, 0, 1.0], [0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, -1.0, 0]])
+    np.testing.assert_allclose(reach(edge, directions), [1.0, 1.0, 80.0, 20.0, 20.0], rtol=1e-10)
+    corner = HALF - (40.0, 0.0, 1.0) + shift
+    directions = np.array([[0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, 0, -1.0]])
+    np.testing.assert_allclose(reach(corner, directions), [2.0, 80.0, 20.0, 2.0], rtol=1e-10)
+    # what is more than rounding beyond the face misses the hull
+    assert np.isnan(reach(HALF - (0.0, 1e-6, 0.0), np.array([[1.0, 0.0, 0.0]]))).all()
+
+
+@pytest.mark.parametrize("shift", ROUNDING)
+def test_a_plane_that_touches_a_hull_meets_its_face_its_edge_or_its_corner(shift):
+    def met(normal, at=(0.0, 0.0, 0.0)):
+        return sorted(tuple(np.round(c, 9) + 0.0) for c in section(HALF + shift - at, normal))
+
+    face = [(x, 0.0, m) for x in (-40.0, 40.0) for m in (-1.0, 1.0)]
+    assert met((0.0, 1.0, 0.0)) == face
+    assert met((0.0, -1e3, 0.0)) == face
+    assert met((1.0, 1.0, 0.0), (40.0, 0.0, 0.0)) == [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]
+    assert met((1.0, 1.0, 1.0), (40.0, 0.0, 1.0)) == [(0.0, 0.0, 0.0)]
+    # a plane of loading through the same edge, and through the middle of the face
+    assert met((0.0, 0.0, 1.0)) == [(x, z, 0.0) for x in (-40.0, 40.0) for z in (-20.0, 0.0)]
+    # beyond it by more than rounding
+    assert met((0.0, 1.0, 0.0), (0.0, 1e-6, 0.0)) == []
+
+
+@pytest.mark.parametrize("shift", ROUNDING)
+def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
+    moved = np.sort(cut(np.add(HALF, (0.0, shift, 0.0))), axis=0)
+    np.testing.assert_allclose(moved, np.sort(HALF, axis=0), atol=1e-11)
+    assert cut(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(CLOUDS, st.integers(0, 1000))
+def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hull(points, seed):
+    """The origin is inside the whole hull, where nothing is in doubt, and on the part's face."""
+    normal = np.random.default_rng(seed).normal(size=3) * UNITS
+    below = cut(points, normal)
+    along = np.cross(normal / UNITS, np.eye(3)) / UNITS
+    ways = np.vstack([along, -along])
+    whole = reach(points, ways)
+    for shift in ROUNDING:
+        moved = below + shift / UNITS
+        np.testing.assert_allclose(reach(moved, ways), whole, rtol=1e-7)
+    # its highest vertices are on the plane
+    height = below @ normal / np.linalg.norm(normal / UNITS)
+    assert (height < 1e-13).all()
+    assert ((height < -1e-9) | (height > -1e-13)).all()
+
+
+# Against linear programs --------------------------------------------------------------------------
+
+
 @settings(max_examples=20, deadline=None)
 @given(CLOUDS, st.floats(-0.5, 0.5), st.integers(0, 1000))
 def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):

@@ -21,6 +21,7 @@ from hand_models.finger import PHALANGES
 from hand_models.frames import Array
 from hand_models.gripper import Gripper, gripper_table
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.polytopes import TOLERANCE
 from hand_models.studies import Claim, Progress, StudyResult, save_picture
 from hand_models.studies.pulling import DRAGGED, UNBALANCED, Pulled, even_pulls, pull, unloaded
 from hand_models.studies.wrench_hull import (
@@ -165,10 +166,13 @@ def _best(points: Array) -> dict[str, dict[str, Any]]:
         ("force", np.hypot(points[:, 0], points[:, 1])),
         ("moment", np.abs(points[:, 2])),
     ):
-        best = points[strengths.argmax()]
+        # of a wrench and its mirror image, which are as strong, that to the right
+        most = strengths.max()
+        alike = points[strengths >= (1.0 - TOLERANCE) * most]
+        best = alike[alike[:, 0].argmax()]
         found[name] = {
             "wrench": best.tolist(),
-            name: float(strengths.max()),
+            name: float(most),
             "arm": float(best[2] / best[0]),
             "ratio": float(best[0] / best[2]),
         }

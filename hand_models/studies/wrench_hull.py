@@ -2,6 +2,10 @@
 
 Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus the contract's. A hull is
 given by any points whose convex hull it is; what comes back are vertices.
+
+A cut through the origin leaves the origin on a face, where "inside" and "beyond" differ by rounding
+alone. So what is within `TOLERANCE` of a plane, as a share of the hull's size, counts as lying on
+it, and what lies on a face counts as within: nothing jumps where a wrench crosses a face by less.
 """
 
 from __future__ import annotations
@@ -12,8 +16,8 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-from hand_models.frames import Array
-from hand_models.polytopes import hull, hull_facets
+from hand_models.frames import Array, Indices
+from hand_models.polytopes import TOLERANCE, hull, hull_facets
 from hand_models.wrench_space import SCALE
 from hand_models.wrist_search import PLANAR
 
@@ -82,54 +86,74 @@ def volume(points: Array) -> float:
 def cut(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
     """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
 
-    None, shape (0, 3), if no vertex of the hull is within.
+    None, shape (0, 3), if no vertex of the hull is below the plane.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
     normal : array_like, shape (3,)
         By default `PULL_OFF`.
     offset : float
     """
-    height = points @ np.asarray(normal, dtype=float) - offset
-    if not (height < 0.0).any():
+    way = np.asarray(normal, dtype=float) / UNITS
+    height = (points @ np.asarray(normal, dtype=float) - offset) / np.linalg.norm(way)
+    slack = _slack(points)
+    if not (height < -slack).any():
         return np.zeros((0, 3))
-    if (height <= 0.0).all():
+    if (height <= slack).all():
         return vertices(points)
-    return vertices(np.vstack([points[height <= 0.0], _crossings(points, height)]))
+    met = _met(points, height, slack)
+    # exactly on the plane: the part's face there is one face
+    beyond = (met @ np.asarray(normal, dtype=float) - offset) / (way @ way)
+    face = met - beyond[:, None] * way / UNITS
+    return vertices(np.vstack([points[height < -slack], face]))
 
 
 def section(points: Array, normal: ArrayLike) -> Array:
     """Return the polygon in which the plane normal · w = 0 meets a hull, in order, shape (k, 3).
 
-    Fewer than three corners, shape (0, 3), if it misses the hull.
+    A face, an edge's two ends or one vertex where the plane only touches the hull; no corners,
+    shape (0, 3), if it misses it.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
+    normal : array_like, shape (3,)
     """
-    n = np.asarray(normal, dtype=float)
-    height = points @ n
-    met = np.vstack([points[height == 0.0], _crossings(points, height)])
-    if len(met) < 3:
-        return np.zeros((0, 3))
+    way = np.asarray(normal, dtype=float) / UNITS
+    slack = _slack(points)
+    met = _met(points, (points * UNITS) @ way / np.linalg.norm(way), slack)
+    if not len(met):
+        return met
     # coordinates in the plane, of commensurate units
-    basis = np.linalg.svd((n / UNITS)[None])[2][1:]
-    return met[hull(met * UNITS @ basis.T).vertices]
+    basis = np.linalg.svd(way[None])[2][1:]
+    return met[_outermost(met * UNITS @ basis.T, slack)]
 
 
 def reach(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
     """Return the largest s ≥ 0 with start + s · direction in a hull, shape (m,).
 
-    Not a number where the line misses the hull, or meets it only behind.
+    Not a number where the line misses the hull, or meets it only behind. A start on a face counts
+    as within it: along the face, rounding decides neither whether the line is in the hull nor where
+    it ends.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
     directions : ndarray, shape (m, 3)
+        In the wrenches' units, of any length.
     start : array_like, shape (3,) or (m, 3), optional
-        The origin by default.
+        The origin by default [N, N, N·m].
     """
     normals, offsets = hull_facets(points * UNITS)
+    slack = _slack(points)
     gaps = offsets - np.broadcast_to(start, directions.shape) * UNITS @ normals.T
+    gaps = np.where(gaps < -slack, gaps, np.maximum(gaps, slack))
     slopes = (directions * UNITS) @ normals.T
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         ratios = gaps / slopes
     most = np.where(slopes > 0.0, ratios, np.inf).min(axis=1)
     least = np.where(slopes < 0.0, ratios, -np.inf).max(axis=1)
@@ -137,15 +161,34 @@ def reach(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
     return np.where((most >= np.maximum(least, 0.0)) & ~blocked, most, np.nan)
 
 
-def _crossings(points: Array, height: Array) -> Array:
-    """Return where the edges of a hull cross the plane at which its height is zero, (k, 3)."""
+def _slack(points: Array) -> float:
+    """Return how near wrenches of a hull are that rounding alone may part [N]."""
+    return TOLERANCE * float(np.abs(points * UNITS).max(initial=0.0))
+
+
+def _met(points: Array, height: Array, slack: float) -> Array:
+    """Return where a hull meets the plane at which its height is zero, shape (k, 3).
+
+    Vertices no farther than ``slack`` from it, and where edges cross it between the others.
+    """
     triangles = hull(points * UNITS).simplices
     pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
     near, far = np.unique(np.sort(pairs), axis=0).T
-    across = height[near] * height[far] < 0.0
+    side = np.where(np.abs(height) <= slack, 0.0, np.sign(height))
+    across = side[near] * side[far] < 0.0
     near, far = near[across], far[across]
     part = height[near] / (height[near] - height[far])
-    return np.asarray(points[near] + part[:, None] * (points[far] - points[near]))
+    crossings = points[near] + part[:, None] * (points[far] - points[near])
+    return np.vstack([points[side == 0.0], crossings])
+
+
+def _outermost(flat: Array, slack: float) -> Indices:
+    """Return which of some points (n, 2) are corners of their hull, two ends of it, or one."""
+    _, widths, axes = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
+    if len(widths) > 1 and widths[1] > slack:
+        return np.asarray(hull(flat).vertices, dtype=np.intp)
+    along = flat @ axes[0]
+    return np.unique([along.argmin(), along.argmax()] if widths[0] > slack else [0])
 
 
 def label_solid(axes: Any, title: str) -> None:
