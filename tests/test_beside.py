@@ -9,6 +9,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
 from planner import beside, program, solve
@@ -87,7 +88,7 @@ def test_plans_are_made_while_the_interpreter_ends():
         env={**os.environ, "PYTHONPATH": path},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True\n", "")
@@ -95,13 +96,22 @@ def test_plans_are_made_while_the_interpreter_ends():
 
 def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):
     threads = []
-    prepare = solve.prepare
+    prepare, begin = solve.prepare, beside.begin
+    taken = threading.Event()
 
     def noted(*given):
         threads.append(me())
+        taken.set()
         return prepare(*given)
 
+    def begun():
+        """Let no solver be done before the other thread has the work."""
+        waiting = beside._waiting.get() is not None
+        begin()
+        assert not waiting or taken.wait(PATIENCE)
+
     monkeypatch.setattr(solve, "prepare", noted)
+    monkeypatch.setattr(beside, "begin", begun)
     question = ask(on_wall())
     answer = solve.plan(question)
     assert answer.verified

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 import trimesh
 from asked import HEAVY, LIGHT, flat_request, jointed_request, put, wall_request
+from patience import PATIENCE
 from rich.console import Console
 from rocks import cylinder_mesh
 from test_service import ROOT, Served, free_endpoint
@@ -64,7 +65,7 @@ def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[
         capture_output=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
 
@@ -331,6 +332,7 @@ def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFix
 def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
     server = Served(free_endpoint())
     flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
+    flags += ["--timeout", str(PATIENCE)]
     try:
         asked = process("query", stance(wall_request()), *flags, "--json")
         assert (asked.returncode, asked.stderr) == (DONE, b"")
@@ -362,7 +364,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
         capture_output=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert (asked.returncode, asked.stdout) == (FAILED, b"")

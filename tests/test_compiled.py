@@ -15,6 +15,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from patience import PATIENCE
 from stances import PLACES, ask, on_wall, program_data
 
 from planner import compiled, cvxpy_internals, deadline, program, stance_data
@@ -198,16 +199,17 @@ def test_a_solver_is_stopped_at_the_deadline_and_goes_on_after(data):
         late = built.solve(data)
     assert late.status == compiled.OUT_OF_TIME
     assert not late.solved
-    with deadline.within(60.0):
+    with deadline.within(1e4):
         assert built.solve(data).value == honest.value
     assert built.solve(data).value == honest.value
 
 
 def test_an_inner_deadline_cannot_put_off_an_outer_one():
-    with deadline.within(0.0), deadline.within(60.0):
+    with deadline.within(0.0), deadline.within(1e4):
         assert deadline.expired()
-    with deadline.within(60.0), deadline.within(None):
-        assert 50.0 < deadline.left() <= 60.0
+    with deadline.within(1e4), deadline.within(None):
+        assert deadline.seconds() == 1e4
+        assert 0.0 < deadline.left() <= 1e4
     assert deadline.left() is None
 
 
@@ -296,7 +298,7 @@ def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
     def interrupted():
         raise KeyboardInterrupt
 
-    with deadline.within(60.0), monkeypatch.context() as patch:
+    with deadline.within(1e4), monkeypatch.context() as patch:
         patch.setattr(deadline, "expired", interrupted)
         with pytest.raises(KeyboardInterrupt):
             built.solve(data)
@@ -323,7 +325,7 @@ def test_a_forked_process_builds_programs_of_its_own():
     ended = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", FORKED],
         env={**os.environ, "PYTHONPATH": path},
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert ended.returncode == 0

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from asked import LIGHT, spoil, wall_request
+from patience import PATIENCE
 from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models.compliant_hand import CompliantHand
@@ -285,7 +286,7 @@ def test_reply_over_zenoh_tells_the_wrists():
         open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as session,
         PlanService(session),
     ):
-        reply = CruxClient(session).plan(request)
+        reply = CruxClient(session, timeout=PATIENCE).plan(request)
     assert reply.status == "optimal"
     assert [hand.wrist.mode for hand in reply.hands] == ["fixed", "floating", "floating", "fixed"]
     for hand in reply.hands:

@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from asked import HEAVY, flat_request, put, wall_request
+from patience import PATIENCE
 from test_service import ROOT, plan_request
 
 from hand_models.errors import InvalidInputError
@@ -113,6 +114,7 @@ def test_a_process_that_is_killed_while_it_plans_costs_no_reply(two):
         if not killed:
             worker = two._workers._all[0]
             os.kill(worker.process.pid, signal.SIGKILL)
+            worker.process.join(PATIENCE)
             killed.append(worker)
 
     replies = two.plan_many(requests, kill_one)
@@ -175,7 +177,7 @@ def script(tmp_path: Path, body: str, guard: str = "") -> subprocess.CompletedPr
         capture_output=True,
         text=True,
         env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}"},
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
 
@@ -283,7 +285,7 @@ def test_a_batch_from_standard_input_goes_through_processes_of_its_own():
         capture_output=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert (found.returncode, found.stderr) == (0, b"")

@@ -16,6 +16,7 @@ import pytest
 import zenoh
 from asked import HEAVY, full_request, put, wall_request
 from hands import PINCH, ROCK
+from patience import PATIENCE
 from rocks import cylinder_mesh
 from test_command import process
 from test_service import Served, client_config, free_endpoint
@@ -457,7 +458,7 @@ def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Se
     assert len({reply["utilisation"] for reply in want}) >= 2
     order = [i for _ in range(5) for i in (0, 1, 2, 3, 1, 0)]
     with PlanService(alone), ThreadPoolExecutor(4) as pool:
-        client = CruxClient(alone)
+        client = CruxClient(alone, timeout=PATIENCE)
         got = list(pool.map(lambda i: untimed(client.plan(asked[i])), order))
         bad = put(
             msgspec.to_builtins(asked[1]),
@@ -481,7 +482,7 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(file) -> No
     default = own("structure", "held_mass", 20.0)
     try:
         with zenoh.open(client_config(served.endpoint)) as session:
-            client = CruxClient(session)
+            client = CruxClient(session, timeout=PATIENCE)
             for request in (plain, with_hand(plain, THICK), with_hand(plain, heavy)):
                 want = dispatch.plan(over_default(request, default))
                 assert untimed(client.plan(request)) == untimed(want)
@@ -489,6 +490,7 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(file) -> No
             assert untimed(client.plan(with_hand(plain, back))) == untimed(dispatch.plan(plain))
         stance = file(json.dumps(wall_request(HEAVY)), "stance.json")
         flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
+        flags += ["--timeout", str(PATIENCE)]
         hand = file(line("structure", "held_mass", 45.0), "mine.toml")
         asked = process("query", stance, *flags, "--json", "--hand", hand)
         want = dispatch.plan(with_hand(plain, own("structure", "held_mass", 45.0)))

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import zenoh
 from asked import pose, put, wall_request
+from patience import PATIENCE
 from robots import arm
 from test_command import process
 from test_own_hand import line
@@ -317,9 +318,12 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
     request = plan_request(hanging(file))
     with PlanService(alone), PlanService(alone, own) as service:
         assert service.robot == "arms"
-        alive = {str(r.ok.key_expr) for r in alone.liveliness().get("crux/**", timeout=5.0)}
+        heard = alone.liveliness().get("crux/**", timeout=PATIENCE)
+        alive = {str(reply.ok.key_expr) for reply in heard}
         assert alive == {service_key(robot, "alive") for robot in ("arms", "robosimian")}
-        arms, simian = CruxClient(alone, "arms"), CruxClient(alone)
+        arms, simian = (
+            CruxClient(alone, name, timeout=PATIENCE) for name in ("arms", "robosimian")
+        )
         want = dispatch.plan(request, robots_of(own))
         for asked in (request, with_robot(request, own)):
             assert arms.plan(asked).utilisation == pytest.approx(want.utilisation, rel=1e-9)
@@ -333,7 +337,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
         with pytest.raises(ServiceError, match="unknown robot 'robosimian'; known are arms"):
             arms.plan(named)
         with pytest.raises(NoServiceError, match="nobody answers at crux/loris/plan"):
-            CruxClient(alone, "loris").plan(request)
+            CruxClient(alone, "loris", timeout=PATIENCE).plan(request)
 
 
 def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path) -> None:
@@ -342,6 +346,7 @@ def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path)
     own = read_robot(file)
     served = Served(free_endpoint(), "--robot", str(file))
     flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting", "--json"]
+    flags += ["--timeout", str(PATIENCE)]
     try:
         assert set(served.ready["keys"]) == {
             service_key("arms", name) for name in dispatch.SERVICES
@@ -362,7 +367,7 @@ def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path)
             far = hanging(file, "solve")
             far["stance"]["hands"][1]["pose"]["position"][2] += 1.0
             with pytest.raises(ServiceError, match="right is out of reach by 0") as caught:
-                CruxClient(session, "arms").plan(plan_request(far))
+                CruxClient(session, "arms", timeout=PATIENCE).plan(plan_request(far))
             assert caught.value.kind == "unreachable"
     finally:
         served.stop(signal.SIGTERM)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -28,6 +29,7 @@ from asked import (
     spoil,
     wall_request,
 )
+from patience import PATIENCE
 from test_messages import check_answer
 from zenoh.handlers import FifoChannel
 
@@ -75,12 +77,11 @@ class Served:
         assert line, self.process.stderr.read().decode()
         self.ready = json.loads(line)
 
-    def stop(self, number: int) -> tuple[float, str, str]:
-        """Send a signal; how long the process took to end, and what it had to say."""
-        start = time.monotonic()
+    def stop(self, number: int) -> tuple[str, str]:
+        """Send a signal; what the process had to say until its end."""
         self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=20)
-        return time.monotonic() - start, out.decode(), err.decode()
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return out.decode(), err.decode()
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +111,7 @@ def ask(
 ) -> list[Answer]:
     """Every reply to a raw query."""
     answers = []
-    for reply in session.get(key, payload=payload, encoding=encoding, timeout=10.0):
+    for reply in session.get(key, payload=payload, encoding=encoding, timeout=PATIENCE):
         part = reply.ok or reply.err
         answers.append(Answer(part.payload.to_bytes(), str(part.encoding), reply.ok is not None))
         if reply.ok is not None:
@@ -162,7 +163,8 @@ def test_a_wildcard_finds_the_robots_that_plan(session: zenoh.Session) -> None:
 
 
 def test_the_service_is_alive_while_it_serves(session: zenoh.Session) -> None:
-    alive = [str(reply.ok.key_expr) for reply in session.liveliness().get("crux/**", timeout=5.0)]
+    told = session.liveliness().get("crux/**", timeout=PATIENCE)
+    alive = [str(reply.ok.key_expr) for reply in told]
     assert alive == [service_key("robosimian", "alive")]
 
 
@@ -182,7 +184,8 @@ def test_fuzz_over_the_network(session: zenoh.Session) -> None:
 
 @pytest.mark.parametrize("form", Format)
 def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
-    with CruxClient(client_config(served.endpoint), form=form) as client:
+    config = client_config(served.endpoint)
+    with CruxClient(config, form=form, timeout=PATIENCE) as client:
         reply = client.plan(plan_request())
         assert (reply.id, reply.status) == ("wall", "optimal")
         assert client.plan(plan_request(wall_request(HEAVY))).status == "overloaded"
@@ -196,7 +199,7 @@ def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
 
 
 def test_the_client_raises_what_the_service_says(session: zenoh.Session) -> None:
-    client = CruxClient(session)
+    client = CruxClient(session, timeout=PATIENCE)
     request = msgspec.structs.replace(plan_request(), objective="max_reliability")
     with pytest.raises(ServiceError, match="objective: max_reliability is not supported") as caught:
         client.plan(request)
@@ -213,13 +216,16 @@ def test_nobody_there() -> None:
     with pytest.raises(NoServiceError, match="no zenoh session"):
         CruxClient(client_config(free_endpoint()))
     alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with CruxClient(alone) as client, pytest.raises(NoServiceError, match="nobody answers at"):
+    with (
+        CruxClient(alone, timeout=PATIENCE) as client,
+        pytest.raises(NoServiceError, match="nobody answers at"),
+    ):
         client.plan(plan_request())
 
 
 def test_a_robot_that_nobody_plans_for(session: zenoh.Session) -> None:
     with pytest.raises(NoServiceError, match="crux/loris/plan"):
-        CruxClient(session, "loris").plan(plan_request())
+        CruxClient(session, "loris", timeout=PATIENCE).plan(plan_request())
 
 
 @pytest.fixture
@@ -248,13 +254,13 @@ def test_an_empty_answer_is_asked_for_once_more(alone: zenoh.Session) -> None:
                 query.reply(PLAN, good, encoding=JSON)
 
     with alone.declare_queryable(PLAN, second_time):
-        assert CruxClient(alone).plan(plan_request()).status == "optimal"
+        assert CruxClient(alone, timeout=PATIENCE).plan(plan_request()).status == "optimal"
     asked.clear()
     with (
         alone.declare_queryable(PLAN, lambda query: (asked.append(1), query.drop())),
         pytest.raises(NoServiceError),
     ):
-        CruxClient(alone).plan(plan_request())
+        CruxClient(alone, timeout=PATIENCE).plan(plan_request())
     assert len(asked) == 2
 
 
@@ -272,7 +278,7 @@ def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
         alone.declare_queryable(PLAN, nonsense),
         pytest.raises(ServiceError, match="a reply that is no PlanReply"),
     ):
-        CruxClient(alone).plan(plan_request())
+        CruxClient(alone, timeout=PATIENCE).plan(plan_request())
 
 
 # Faults and floods --------------------------------------------------------------------------------
@@ -281,7 +287,7 @@ def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
 def test_a_fault_is_the_callers_error_and_the_service_goes_on(
     alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    client = CruxClient(alone)
+    client = CruxClient(alone, timeout=PATIENCE)
     with PlanService(alone):
         with monkeypatch.context() as patch:
             patch.setattr(solve, "plan", lambda _: 1 / 0)
@@ -293,13 +299,31 @@ def test_a_fault_is_the_callers_error_and_the_service_goes_on(
         client.plan(plan_request())
 
 
+class Turn:
+    """A lock that knows whose it is."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.owner: int | None = None
+
+    def acquire(self, *, timeout: float = -1.0) -> bool:
+        taken = self._lock.acquire(timeout=timeout)
+        if taken:
+            self.owner = threading.get_ident()
+        return taken
+
+    def release(self) -> None:
+        self.owner = None
+        self._lock.release()
+
+
 def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    inside = threading.Lock()
+    turn, all_sent = Turn(), threading.Event()
 
     def exclusive(*_: object) -> None:
-        assert inside.acquire(blocking=False)
-        time.sleep(0.05)
-        inside.release()
+        # while others wait
+        assert all_sent.wait(PATIENCE)
+        assert turn.owner == threading.get_ident()
         raise InvalidInputError("done", field="stance")
 
     monkeypatch.setattr(solve, "plan", exclusive)
@@ -311,11 +335,15 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         WRENCH_SPACE: {"v": 1, "stance": stance, "limb": "front_left"},
         BODY_SPACE: {"v": 1, "stance": stance, "axes": ["fx", "fz"]},
     }
-    with PlanService(alone):
+    service = PlanService(alone)
+    monkeypatch.setattr(service, "_answering", turn)
+    with service:
+        # no more than fit into the channels while nothing is answered
         channels = [
-            alone.get(key, payload=msgspec.json.encode(asked), encoding=JSON, timeout=10.0)
-            for key, asked in 3 * list(questions.items())
+            alone.get(key, payload=msgspec.json.encode(asked), encoding=JSON, timeout=PATIENCE)
+            for key, asked in 2 * list(questions.items())
         ]
+        all_sent.set()
         for channel in channels:
             (reply,) = channel
             error = Format.JSON.decode(reply.err.payload.to_bytes(), ErrorReply).error
@@ -325,53 +353,64 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
 def test_a_stop_does_not_wait_for_a_long_question(
     alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun, go_on = threading.Event(), threading.Event()
+    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
 
     def long_question(_: object) -> None:
         begun.set()
-        go_on.wait(10.0)
+        go_on.wait(0.5 * PATIENCE)
+        ended.set()
         raise InvalidInputError("too late")
 
     monkeypatch.setattr(solve, "plan", long_question)
     with PlanService(alone):
-        channel = alone.get(PLAN, payload=msgspec.json.encode(wall_request()), timeout=10.0)
-        assert begun.wait(5.0)
-        start = time.monotonic()
-    assert time.monotonic() - start < 1.0
+        payload = msgspec.json.encode(wall_request())
+        channel = alone.get(PLAN, payload=payload, timeout=PATIENCE)
+        assert begun.wait(PATIENCE)
+    assert not ended.is_set()
     go_on.set()
     list(channel)
+
+
+FLOOD, FLOODS = 300, 4
+"""Questions that a flood has at once, and floods."""
+
+BEFORE = 100
+"""Others' questions that may be answered before one: far fewer than are waiting."""
 
 
 def test_a_flood_from_some_leaves_the_others_their_turn(served: Served) -> None:
     payload = msgspec.json.encode(wall_request() | {"want": ["load_factor"]})
     answered: list[int] = []
-    stop = threading.Event()
+    flooded, stop = threading.Event(), threading.Event()
+
+    def note(_: zenoh.Reply) -> None:
+        answered.append(1)
+        if len(answered) >= 4 * FLOODS:
+            flooded.set()
 
     def flood() -> None:
         with zenoh.open(client_config(served.endpoint)) as mine:
-            for _ in range(300):
+            for _ in range(FLOOD):
                 if stop.is_set():
                     return
-                mine.get(PLAN, lambda _: answered.append(1), payload=payload, timeout=60.0)
-            stop.wait(60.0)
+                mine.get(PLAN, note, payload=payload, timeout=PATIENCE)
+            stop.wait(PATIENCE)
 
-    floods = [threading.Thread(target=flood) for _ in range(4)]
+    floods = [threading.Thread(target=flood) for _ in range(FLOODS)]
     with zenoh.open(client_config(served.endpoint)) as mine:
         for thread in floods:
             thread.start()
-        time.sleep(0.5)
-        delays = []
+        assert flooded.wait(PATIENCE)
+        before = []
         for _ in range(3):
-            start = time.monotonic()
+            start = len(answered)
             (answer,) = ask(mine, payload, JSON)
-            delays.append(time.monotonic() - start)
+            before.append(len(answered) - start)
             assert answer.good
-        done = len(answered)
         stop.set()
         for thread in floods:
             thread.join()
-    assert done < 1200, "the flood was over before it could be measured"
-    assert max(delays) < 2.0
+    assert max(before) < BEFORE
 
 
 # Processes ----------------------------------------------------------------------------------------
@@ -397,30 +436,35 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
         channels = []
         if busy:
             ask(mine, payload, JSON)
-            channels = [mine.get(PLAN, payload=payload, timeout=20.0) for _ in range(50)]
-        took, out, err = server.stop(number)
-        start = time.monotonic()
-        for channel in channels:
-            list(channel)
-        assert time.monotonic() - start < 5.0
+            channels = [mine.get(PLAN, payload=payload, timeout=PATIENCE) for _ in range(50)]
+        out, err = server.stop(number)
+        replies = [reply for channel in channels for reply in channel]
     assert server.process.returncode == 0
-    assert took < 3.0
+    # who has no answer is told that none comes, and does not wait until his time is over
+    assert all(reply.ok is not None for reply in replies)
     assert out == ""
     assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
 
 
 def test_a_second_server_of_one_robot_warns(served: Served) -> None:
-    second = Served(free_endpoint(), "-e", served.endpoint)
-    warning, serving = second.stop(signal.SIGTERM)[2].splitlines()
-    assert warning == (
+    def said() -> list[str]:
+        second = Served(free_endpoint(), "-e", served.endpoint)
+        return second.stop(signal.SIGTERM)[1].splitlines()
+
+    # the first's token may not have been heard of yet
+    for _ in range(10):
+        *warnings, serving = said()
+        if warnings:
+            break
+    assert warnings == [
         "crux: another service already answers crux/robosimian/…: queries may reach either; "
         "--no-multicast-scouting keeps services apart"
-    )
+    ]
     assert serving.startswith("crux: serving ")
 
 
-def soon(said: Callable[[], bool], *, within: float = 10.0) -> bool:
-    """Whether something is said in time: tokens take a moment to be heard of."""
+def soon(said: Callable[[], bool], *, within: float = PATIENCE) -> bool:
+    """Whether something is ever said: tokens take a moment to be heard of."""
     until = time.monotonic() + within
     while time.monotonic() < until:
         if said():
@@ -446,34 +490,34 @@ def test_a_killed_server_is_noticed_and_its_successor_found() -> None:
     endpoint = free_endpoint()
     server = Served(endpoint)
     config = zenoh_config(mode="client", connect=[endpoint], multicast=False)
-    with CruxClient(config, timeout=20.0) as client:
+    with CruxClient(config, timeout=0.5 * PATIENCE) as client:
         assert client.plan(plan_request()).status == "optimal"
-        outcome: list[BaseException] = []
+        answered, outcome = threading.Event(), []
 
         def ask_until_it_fails() -> None:
             try:
                 while True:
                     client.plan(plan_request())
+                    answered.set()
             except BaseException as error:
                 outcome.append(error)
 
         asking = threading.Thread(target=ask_until_it_fails)
         asking.start()
-        time.sleep(0.3)
-        start = time.monotonic()
+        assert answered.wait(PATIENCE)
         server.stop(signal.SIGKILL)
-        asking.join(15.0)
+        asking.join(PATIENCE)
+        # not that its time is over
         assert isinstance(outcome[0], NoServiceError)
-        assert time.monotonic() - start < 5.0
         successor = Served(endpoint)
+
+        def found() -> bool:
+            with contextlib.suppress(NoServiceError):
+                return client.plan(plan_request()).status == "optimal"
+            return False
+
         try:
-            deadline = time.monotonic() + 20.0
-            while True:
-                try:
-                    assert client.plan(plan_request()).status == "optimal"
-                    break
-                except NoServiceError:
-                    assert time.monotonic() < deadline
+            assert soon(found)
         finally:
             successor.stop(signal.SIGTERM)
     assert successor.process.returncode == 0
@@ -538,7 +582,7 @@ def test_a_channel_that_is_full_makes_its_client_wait(alone: zenoh.Session) -> N
     replies = []
     sender = threading.Thread(
         target=lambda: replies.extend(
-            alone.get(PLAN, payload=str(i), timeout=10.0) for i in range(5)
+            alone.get(PLAN, payload=str(i), timeout=PATIENCE) for i in range(5)
         )
     )
     sender.start()

@@ -10,6 +10,7 @@ import numpy as np
 import peer
 import pytest
 from barred import KINDS
+from patience import PATIENCE
 from stances import ask, on_wall
 from test_loads_check import streamable
 
@@ -32,9 +33,6 @@ BARE = ask(on_wall(palm=False), body_wrench=np.array([0.0, 0.0, -100.0, 0.0, 0.0
 """Hands without palms: they cannot be pushed up the wall."""
 
 OFF, UP = BARE.body_wrench, np.array([100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-
-PATIENCE = 60.0
-"""How long a thread may take [s]."""
 
 
 @pytest.fixture

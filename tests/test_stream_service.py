@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import zenoh
 from asked import HEAVY, JSON, LIGHT, MSGPACK, put, wall_request
+from patience import PATIENCE
 from test_command import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process, stance
 from test_messages import departures
 from test_service import free_endpoint
@@ -80,7 +81,7 @@ def serving() -> Iterator[tuple[PlanService, str]]:
 @pytest.fixture
 def client(serving) -> Iterator[CruxClient]:
     config = zenoh_config(mode="client", connect=[serving[1]], multicast=False)
-    with CruxClient(config) as opened:
+    with CruxClient(config, timeout=PATIENCE) as opened:
         yield opened
 
 
@@ -115,7 +116,8 @@ def test_messages_come_in_the_encoding_of_the_request(serving, form: Format) -> 
 
         def ask(name: str, request: object) -> zenoh.Sample:
             key = service_key("robosimian", name)
-            (reply,) = session.get(key, payload=form.encode(request), encoding=form.value)
+            payload = form.encode(request)
+            (reply,) = session.get(key, payload=payload, encoding=form.value, timeout=PATIENCE)
             return reply.ok
 
         declared = ask(STREAM, declaration())
@@ -149,7 +151,7 @@ def test_a_service_that_ends_lets_its_streams_go() -> None:
     before = running()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with open_session(config) as session, PlanService(session) as service:
-        client = CruxClient(session, service.robot)
+        client = CruxClient(session, service.robot, timeout=PATIENCE)
         declared = client.stream(declaration(radius=5.0))
         far = tuple(part + 5.0 for part in declared.body_wrench)
         client.set_points(SetPointsRequest(v=1, stream=declared.stream, body_wrench=far))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import workshop
+from patience import PATIENCE
 
 from service.workers import NO_START, THREADS, Lost, Workers
 
@@ -23,6 +24,14 @@ def done(workers: Workers, items: list) -> dict:
     found = dict(workers.each(items))
     assert sorted(found) == list(range(len(items)))
     return found
+
+
+def kill(workers: Workers, pid: int) -> None:
+    """Kill a process from outside, and see that it is dead."""
+    (process,) = (worker.process for worker in workers._all if worker.process.pid == pid)
+    os.kill(pid, 9)
+    process.join(PATIENCE)
+    assert process.exitcode == -9
 
 
 @pytest.fixture(scope="module")
@@ -59,12 +68,12 @@ def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
         found[i] = result
         if killed is None:
             killed = result
-            os.kill(killed, 9)
+            kill(nappers, killed)
     assert sorted(found) == list(range(30))
     assert not any(isinstance(result, Lost) for result in found.values())
     # one that has nothing to do is replaced, too
     (first,) = done(nappers, [0.0]).values()
-    os.kill(first, 9)
+    kill(nappers, first)
     assert first not in done(nappers, [0.0] * 4).values()
 
 
@@ -80,8 +89,11 @@ def test_all_processes_are_ready_once_they_are_waited_for():
 
 
 def test_who_stops_listening_leaves_no_work_behind(nappers):
-    for _ in nappers.each([0.0, *[60.0] * 5]):
+    for _ in nappers.each([0.0, *[2.0 * PATIENCE] * 5]):
+        busy = [worker.process for worker in nappers._all if worker.hand]
         break
+    assert busy
+    assert {process.exitcode for process in busy} == {-9}
     assert len(done(nappers, [0.0, 0.0])) == 2
 
 
@@ -102,11 +114,14 @@ def test_this_process_works_while_others_start_and_where_none_does():
     assert [process.exitcode for process in processes] == [-9, -9]
     with Workers(workshop.nothing, 2) as workers:
         found = {}
-        for i, result in workers.each([0.01] * 400, workshop.nap_here):
+        for i, result in workers.each([0.0] * 20, workshop.nap_here):
             found[i] = result
-        assert workers._stillborn >= 2
+            for worker in workers._all:
+                worker.process.join(PATIENCE)
+        assert workers._stillborn == 2
+        assert workers._all == []
     assert set(found.values()) == {os.getpid()}
-    assert sorted(found) == list(range(400))
+    assert sorted(found) == list(range(20))
 
 
 def test_this_process_and_others_share_the_work(nappers):

@@ -47,7 +47,7 @@ def nap_here(seconds: float) -> int:
 
 def sleepers() -> Callable[[int], int]:
     """Is not ready for as long as anyone waits."""
-    time.sleep(600.0)
+    time.sleep(3600.0)
     return abs
 
 

@@ -106,6 +106,8 @@ def _surface(gripper: Gripper, tell: Callable[[float], None]) -> dict[str, Any]:
     found = search(gripper, PER_AXIS)
     tell(0.1)
     shown = cut(in_paper_signs(found.wrenches))
+    # in an order that is everyone's
+    shown = shown[np.lexsort(shown.T)]
     directions = even_pulls(DIRECTIONS, np.abs(shown).max(axis=0))
     pulled = pull(gripper, directions, lambda done: tell(0.1 + 0.9 * float(done.mean())))
     return {
