@@ -41,7 +41,7 @@ def timed(
         capture_output=True,
         text=True,
         check=True,
-        timeout=300,
+        timeout=600,
     )
     # the library itself writes to standard output, too
     found = json.loads(done.stdout.splitlines()[-1])

@@ -13,6 +13,7 @@ import pytest
 import workshop
 from patience import PATIENCE
 
+from service import workers as workers_module
 from service.workers import NO_START, THREADS, Lost, Workers
 
 
@@ -103,7 +104,8 @@ def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
     assert {result.reason for result in found.values()} == {NO_START}
 
 
-def test_this_process_works_while_others_start_and_where_none_does():
+def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
+    monkeypatch.setattr(workers_module, "PATIENCE", 1e5)
     with Workers(workshop.sleepers, 2) as workers:
         # well before any is ready
         found = dict(workers.each(list(range(5)), lambda item: -item))
