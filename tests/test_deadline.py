@@ -413,18 +413,32 @@ def test_a_search_that_is_cut_short_after_its_first_plan_gives_that_plan(monkeyp
     assert answer.utilisation >= whole.utilisation * (1.0 - 1e-4)
 
 
-def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock):
-    gate = threading.Event()
+def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock, monkeypatch):
+    gate, waits, built = threading.Event(), [], program._built
+
+    def waited_for(*asked):
+        """The program that is being built, for which all the time that is allowed goes by."""
+        future = built(*asked)
+
+        def result(allowed):
+            waits.append(allowed)
+            clock.now += allowed
+            return future.result(0.0)
+
+        return SimpleNamespace(result=result)
+
     program._builders[0].submit(gate.wait, 2.0 * PATIENCE)
-    program._built.cache_clear()
+    built.cache_clear()
     try:
-        # the clock stands still until there is nothing to do but to wait
-        with pytest.raises(DeadlineError, match="a plan was found"):
-            plan(replace(QUESTION, deadline=0.05))
-        assert not program._built(program.Unique, ground_shape()).done()
+        with monkeypatch.context() as patch:
+            patch.setattr(program, "_built", waited_for)
+            with pytest.raises(DeadlineError, match="a plan was found"):
+                late(QUESTION)
+        assert waits[0] == pytest.approx(LONG)
+        assert not built(program.Unique, ground_shape()).done()
     finally:
         gate.set()
-    assert plan(replace(QUESTION, deadline=LONG)).verified
+    assert late(QUESTION).verified
 
 
 def ground_shape():
