@@ -7,15 +7,6 @@ between the messages and the planner; ``dispatch`` puts them together, and ``ser
 ``command`` and, for many requests at once, ``many`` are ways to reach it.
 """
 
-from service.client import CruxClient
-from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
-from service.stream_messages import SetPointsRequest, StreamRequest
+import lazy_loader
 
-__all__ = [
-    "BodySpaceRequest",
-    "CruxClient",
-    "PlanRequest",
-    "SetPointsRequest",
-    "StreamRequest",
-    "WrenchSpaceRequest",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

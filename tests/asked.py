@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from stances import PALM_TO_WALL, PLACES, wall
 
-from hand_models.frames import Pose
+from hand_models.base import Pose
 
 JSON = "application/json"
 MSGPACK = "application/msgpack"

@@ -15,14 +15,13 @@ from msgspec import convert
 from random_requests import random_request
 from stances import random_question
 
-from hand_models.wrench_space import WrenchSpace
-from planner.gathering import gather
-from planner.plan import LimitName, Plan
-from planner.posture import posture
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import gather, posture
+from planner.programs import WRENCH_UNIT
 from planner.question import Question
-from planner.solve import plan
-from planner.stance_data import WRENCH_UNIT
-from service.questions import question as planner_question
+from planner.result import LimitName, Plan
+from planner.solving import plan
+from service.answering.questions import question as planner_question
 from service.requests import PlanRequest
 
 LOAD, SIZE = 100.0, 100.0

@@ -7,13 +7,12 @@ from robots import TWO_LINK, limbs_toml
 from scipy.spatial.transform import Rotation
 from stances import random_hold, random_surface
 
-from hand_models.frames import Pose
+from hand_models.base import Pose
 from hand_models.hand import Grasp
-from hand_models.holds import Cylinder, Hold
-from hand_models.spines import Surface
-from planner.question import ForceCap, Limits, Load, Question
-from planner.robosimian import Robot, RobotFile, robosimian, robot_of
-from planner.stance import EARTH, HandOnHold, Stance
+from hand_models.rock import Cylinder, Hold
+from hand_models.tile import Surface
+from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Question, Stance
+from planner.robots import Robot, RobotFile, robosimian, robot_of
 
 TRUNK = 10.0
 """Mass of the two-link robot's trunk with its head [kg], at (0, 0, 0.1) and (0, 0, 0.4) m."""

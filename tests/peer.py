@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import OptimizeResult, linprog
 
-from hand_models.wrench_space import WrenchSpace
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import hand_space
 from planner.question import Question
-from planner.settling import hand_space
 
 INFEASIBLE = 2
 """HiGHS's status in scipy."""

@@ -13,7 +13,7 @@ from asked import pose
 from scipy.spatial.transform import Rotation
 from stances import PALM_TO_WALL, PLACES, wall
 
-from hand_models.frames import Pose
+from hand_models.base import Pose
 
 GRAVITIES = (9.81, 3.71, 1.62)
 SURFACES = ("rock", "concrete-coarse", "concrete-fine", "sandpaper-36")

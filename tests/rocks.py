@@ -14,10 +14,8 @@ import trimesh
 from matplotlib.path import Path
 from scipy.spatial.transform import Rotation
 
-from hand_models.frames import Pose
-from hand_models.holds import Cylinder, Edge, Ellipsoid, Hold, Plane, Sphere
-from hand_models.mesh import Mesh
-from hand_models.profile import Profile
+from hand_models.base import Pose
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Mesh, Plane, Profile, Sphere
 
 
 def distance(hold: Hold, points: np.ndarray) -> np.ndarray:

@@ -14,17 +14,15 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose, wrench_transport
+from hand_models.base import InvalidInputError, Pose, wrench_transport
 from hand_models.hand import Grasp, spiny_hand
-from hand_models.holds import Cylinder, Edge, Hold, Plane, Sphere
-from hand_models.spines import Surface
-from planner.plan import Plan
-from planner.question import Load, Question
-from planner.settling import hand_space
-from planner.solve import plan
-from planner.stance import HandOnHold, Stance
-from planner.stance_data import WRENCH_UNIT, HandData, StanceData
+from hand_models.rock import Cylinder, Edge, Hold, Plane, Sphere
+from hand_models.tile import Surface
+from planner.prepare import hand_space
+from planner.programs import WRENCH_UNIT, HandData, StanceData
+from planner.question import HandOnHold, Load, Question, Stance
+from planner.result import Plan
+from planner.solving import plan
 
 PLACES = {
     "front_right": (0.5, -0.4),

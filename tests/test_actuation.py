@@ -8,8 +8,8 @@ from hands import HAND, changed_hand, pinch, random_hand
 from stances import ask, on_wall, random_answer
 
 from hand_models import FINGERS, InvalidInputError
-from planner.settling import settle
-from planner.solve import plan
+from planner.prepare import settle
+from planner.solving import plan
 
 DRIVE = HAND.drive
 

@@ -7,12 +7,11 @@ import peer
 import pytest
 from stances import CALIBRATION_LOAD, ask, on_wall, program_data
 
-from hand_models.holds import Cylinder, Plane
-from planner import program
-from planner.program import Outcome
+from hand_models.rock import Cylinder, Plane
+from planner.prepare import hand_space
+from planner.programs import Outcome, program
 from planner.question import Question
-from planner.settling import hand_space
-from planner.solve import plan
+from planner.solving import plan
 
 QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 

@@ -12,9 +12,10 @@ import pytest
 from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
-from planner import beside, program, solve
-from planner.beside import Beside
-from planner.known_stance import KnownStance
+from planner.deadline import Beside
+from planner.deadline import overlap as beside
+from planner.programs import program
+from planner.solving import KnownStance, solve
 
 
 def me() -> str:
@@ -71,7 +72,7 @@ def test_what_the_work_raises_is_raised_to_its_caller():
 AT_THE_END = """
 import atexit
 from stances import ask, on_wall
-from planner.solve import plan
+from planner.solving.solve import plan
 asked = ask(on_wall())
 first = plan(asked).utilisation
 @atexit.register

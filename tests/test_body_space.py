@@ -19,20 +19,19 @@ from test_floating_plan import NEAR, PAIR, body_wrench
 from test_messages import KINDS
 from test_polygon import hull_of
 
-from hand_models.errors import InvalidInputError
-from hand_models.spines import Surface
-from planner.body_space import COMPONENTS, BodySpace
-from planner.posture import posture
-from planner.program import SLACK
+from hand_models.base import InvalidInputError
+from hand_models.tile import Surface
+from planner.capability import COMPONENTS, BodySpace
+from planner.prepare import hand_space, posture
+from planner.programs import SLACK
 from planner.question import ForceCap, Limits, Load, Question
-from planner.settling import hand_space
-from planner.solve import plan
-from service import dispatch
-from service.codec import Format, decode_request
-from service.command import run
-from service.questions import question as asked_by
+from planner.solving import plan
+from service.answering import dispatch
+from service.answering.questions import question as asked_by
+from service.commands.cli import run
 from service.replies import BodySpaceReply, ErrorReply
 from service.requests import PlanRequest
+from service.wire import Format, decode_request
 
 KEY = "crux/robosimian/body_space"
 AXES = np.vstack([np.eye(3), -np.eye(3)])

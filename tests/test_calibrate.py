@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from hand_models.gripper import gripper_table
+from hand_models.compliance import gripper_table, search
+from hand_models.experiments import cut, extents, in_paper_signs
 from hand_models.parameters import experiment_table, hand_table
 from hand_models.studies import calibrate
 from hand_models.studies.calibrate import HELD, Fit, pulled_pose
-from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
-from hand_models.wrist_search import search
 
 FIT = Fit(gripper_table())
 

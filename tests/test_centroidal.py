@@ -11,9 +11,8 @@ import centroidal_peer
 import numpy as np
 import pytest
 
-from hand_models.wrench_space import Row, WrenchSpace
-from planner import program
-from planner.stance_data import WRENCH_UNIT, HandData, StanceData
+from hand_models.wrench_spaces import Row, WrenchSpace
+from planner.programs import WRENCH_UNIT, HandData, StanceData, program
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="its wheels are for Linux")
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import linprog
 from stances import ask, on_wall, random_answer
 
-from hand_models.frames import Pose
-from hand_models.holds import Plane
-from planner.solve import plan
-from planner.stance_data import WRENCH_UNIT
+from hand_models.base import Pose
+from hand_models.rock import Plane
+from planner.programs import WRENCH_UNIT
+from planner.solving import plan
 
 SEEDS = (
     3, 5, 12, 58, 64, 77, 86, 98, 110, 142, 143, 147, 148, 150, 160, 166, 175, 187, 191, 199,

@@ -6,7 +6,8 @@ import pytest
 from hands import HAND, PINCH, ROCK, changed_hand, pinch
 
 from hand_models import Cylinder, Plane, Pose
-from hand_models.closing import TILES, closing_sequence
+from hand_models.hand import closing_sequence
+from hand_models.hand.tightening import TILES
 
 PARTS = ["nail", "proximal", "middle", "distal", TILES]
 

@@ -18,12 +18,13 @@ from rich.console import Console
 from rocks import cylinder_mesh
 from test_service import ROOT, Served, free_endpoint
 
-from service import command, dispatch
-from service.codec import decode_request
-from service.command import run
+from service.answering import dispatch
+from service.commands import cli as command
+from service.commands.cli import run
+from service.commands.stances import bundled
+from service.commands.tables import print_plan
 from service.requests import PlanRequest
-from service.stances import bundled
-from service.tables import print_plan
+from service.wire import decode_request
 
 DONE, FAILED, BAD_INPUT, OVERLOADED = 0, 1, 2, 3
 
@@ -60,7 +61,7 @@ def complaint(capfd: pytest.CaptureFixture[str]) -> str:
 
 def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(
-        [sys.executable, "-m", "service.command", *arguments],
+        [sys.executable, "-m", "service.commands.cli", *arguments],
         input=given,
         capture_output=True,
         cwd=ROOT,
@@ -360,7 +361,7 @@ def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
 def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
     arguments = ["query", stance(wall_request()), "--no-multicast-scouting", "-l", free_endpoint()]
     asked = subprocess.run(
-        [sys.executable, "-m", "service.command", *arguments, "--json"],
+        [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
         capture_output=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},

@@ -18,11 +18,12 @@ from hypothesis import strategies as st
 from patience import PATIENCE
 from stances import PLACES, ask, on_wall, program_data
 
-from planner import compiled, cvxpy_internals, deadline, program, stance_data
-from planner.program import SETTINGS
+from planner.deadline import clock as deadline
+from planner.programs import compiled, cvxpy_internals, program, stance_data
+from planner.programs.program import SETTINGS
+from planner.programs.stance_data import Shape
 from planner.question import Load
-from planner.solve import plan
-from planner.stance_data import Shape
+from planner.solving import plan
 
 FIXED = (10, 95, 20, 4)
 WITH_JOINTS = (10, 109, 20, 11)
@@ -308,7 +309,7 @@ def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
 FORKED = """
 import os
 from stances import PLACES, ask, on_wall
-from planner.solve import plan
+from planner.solving.solve import plan
 plan(ask(on_wall()))
 child = os.fork()
 if not child:

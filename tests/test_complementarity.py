@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from hand_models.complementarity import solve_lcp, stick_slip
-from hand_models.errors import SolverError
+from hand_models.base import SolverError
+from hand_models.tendon.complementarity import solve_lcp, stick_slip
 
 
 def by_enumeration(M, q):

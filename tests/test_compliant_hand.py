@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError
-from hand_models.compliant_hand import CompliantHand
-from hand_models.errors import UnsupportedError
+from hand_models.base import UnsupportedError
+from hand_models.compliance import PALM_MODES, CompliantHand, FloatingWrist
 from hand_models.fixed_wrist import wrench_space
-from hand_models.floating_wrist import PALM_MODES, FloatingWrist
 from hand_models.hand import FINGERS, Grasp
-from hand_models.holds import Cylinder, Edge, Ellipsoid, Plane, Sphere
-from hand_models.spines import Surface
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
+from hand_models.tile import Surface
 from tests.hands import HAND, changed_hand
 
 ROCK = Surface.named("rock")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hand_models.conics import circle_crossings
+from hand_models.sections.conics import circle_crossings
 
 seeds = st.integers(0, 2**32 - 1)
 TURN = np.linspace(-math.pi, math.pi, 4001)

@@ -7,10 +7,9 @@ import peer
 import pytest
 from stances import ask, on_wall, program_data, random_question
 
-from hand_models.holds import Cylinder
-from planner import program
-from planner.cuts import cut
-from planner.stance_data import WRENCH_UNIT
+from hand_models.rock import Cylinder
+from planner.programs import WRENCH_UNIT, program
+from planner.streaming.affine_bounds import cut
 
 QUESTIONS = {
     "wall": ask(on_wall()),

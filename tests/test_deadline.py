@@ -22,31 +22,25 @@ from patience import PATIENCE
 from stances import CALIBRATION_LOAD, ask, on_wall
 from test_service import Served, client_config, free_endpoint, plan_request
 
-from hand_models.errors import InvalidInputError
-from hand_models.holds import Plane
-from planner import certificate as certificates
-from planner import (
-    continuation,
-    deadline,
-    dual_bounds,
-    least_utilisation,
-    pose_search,
-    program,
-    solve,
-)
-from planner import ground as grounds
-from planner.barriers import vertex
-from planner.budget import Budget
-from planner.deadline import DeadlineError
-from planner.plan import Plan
+from hand_models.base import InvalidInputError
+from hand_models.rock import Plane
+from planner.deadline import Budget, DeadlineError
+from planner.deadline import clock as deadline
+from planner.explanation import certificate as certificates
+from planner.explanation.infeasibility import vertex
+from planner.floating import continuation
+from planner.programs import WRENCH_UNIT, program
 from planner.question import Limits, Question
-from planner.solve import plan
-from planner.stance_data import WRENCH_UNIT
-from service import dispatch, questions
-from service.client import CruxClient
-from service.command import run
-from service.errors import ServiceError
-from service.stances import read_request
+from planner.result import Plan
+from planner.robots import pose_search
+from planner.solving import dual_bounds, plan, solve
+from planner.solving import prepared_stance as grounds
+from planner.solving import unique_plan as least_utilisation
+from service.answering import dispatch, questions
+from service.commands.cli import run
+from service.commands.stances import read_request
+from service.serving import CruxClient
+from service.wire import ServiceError
 
 LONG = 1e4
 """A deadline that no test comes near to [s]."""

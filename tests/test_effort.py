@@ -12,15 +12,12 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from stances import ask, on_wall, random_question
 
-from planner import dual_bounds, program, stance_data
-from planner.gathering import gather
-from planner.plan import Price
-from planner.posture import posture
+from planner.prepare import gather, hand_space, posture
+from planner.programs import HandData, StanceData, program, stance_data
 from planner.question import ForceCap, Limits, Question
-from planner.robosimian import RobotFile, robot_of
-from planner.settling import hand_space
-from planner.solve import plan
-from planner.stance_data import HandData, StanceData
+from planner.result import Price
+from planner.robots import RobotFile, robot_of
+from planner.solving import dual_bounds, plan
 
 TENDON = 700.0
 """What a tendon holds [N]."""

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hand_models import Cylinder, Ellipsoid, Grasp, InvalidInputError, Sphere
-from service import dispatch
-from service.keys import PLAN
+from service.answering import dispatch
+from service.wire import PLAN
 
 size = st.floats(0.03, 3.0)
 axes = st.tuples(size, size, size)

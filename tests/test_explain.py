@@ -9,15 +9,15 @@ import pytest
 from hands import changed_hand
 from stances import CALIBRATION_LOAD, ask, on_wall
 
-from hand_models.frames import Pose
-from hand_models.holds import Cylinder, Plane
-from planner.explain import overload_sentence, shortfall_sentence
+from hand_models.base import Pose
+from hand_models.rock import Cylinder, Plane
+from planner.explanation import overload_sentence, shortfall_sentence
+from planner.prepare import settle
+from planner.programs import WRENCH_UNIT
 from planner.question import Limits, Question
-from planner.settling import settle
-from planner.solve import plan
-from planner.stance_data import WRENCH_UNIT
-from service import questions
-from service.stances import read_request
+from planner.solving import plan
+from service.answering import questions
+from service.commands.stances import read_request
 
 
 def bundled(name: str) -> Question:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from hand_models import Surface
-from hand_models.limit_pieces import reach
-from hand_models.spine_array import SpineArray
 from hand_models.studies import fig10, run_study
+from hand_models.tile import SpineArray, reach
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from hand_models.gripper import Gripper
+from hand_models.compliance import Gripper
 from hand_models.studies import run_study
 from hand_models.studies.fig12 import balance_matrix
-from service.command import run
+from service.commands.cli import run
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
-from hand_models.gripper import Gripper
+from hand_models.compliance import Gripper, boundary, search_box
+from hand_models.experiments import UNITS, in_paper_signs
 from hand_models.parameters import hand_table
 from hand_models.studies import fig13, run_study
-from hand_models.studies.wrench_hull import UNITS, in_paper_signs
-from hand_models.wrist_box import search_box
-from hand_models.wrist_search import boundary
 
 
 @pytest.fixture(scope="module")

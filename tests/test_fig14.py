@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from hand_models.experiments import reach
 from hand_models.studies import fig14, run_study
 from hand_models.studies.fig14 import loading_planes
-from hand_models.studies.wrench_hull import reach
 
 BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)])
 

@@ -5,12 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from hand_models.gripper import gripper_table
+from hand_models.compliance import gripper_table
+from hand_models.experiments import Conditions, radius_axes, rest_state
 from hand_models.parameters import experiment_table
 from hand_models.studies import as_json, fig15, fig16, load_study, run_study
-from hand_models.studies.force_limits import rest_state
-from hand_models.studies.sweep import radius_axes
-from hand_models.studies.sweep_axis import Conditions
 
 PROXIMAL, DISTAL = 0, 2
 

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from rocks import distance, random_axes, random_hold
 
 from hand_models import Plane, spiny_hand
-from hand_models.finger import Contact, SettledFinger
+from hand_models.finger import Contact, SettledFinger, settle
 from hand_models.sections import LEVEL, FlatSection, RoundSection
-from hand_models.settling import settle
 
 MODEL = spiny_hand().finger
 L, H = MODEL.joint_spacing, MODEL.tile_height

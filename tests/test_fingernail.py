@@ -26,25 +26,22 @@ from hand_models import (
     Pose,
     Profile,
     SettledHand,
-    wrench_space,
 )
-from hand_models.closing import closing_sequence
-from hand_models.frames import wrench_transport
-from hand_models.holds import Hold
-from planner.explain import warnings
-from planner.hand_plots import plot_wrench_space
-from planner.plan import Plan
-from planner.plan_plots import plot_plan
-from planner.question import Question
-from planner.settling import settle
-from planner.solve import plan
-from planner.stance import HandOnHold, Stance
-from planner.verify import problems
-from service import dispatch, questions
-from service.codec import Format
+from hand_models.base import wrench_transport
+from hand_models.hand import closing_sequence
+from hand_models.rock import Hold
+from hand_models.wrench_spaces import space as wrench_space
+from planner.explanation import warnings
+from planner.pictures import plot_plan, plot_wrench_space
+from planner.prepare import settle
+from planner.question import HandOnHold, Question, Stance
+from planner.result import Plan
+from planner.solving import plan
+from planner.verification import problems
+from service.answering import dispatch, questions
+from service.commands.stances import read_request
 from service.replies import PlanReply
-from service.schema import schema
-from service.stances import read_request
+from service.wire import Format, schema
 
 PIN = {"inner": 0.06615 + 3 * 0.0431, "outer": 0.03275 + 0.0346 + 3 * 0.0431}
 """x of the nails' pins in H, all fingers along x [m]."""

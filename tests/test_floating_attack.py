@@ -10,14 +10,18 @@ import pytest
 from hands import HAND, PINCH, ROCK, changed_hand, settled_at
 
 from hand_models import Cylinder, Edge, Grasp, Hold, InvalidInputError, Plane, Pose, Sphere
-from hand_models.compliant_hand import CompliantHand
-from hand_models.errors import EmptySetError
-from hand_models.floating_wrist import FloatingWrist
-from hand_models.gripper import Gripper
-from hand_models.wrist_box import linear_box, search_box
-from hand_models.wrist_inverse import wrist_pose
-from hand_models.wrist_limit import farthest
-from hand_models.wrist_search import boundary, search
+from hand_models.base import EmptySetError
+from hand_models.compliance import (
+    CompliantHand,
+    FloatingWrist,
+    Gripper,
+    boundary,
+    farthest,
+    linear_box,
+    search,
+    search_box,
+    wrist_pose,
+)
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 OPEN = Grasp(lateral=False, palm=False)

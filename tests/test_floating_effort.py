@@ -12,15 +12,12 @@ from scipy.optimize import minimize
 from stances import on_wall
 from test_floating_plan import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 
-from hand_models.frames import wrench_transport
-from planner.gathering import gather
-from planner.hand_plan import HandPlan
-from planner.plan import Plan
-from planner.posture import posture
-from planner.program import SLACK
+from hand_models.base import wrench_transport
+from planner.prepare import gather, posture
+from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
 from planner.question import ForceCap, Limits, Question
-from planner.solve import plan
-from planner.stance_data import TWIST_UNIT, WRENCH_UNIT
+from planner.result import HandPlan, Plan
+from planner.solving import plan
 
 chance = np.random.default_rng(1)
 TWISTS = [NEAR * part for part in chance.uniform(0.2, 1.0, (8, 6))[6:]] * np.array(
@@ -235,7 +232,7 @@ def test_beyond_the_cap_the_least_utilisation_is_told():
 
 def test_an_ended_budget_leaves_a_plan_and_says_so(monkeypatch):
     question, margin, _ = both("jointed")
-    monkeypatch.setattr("planner.floating_effort.PROGRAMS", 0)
+    monkeypatch.setattr("planner.floating.effort.PROGRAMS", 0)
     answer = least(question)
     assert answer.status == "optimal"
     assert answer.verified

@@ -11,26 +11,21 @@ from asked import LIGHT, spoil, wall_request
 from patience import PATIENCE
 from stances import CALIBRATION_LOAD, ask, on_wall
 
-from hand_models.compliant_hand import CompliantHand
-from hand_models.errors import InvalidInputError, UnsupportedError
-from hand_models.floating_wrist import FloatingWrist
-from hand_models.frames import wrench_transport
-from hand_models.settling import settle as settle_finger
-from planner.plan import Plan
-from planner.question import Question
-from planner.settling import settle
-from planner.solve import plan
-from planner.stance import HandOnHold, Stance
-from planner.stance_data import TWIST_UNIT
-from planner.verify import problems
-from service.client import CruxClient
-from service.codec import decode_request
-from service.config import open_session, zenoh_config
-from service.dispatch import handle
-from service.questions import question as asked
+from hand_models.base import InvalidInputError, UnsupportedError, wrench_transport
+from hand_models.compliance import CompliantHand, FloatingWrist
+from hand_models.finger import settle as settle_finger
+from planner.prepare import settle
+from planner.programs import TWIST_UNIT
+from planner.question import HandOnHold, Question, Stance
+from planner.result import Plan
+from planner.solving import plan
+from planner.verification import problems
+from service.answering import handle
+from service.answering.questions import question as asked
+from service.commands.stances import read_request
 from service.requests import PlanRequest, WrenchSpaceRequest
-from service.server import PlanService
-from service.stances import read_request
+from service.serving import CruxClient, PlanService, open_session, zenoh_config
+from service.wire import decode_request
 
 REAR = ("rear_right", "rear_left")
 

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hand_models.compliant_hand import CompliantHand
-from hand_models.floating_wrist import FloatingWrist
-from planner import continuation, program
-from planner.budget import Budget
-from planner.floating_warnings import far_wrists
-from planner.plan import Plan
+from hand_models.compliance import CompliantHand, FloatingWrist
+from planner.deadline import Budget
+from planner.explanation import far_wrists
+from planner.floating import continuation
+from planner.prepare import settle
+from planner.programs import program
 from planner.question import Question
-from planner.settling import settle
-from planner.solve import plan
-from service import command
-from service import terminal as screens
-from service.own_robot import ROBOTS
-from service.questions import question
+from planner.result import Plan
+from planner.solving import plan
+from service.answering.own_robot import ROBOTS
+from service.answering.questions import question
+from service.commands import cli as command
+from service.commands import terminal as screens
+from service.commands.stances import read_request
 from service.requests import PlanRequest
-from service.stances import read_request
 
 REAR = ("rear_right", "rear_left")
 
@@ -92,7 +92,7 @@ def test_budget_ends_a_search(monkeypatch):
     """With next to no programs left an answer comes at once, and is honest."""
     asked, whole = all_float()
     assert SOLVED[0] <= 1.2 * continuation.PROGRAMS
-    monkeypatch.setattr("planner.solve.PROGRAMS", 30)
+    monkeypatch.setattr("planner.solving.solve.PROGRAMS", 30)
     with counted() as solved:
         answer = plan(asked)
     assert len(solved) <= 90 < SOLVED[0]

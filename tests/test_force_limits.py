@@ -9,21 +9,12 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from hand_models import InvalidInputError
-from hand_models.errors import EmptySetError
-from hand_models.gripper import Gripper, gripper_table
+from hand_models.base import EmptySetError
+from hand_models.compliance import Gripper, gripper_table
+from hand_models.experiments import Axis, HullPoints, cut, limit, rest_state, section, sharpened
+from hand_models.experiments.force_limits import force_limits, surface_named, unloaded_pose
 from hand_models.parameters import experiment_table
-from hand_models.spines import Surface
-from hand_models.studies.force_limits import (
-    HullPoints,
-    force_limits,
-    limit,
-    rest_state,
-    sharpened,
-    surface_named,
-    unloaded_pose,
-)
-from hand_models.studies.sweep_axis import Axis
-from hand_models.studies.wrench_hull import cut, section
+from hand_models.tile import Surface
 
 RATIO = 50.0
 BOX = np.array(list(itertools.product((-10.0, 10.0), (-5.0, 8.0), (-0.1, 0.1))))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import InvalidInputError, Pose
-from hand_models.frames import skew, wrench_transport
+from hand_models.base import skew, wrench_transport
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -13,15 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stances import ask, moved, on_wall, random_stance
 
-from hand_models.frames import Pose, wrench_transport, wrench_transports
+from hand_models.base import Pose, wrench_transport, wrench_transports
 from hand_models.hand import FINGERS
-from hand_models.holds import Cylinder
-from planner.gathering import gather
-from planner.hand_sets import Hands
-from planner.posture import posture
+from hand_models.rock import Cylinder
+from planner.prepare import Hands, gather, posture
+from planner.programs import HandData, StanceData, scaled_rows
 from planner.question import ForceCap, Limits, Question
-from planner.scaled_rows import scaled_rows
-from planner.stance_data import HandData, StanceData
 
 WRENCH = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """What body wrenches are over [N, N·m]."""

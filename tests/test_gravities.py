@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from stances import TILE_60N, ask, on_wall
 
-from planner.plan import Plan
 from planner.question import Limits, Load
-from planner.solve import plan
+from planner.result import Plan
+from planner.solving import plan
 
 ANGLES = {"slab": -30, "wall": 0, "overhang": 45, "ceiling": 90}
 """How far the rock leans over the climber [°]."""

@@ -10,12 +10,11 @@ from hands import HAND, ROCK
 from matplotlib.figure import Figure, SubFigure
 from rocks import cylinder_mesh
 
-from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere, wrench_space
-from hand_models.compliant_hand import CompliantHand
-from hand_models.floating_wrist import FloatingWrist
-from hand_models.mesh import Mesh
-from hand_models.profile import Profile
-from planner import hand_plots
+from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
+from hand_models.compliance import CompliantHand, FloatingWrist
+from hand_models.rock import Mesh, Profile
+from hand_models.wrench_spaces import space as wrench_space
+from planner.pictures import hand_plots
 
 HOLDS = {
     "plane": (Plane(), 0.0),

@@ -22,8 +22,8 @@ from hand_models import (
     Sphere,
     Surface,
     tension_limits,
-    wrench_space,
 )
+from hand_models.wrench_spaces import space as wrench_space
 
 ROCK = Surface.named("rock")
 SIZES = [1e-3, 1e-2, 1.0, 30.0, 1e3]

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from stances import on_wall
 
 from hand_models.hand import FINGERS
-from hand_models.wrench_space import WrenchSpace
-from planner.hand_rows import BALL, FORCE_CAP, TENSION_CHANGE, AddedRows, JointLoads
-from planner.settling import hand_space
-from planner.stance_data import JOINT_TORQUE
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import BALL, FORCE_CAP, TENSION_CHANGE, hand_space
+from planner.prepare.stance_constraints import AddedRows, JointLoads
+from planner.programs import JOINT_TORQUE
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -10,8 +10,7 @@ from rocks import distance, random_axes, random_hold, random_round
 from scipy.optimize import minimize_scalar
 
 from hand_models import Cylinder, Edge, InvalidInputError, Plane, Sphere
-from hand_models.profile_section import ProfileSection
-from hand_models.sections import FlatSection, RoundSection
+from hand_models.sections import FlatSection, ProfileSection, RoundSection
 
 LOW, HIGH = -0.52, 1.75
 HEIGHT = 0.0047

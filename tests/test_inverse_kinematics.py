@@ -9,11 +9,16 @@ from robots import arm
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
-from planner.inverse_kinematics import UnreachableError, solve_limbs, unreachable
-from planner.limb_batch import Efforts, LimbBatch
-from planner.robosimian import RobotFile, robosimian, robot_of
+from hand_models.base import InvalidInputError, Pose
+from planner.robots import (
+    RobotFile,
+    UnreachableError,
+    robosimian,
+    robot_of,
+    solve_limbs,
+    unreachable,
+)
+from planner.robots.limb_batch import Efforts, LimbBatch
 
 EARTH = np.array([0.0, 0.0, -9.81])
 LIMBS = ("front_right", "rear_right", "rear_left", "front_left")

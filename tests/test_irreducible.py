@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from planner.barriers import HELD_WRENCH, System
-from planner.irreducible import irreducible_set, sufficient_alone
-from planner.plan import LimitName
-from planner.program import UNLIMITED
+from planner.explanation.infeasibility import HELD_WRENCH, System
+from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
+from planner.programs import UNLIMITED
+from planner.result import LimitName
 
 LIMB = "front_left"
 

@@ -7,16 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stances import ask, on_wall, random_stance
 
-from hand_models.frames import wrench_transport
-from hand_models.holds import Cylinder
-from planner.carried import Carried
-from planner.equilibrium import equilibrium
-from planner.ground import ground_of
-from planner.joint_balance import LEVER, JointBalance
-from planner.settling import settle
-from planner.solve import plan_on
-from planner.stacked import NOTHING, Stacked, stacked
-from planner.verify import Check
+from hand_models.base import wrench_transport
+from hand_models.rock import Cylinder
+from planner.prepare import NOTHING, Stacked, settle, stacked
+from planner.result import Carried
+from planner.solving.prepared_stance import ground_of
+from planner.solving.solve import plan_on
+from planner.verification import Check
+from planner.verification.equilibrium import equilibrium
+from planner.verification.joint_balance import LEVER, JointBalance
 
 STANCES = {
     "pinches": on_wall,

@@ -10,13 +10,12 @@ import pytest
 from jointed import at_joints
 from stances import ask, on_wall
 
-from hand_models.frames import Pose
-from planner.gathering import gather
-from planner.plan import Price
-from planner.posture import posture
+from hand_models.base import Pose
+from planner.prepare import gather, posture
 from planner.question import ForceCap, Limits, Question
-from planner.robosimian import robosimian
-from planner.solve import plan
+from planner.result import Price
+from planner.robots import robosimian
+from planner.solving import plan
 
 ROBOT = robosimian()
 ANGLES = {

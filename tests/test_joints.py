@@ -12,17 +12,14 @@ from robots import TWO_LINK, limbs_toml
 from scipy.spatial.transform import Rotation
 from stances import moved, on_wall
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose, wrench_transport
-from hand_models.holds import Plane
-from planner.hand_rows import JointLoads
-from planner.link_tree import LinkTree
-from planner.plan import Plan
-from planner.posture import posture
-from planner.question import Limits, Load, Question
-from planner.robosimian import RobotFile, robosimian, robot_of
-from planner.solve import plan
-from planner.stance import EARTH
+from hand_models.base import InvalidInputError, Pose, wrench_transport
+from hand_models.rock import Plane
+from planner.prepare import posture
+from planner.prepare.stance_constraints import JointLoads
+from planner.question import EARTH, Limits, Load, Question
+from planner.result import Plan
+from planner.robots import LinkTree, RobotFile, robosimian, robot_of
+from planner.solving import plan
 
 G = 9.81
 SEEDS = st.integers(0, 10_000)

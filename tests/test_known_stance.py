@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from stances import ask, on_wall
 
-from hand_models.errors import InvalidInputError
-from hand_models.holds import Cylinder
-from planner.known_stance import KnownStance
+from hand_models.base import InvalidInputError
+from hand_models.rock import Cylinder
 from planner.question import Limits
-from planner.solve import plan
+from planner.solving import KnownStance, plan
 
 QUESTIONS = {
     "held": ask(on_wall(), "load_factor", "prices"),

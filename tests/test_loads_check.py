@@ -10,11 +10,11 @@ from hands import changed_hand
 from stances import ask, on_wall
 from test_fingernail import STRONG, hung, one_hand
 
-from planner.limit_curve import LimitCurves
-from planner.plan import Plan
 from planner.question import Question
-from planner.solve import plan
-from planner.stream_stance import StreamStance
+from planner.result import Plan
+from planner.solving import plan
+from planner.streaming.stream_stance import StreamStance
+from planner.verification.limit_surface import LimitCurves
 
 WALL = ask(on_wall())
 

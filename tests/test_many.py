@@ -18,15 +18,15 @@ from asked import HEAVY, flat_request, put, wall_request
 from patience import PATIENCE
 from test_service import ROOT, plan_request
 
-from hand_models.errors import InvalidInputError
-from service import dispatch
-from service.codec import decode_request
-from service.command import run
-from service.many import WORTH_A_PROCESS, Planners, plan_many, worth
+from hand_models.base import InvalidInputError
+from service.answering import dispatch
+from service.commands.cli import run
+from service.processes import Planners, plan_many, worth
+from service.processes.many import WORTH_A_PROCESS
+from service.processes.workers import Lost, cores
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
-from service.schema import schema
-from service.workers import Lost, cores
+from service.wire import decode_request, schema
 
 MASSES = [40.0, HEAVY, 60.0, 80.0, 100.0, 55.0]
 
@@ -163,7 +163,7 @@ SCRIPT = """
 import sys
 from asked import wall_request
 from test_service import plan_request
-from service.many import Planners, plan_many
+from service.processes.many import Planners, plan_many
 {guard}
 {body}
 """
@@ -280,7 +280,7 @@ def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd)
 def test_a_batch_from_standard_input_goes_through_processes_of_its_own():
     lines = b"".join(msgspec.json.encode(wall_request() | {"id": str(i)}) + b"\n" for i in range(5))
     found = subprocess.run(
-        [sys.executable, "-m", "service.command", "batch", "-", "--workers", "2", "--json"],
+        [sys.executable, "-m", "service.commands.cli", "batch", "-", "--workers", "2", "--json"],
         input=lines,
         capture_output=True,
         cwd=ROOT,

@@ -13,17 +13,16 @@ from robots import joint, link, urdf
 from stances import ROCK, wall
 from test_floating_effort import promised, told_effort
 
+from hand_models.base import Pose, wrench_transport
 from hand_models.fixed_wrist import wrench_space
-from hand_models.frames import Pose, wrench_transport
 from hand_models.hand import Grasp
-from hand_models.holds import Cylinder
-from planner.plan import Plan
-from planner.program import SLACK
-from planner.question import Question
-from planner.robosimian import Robot, load_robot
-from planner.settling import settle_at, wrist_at
-from planner.solve import plan
-from planner.stance import HandOnHold, Stance
+from hand_models.rock import Cylinder
+from planner.prepare.settled_stance import settle_at, wrist_at
+from planner.programs import SLACK
+from planner.question import HandOnHold, Question, Stance
+from planner.result import Plan
+from planner.robots import Robot, load_robot
+from planner.solving import plan
 
 LIMBS = tuple(f"limb{i:02d}" for i in range(16))
 

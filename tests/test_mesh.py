@@ -14,10 +14,10 @@ from rocks import cylinder_mesh, distance, random_axes, random_mesh, random_prof
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane, Pose
-from hand_models.mesh import Mesh, read_mesh
-from hand_models.polyline import PolylineSection
-from hand_models.smoothing import Scale, smooth
-from hand_models.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
+from hand_models.rock import Mesh, Triangles, read_mesh, weld
+from hand_models.rock.smoothing import Scale, smooth
+from hand_models.rock.triangles import bridge, cut, without_spikes, wound_alike
+from hand_models.sections import PolylineSection
 
 seeds = st.integers(0, 2**32 - 1)
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -35,17 +35,22 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from rocks import cylinder_mesh
 
-from hand_models.errors import InvalidInputError, SolverError, UnsupportedError
-from hand_models.frames import Pose, wrench_transport
-from planner import solve
-from planner.robosimian import robosimian
-from service import dispatch
-from service.codec import LARGEST_REQUEST, Format, decode_request
-from service.errors import MalformedError
-from service.questions import question
+from hand_models.base import (
+    InvalidInputError,
+    Pose,
+    SolverError,
+    UnsupportedError,
+    wrench_transport,
+)
+from planner.robots import robosimian
+from planner.solving import solve
+from service.answering import dispatch
+from service.answering.questions import question
 from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
 from service.requests import PlanRequest, WrenchSpaceRequest
-from service.schema import MESSAGES, schema
+from service.wire import Format, MalformedError, decode_request, schema
+from service.wire.codec import LARGEST_REQUEST
+from service.wire.json_schema import MESSAGES
 
 PLAN = "crux/robosimian/plan"
 WRENCH_SPACE = "crux/robosimian/wrench_space"
@@ -689,7 +694,7 @@ def test_a_hand_that_is_not_there() -> None:
 
 
 def test_numbers_that_do_not_exist_are_null(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hand_models.parallelepiped import TensionLimit
+    from hand_models.fixed_wrist import TensionLimit
 
     endless = (TensionLimit("inner_left", math.inf, None),)
     monkeypatch.setattr(dispatch, "tension_limits", lambda _: endless)

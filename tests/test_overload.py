@@ -15,18 +15,18 @@ from jointed import at_joints
 from rich.console import Console
 from stances import CALIBRATION_LOAD, ask, on_wall
 
-from hand_models.holds import Cylinder
-from planner.barriers import HELD_WRENCH
-from planner.plan import LimitName
+from hand_models.rock import Cylinder
+from planner.explanation.infeasibility import HELD_WRENCH
+from planner.programs import WRENCH_UNIT
 from planner.question import ForceCap, Limits
-from planner.robosimian import robosimian
-from planner.solve import plan
-from planner.stance_data import WRENCH_UNIT
-from service.answers import plan_reply
-from service.questions import question as planner_question
+from planner.result import LimitName
+from planner.robots import robosimian
+from planner.solving import plan
+from service.answering.answers import plan_reply
+from service.answering.questions import question as planner_question
+from service.commands.tables import print_plan
 from service.replies import Certificate, PlanReply
 from service.requests import PlanRequest
-from service.tables import print_plan
 
 STATUSES = ("infeasible", "overloaded")
 HEAVILY = replace(CALIBRATION_LOAD, mass=150.0)

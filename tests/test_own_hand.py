@@ -23,20 +23,16 @@ from test_service import Served, client_config, free_endpoint
 
 from hand_models import Cylinder, InvalidInputError, Mesh, SpinyHand, spiny_hand
 from hand_models.hand import FINGERS
-from hand_models.parameters import ParameterTable, Quantity, hand_table
-from hand_models.parameters.own import load_own_hand, own_hand
-from planner.robosimian import robosimian
-from service import dispatch
-from service.client import CruxClient
-from service.codec import decode_request
-from service.command import run
-from service.config import open_session, zenoh_config
-from service.errors import ServiceError
-from service.own_hand import over_default, read_hand, with_hand
-from service.questions import question
+from hand_models.parameters import ParameterTable, Quantity, hand_table, load_own_hand, own_hand
+from planner.robots import robosimian
+from service.answering import dispatch, read_hand, with_hand
+from service.answering.own_hand import over_default
+from service.answering.questions import question
+from service.commands.cli import run
 from service.replies import PlanReply
 from service.requests import PlanRequest
-from service.server import PlanService
+from service.serving import CruxClient, PlanService, open_session, zenoh_config
+from service.wire import ServiceError, decode_request
 
 X, Z = np.eye(3)[[0, 2]]
 BUNDLED = [(section, name) for section, name, _ in hand_table()]

@@ -20,20 +20,15 @@ from test_command import process
 from test_own_hand import line
 from test_service import Served, client_config, free_endpoint
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
-from planner.robosimian import load_robot, robosimian
-from service import CruxClient, dispatch
-from service.codec import decode_request
-from service.command import run
-from service.config import open_session, zenoh_config
-from service.errors import NoServiceError, ServiceError
-from service.keys import service_key
-from service.own_hand import with_hand
-from service.own_robot import read_robot, robots_of, with_robot
-from service.questions import question
+from hand_models.base import InvalidInputError, Pose
+from planner.robots import load_robot, robosimian
+from service import CruxClient
+from service.answering import dispatch, read_robot, robots_of, with_hand, with_robot
+from service.answering.questions import question
+from service.commands.cli import run
 from service.requests import PlanRequest, WrenchSpaceRequest
-from service.server import PlanService
+from service.serving import PlanService, open_session, zenoh_config
+from service.wire import NoServiceError, ServiceError, decode_request, service_key
 
 ANGLES = {"left": [0.3, -0.4, 0.2, 0.5, -0.2, -0.3], "right": [-0.3, -0.4, -0.2, 0.5, 0.2, -0.3]}
 """Of the two arms [rad]: the palms face the rock."""
@@ -354,7 +349,7 @@ def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path)
         path = written(hanging(file))
         asked = process("query", path, *flags, "--robot", str(file), "--hand", str(hand))
         assert (asked.returncode, asked.stderr) == (0, b"")
-        from service.own_hand import read_hand
+        from service.answering import read_hand
 
         request = with_hand(plan_request(hanging(file)), read_hand(hand))
         want = dispatch.plan(request, robots_of(own))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from hand_models import InvalidInputError
-from hand_models.palm import PalmTendon, share_load, shear_capacity
+from hand_models.tendon import PalmTendon, share_load, shear_capacity
 
 MU, KP = 0.34, 840.0
 SPRINGS = (1400.0, 2200.0, 4900.0)

@@ -3,10 +3,10 @@
 import msgspec
 import pytest
 
-from planner.explain import LEAST_FACTOR
-from planner.solve import plan
-from service.questions import question
-from service.stances import read_request
+from planner.explanation import LEAST_FACTOR
+from planner.solving import plan
+from service.answering.questions import question
+from service.commands.stances import read_request
 
 
 def factor_of(request):

@@ -18,11 +18,11 @@ from stances import (
     random_question,
 )
 
-from hand_models.frames import Pose
-from hand_models.holds import Cylinder, Edge, Plane, Sphere
-from hand_models.spines import Surface
+from hand_models.base import Pose
+from hand_models.rock import Cylinder, Edge, Plane, Sphere
+from hand_models.tile import Surface
 from planner.question import Load, Question
-from planner.solve import plan
+from planner.solving import plan
 
 NEVER = math.inf
 """Utilisation of what cannot be balanced at all."""

@@ -5,15 +5,14 @@ import peer
 import pytest
 from stances import SANDPAPER, ask, on_wall, random_answer
 
-from hand_models.errors import InvalidInputError
-from hand_models.hand import FINGERS
-from hand_models.holds import Cylinder, Plane
-from hand_models.structure import HELD
+from hand_models.base import InvalidInputError
+from hand_models.hand import FINGERS, HELD
+from hand_models.rock import Cylinder, Plane
 from planner.deadline import DeadlineError
-from planner.known_stance import KnownStance
-from planner.plan import Plan
+from planner.programs import SLACK
 from planner.question import Limits, Question
-from planner.solve import SLACK, plan
+from planner.result import Plan
+from planner.solving import KnownStance, plan
 
 FEW = range(25)
 

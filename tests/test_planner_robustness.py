@@ -12,13 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stances import PLACES, ask, moved, on_wall, random_question
 
-from hand_models.errors import CruxError, InvalidInputError
-from hand_models.frames import Pose
+from hand_models.base import CruxError, InvalidInputError, Pose
 from hand_models.hand import Grasp
-from hand_models.holds import Cylinder, Edge, Plane, Sphere
-from hand_models.spines import Surface
+from hand_models.rock import Cylinder, Edge, Plane, Sphere
+from hand_models.tile import Surface
 from planner.question import Limits, Load, Question
-from planner.solve import plan
+from planner.solving import plan
 
 FAR = Pose(np.array([0.0, 0.0, 1.0]), np.eye(3))
 

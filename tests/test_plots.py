@@ -24,23 +24,22 @@ from rocks import cylinder_mesh
 from stances import attainable_wrench, on_wall, wall
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
-from hand_models.frames import Pose
-from hand_models.mesh import Mesh
-from hand_models.profile import STRIPS, Profile
-from planner import hand_plots, plan_plots, solve
-from planner.explain import barrier_words
-from planner.plan_plots import draw_plan, plot_plan
-from planner.plan_scene import scene_of, sights
-from planner.plan_views import COLOURS, LIMB
-from planner.question import Limits, Load, Question
-from planner.robosimian import RobotFile, robot_of
-from planner.rock_patches import AROUND, COARSE, MOST, rock_patch
+from hand_models.base import Pose
+from hand_models.rock import Mesh, Profile
+from hand_models.rock.profile import STRIPS
+from planner.explanation import barrier_words
+from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
+from planner.pictures.plan_scene import scene_of, sights
+from planner.pictures.plan_views import COLOURS, LIMB
+from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
+from planner.pictures.route_plots import draw_route
+from planner.question import HandOnHold, Limits, Load, Question, Stance
+from planner.robots import RobotFile, robot_of
 from planner.route import Stage
-from planner.route_plots import draw_route
-from planner.stance import HandOnHold, Stance
-from service import questions
-from service.command import run
-from service.stances import read_request
+from planner.solving import solve
+from service.answering import questions
+from service.commands.cli import run
+from service.commands.stances import read_request
 
 found = solve.plan
 

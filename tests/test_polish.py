@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from stances import CALIBRATION_LOAD, ask, on_wall, program_data, random_stance
 
-from hand_models.errors import InvalidInputError
-from planner import program, stance_data
-from planner.known_stance import KnownStance
-from planner.polish import polished
+from hand_models.base import InvalidInputError
+from planner.programs import program, stance_data
 from planner.question import Load
+from planner.solving import KnownStance
+from planner.solving.active_set import polished
 
 
 def problems():

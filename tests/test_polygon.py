@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from hand_models.errors import SolverError
-from planner.polygon import Polygon, Touch, enclose
+from hand_models.base import SolverError
+from planner.capability import Polygon
+from planner.capability.polygon import Touch, enclose
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

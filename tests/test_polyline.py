@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rocks import distance
 
-from hand_models.polyline import PolylineSection
-from hand_models.profile import Profile
-from hand_models.sections import Rest, RoundSection
+from hand_models.rock import Profile
+from hand_models.sections import PolylineSection, Rest, RoundSection
 
 LOW, HIGH = -0.52, 1.75
 START, END, HEIGHT = 0.0085, 0.0431, 0.0047

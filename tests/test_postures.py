@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Edge, Ellipsoid, Sphere
-from hand_models.contact_states import Closing, close, close_all
-from hand_models.limit_postures import PATTERNS, at_limits
-from hand_models.mixed_rows import section_rows
-from hand_models.posture_loads import Tendons, left_torque, loads
-from hand_models.postures import settle, swing
-from hand_models.settling import settle as settle_one
+from hand_models.finger import Closing, close_all
+from hand_models.finger import settle as settle_one
+from hand_models.finger.contact_states import close
+from hand_models.finger.limit_postures import PATTERNS, at_limits
+from hand_models.finger.posture_loads import Tendons, left_torque, loads
+from hand_models.finger.postures import settle, swing
+from hand_models.sections import section_rows
 
 MODEL = HAND.finger
 RUBBING = changed_hand("tendon", "friction", 0.2).finger

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 from stances import ask, on_wall
 
-from hand_models.holds import Cylinder, Plane
-from planner.carried import Carried
-from planner.prepared import prepare
-from planner.settling import settle
-from planner.solve import plan
+from hand_models.rock import Cylinder, Plane
+from planner.prepare import settle
+from planner.result import Carried
+from planner.solving import plan
+from planner.solving.prepared_checks import prepare
 
 HOLDS = [*(Cylinder(0.28 + 0.011 * k) for k in range(5)), Plane()]
 

@@ -10,11 +10,11 @@ import pytest
 from hands import changed_hand
 from stances import SANDPAPER, ask, on_wall, random_question
 
-from hand_models.holds import Cylinder, Plane
-from hand_models.wrench_space import WrenchSpace
-from planner.plan import LimitName
+from hand_models.rock import Cylinder, Plane
+from hand_models.wrench_spaces import WrenchSpace
 from planner.question import Limits, Load
-from planner.solve import plan
+from planner.result import LimitName
+from planner.solving import plan
 
 QUESTIONS = {
     "pinches": ask(on_wall(), "prices"),

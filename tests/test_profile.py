@@ -14,7 +14,8 @@ from rocks import distance, random_axes, random_profile
 from scipy.optimize import lsq_linear
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane
-from hand_models.profile import STRIPS, Profile
+from hand_models.rock import Profile
+from hand_models.rock.profile import STRIPS
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -10,11 +10,11 @@ from scipy.optimize import minimize
 from stances import CALIBRATION_LOAD, ask, on_wall, program_data, random_answer, random_question
 
 from hand_models.hand import FINGERS
-from hand_models.holds import Cylinder, Plane, Sphere
-from planner import program, stance_data
-from planner.plan import Plan
+from hand_models.rock import Cylinder, Plane, Sphere
+from planner.programs import program, stance_data
 from planner.question import Load
-from planner.solve import plan
+from planner.result import Plan
+from planner.solving import plan
 
 SEEDS = range(40)
 

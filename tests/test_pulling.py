@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hand_models.errors import EmptySetError
-from hand_models.gripper import Gripper, gripper_table, sandpaper
-from hand_models.studies.pulling import DRAGGED, even_pulls, pull, unloaded, wrist_poses
-from hand_models.studies.wrench_hull import UNITS, in_paper_signs
+from hand_models.base import EmptySetError
+from hand_models.compliance import Gripper, gripper_table, sandpaper
+from hand_models.experiments import (
+    DRAGGED,
+    UNITS,
+    even_pulls,
+    in_paper_signs,
+    pull,
+    unloaded,
+    wrist_poses,
+)
 
 SIZE = np.array([50.0, 20.0, 1.0])
 

@@ -9,12 +9,9 @@ from stances import ask, on_wall, random_stance
 
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, Grasp
-from hand_models.holds import Edge
-from planner.carried import Carried
-from planner.gathering import gather
-from planner.reading import Reader
-from planner.settling import settle
-from planner.stacked import KEPT, Same, stacked
+from hand_models.rock import Edge
+from planner.prepare import KEPT, Same, gather, settle, stacked
+from planner.result import Carried, Reader
 
 
 def hooked():

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from service.command import run
-from service.stances import bundled
+from service.commands.cli import run
+from service.commands.stances import bundled
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hand_models.compliant_finger import STEP
+from hand_models.compliance import STEP
+from hand_models.compliance.rolling import Resettling, bearing_angle
+from hand_models.finger import settle
 from hand_models.hand import FINGERS, Grasp
-from hand_models.holds import Cylinder, Edge, Ellipsoid, Plane, Sphere
-from hand_models.resettling import Resettling, bearing_angle
-from hand_models.settling import settle
-from hand_models.spines import Surface
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
+from hand_models.tile import Surface
 from tests.hands import HAND
 
 SHIFTS = st.floats(-6e-4, 6e-4)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hand_models.frames import Pose
-from planner.robosimian import robosimian
+from hand_models.base import Pose
+from planner.robots import robosimian
 
 SHOULDERS = {
     "front_right": (0.29326, -0.2094, -0.20853),

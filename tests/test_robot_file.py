@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from robots import TWO_LINK, arm, joint, limbs_toml, link, urdf
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
-from hand_models.parameters import hand_table
-from hand_models.parameters.own import own_hand
-from planner.robosimian import RobotFile, load_robot, robosimian, robot_of
+from hand_models.base import InvalidInputError, Pose
+from hand_models.parameters import hand_table, own_hand
+from planner.robots import RobotFile, load_robot, robosimian, robot_of
 
 TOML = limbs_toml("walker", {"leg": "foot"})
 

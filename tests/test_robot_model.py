@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from robots import TWO_LINK, arm, joint, link, urdf
 from scipy.spatial.transform import Rotation
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import wrench_transport
-from planner.robosimian import RobotFile, robosimian, robot_of
-from planner.robot_build import Mount
-from planner.robot_model import RobotModel
+from hand_models.base import InvalidInputError, wrench_transport
+from planner.robots import RobotFile, robosimian, robot_of
+from planner.robots.build import Mount
+from planner.robots.kinematics import RobotModel
 
 EARTH = np.array([0.0, 0.0, -9.81])
 

@@ -11,16 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
-from planner.inverse_kinematics import UnreachableError
+from hand_models.base import InvalidInputError, Pose
+from planner.pictures import summary, write_report
+from planner.pictures.report import COLUMNS
 from planner.question import ForceCap, Limits, Load
-from planner.report import COLUMNS, summary, write_report
-from planner.route import Route, evaluate, stages
-from planner.solve import plan
-from service import questions
-from service.command import run
-from service.stances import bundled, read_request, read_route
+from planner.robots import UnreachableError
+from planner.route import Route, evaluate
+from planner.route.climb import stages
+from planner.solving import plan
+from service.answering import questions
+from service.commands.cli import run
+from service.commands.stances import bundled, read_request, read_route
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from rocks import cylinder_mesh, distance, random_mesh, random_profile
 
 from hand_models import Cylinder, Grasp, Sphere
-from hand_models.mesh import Mesh
-from hand_models.profile import Profile
+from hand_models.rock import Mesh, Profile
 
 seeds = st.integers(0, 2**32 - 1)
 

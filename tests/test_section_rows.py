@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from rocks import distance, random_axes, random_ellipsoid
 
 from hand_models import Edge
-from hand_models.mixed_rows import section_rows
-from hand_models.profile_section import ProfileSection
-from hand_models.section_rows import Span
+from hand_models.sections import ProfileSection, Span, section_rows
 
 MODEL = HAND.finger
 FACE = (MODEL.tile_range[0], MODEL.joint_spacing, MODEL.tile_height)

@@ -33,17 +33,23 @@ from patience import PATIENCE
 from test_messages import check_answer
 from zenoh.handlers import FifoChannel
 
-from hand_models.errors import InvalidInputError
-from planner import settling, solve
-from planner.robot_file import RobotFile
-from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest, dispatch
-from service.codec import Format, decode_request
-from service.config import listening, open_session, zenoh_config
-from service.dispatch import Answer
-from service.errors import NoServiceError, ServiceError, ServiceTimeout
-from service.keys import service_key
+from hand_models.base import InvalidInputError
+from planner.prepare import settled_stance as settling
+from planner.robots import RobotFile
+from planner.solving import solve
+from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest
+from service.answering import dispatch
+from service.answering.dispatch import Answer
 from service.replies import ErrorReply, PlanReply
-from service.server import PlanService
+from service.serving import PlanService, listening, open_session, zenoh_config
+from service.wire import (
+    Format,
+    NoServiceError,
+    ServiceError,
+    ServiceTimeout,
+    decode_request,
+    service_key,
+)
 
 ROOT = Path(__file__).parents[1]
 PLAN = service_key("robosimian", "plan")
@@ -67,7 +73,7 @@ class Served:
         self.endpoint = endpoint
         flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "service.command", "serve", *flags],
+            [sys.executable, "-m", "service.commands.cli", "serve", *flags],
             cwd=ROOT,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

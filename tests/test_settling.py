@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold, random_mesh, random_profile
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface
-from hand_models.contact_states import close
-from hand_models.limit_postures import PATTERNS, at_limits
-from hand_models.mixed_rows import section_rows
-from hand_models.profile import Profile
-from hand_models.sections import RoundSection
-from hand_models.settling import settle
+from hand_models.finger import settle
+from hand_models.finger.contact_states import close
+from hand_models.finger.limit_postures import PATTERNS, at_limits
+from hand_models.rock import Profile
+from hand_models.sections import RoundSection, section_rows
 
 MODEL = HAND.finger
 DEEPEST = 1e-4

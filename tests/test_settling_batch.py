@@ -16,14 +16,13 @@ from rocks import random_axes, random_ellipsoid, random_hold, random_mesh, rando
 from stances import on_wall
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
-from hand_models.contact_states import close
+from hand_models.base import Recent
+from hand_models.finger import settle
+from hand_models.finger.contact_states import close
 from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
-from hand_models.mesh import Mesh
-from hand_models.profile import Profile
-from hand_models.recent import Recent
-from hand_models.settling import settle
-from hand_models.spines import Surface
-from planner.settling import settle_stance
+from hand_models.rock import Mesh, Profile
+from hand_models.tile import Surface
+from planner.prepare.settled_stance import settle_stance
 
 seeds = st.integers(0, 2**32 - 1)
 

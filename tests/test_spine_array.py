@@ -12,18 +12,22 @@ from scipy.stats import truncnorm
 
 from hand_models import InvalidInputError, Surface
 from hand_models.parameters import spine_table, surface_table
-from hand_models.spine_array import SpineArray, spine_forces, statistics
-from hand_models.spine_calibration import (
+from hand_models.tile import (
     LEAST_SPINES,
-    TileShear,
-    fit_asperity_friction,
+    SpineArray,
     fit_lateral,
     fit_line,
-    fit_strength,
     measured_tile_shear,
+    statistics,
+    surface_names,
+)
+from hand_models.tile.spine_array import spine_forces
+from hand_models.tile.spine_calibration import (
+    TileShear,
+    fit_asperity_friction,
+    fit_strength,
     scale_strength,
 )
-from hand_models.spines import surface_names
 
 FINE = SpineArray.named("concrete-fine")
 COARSE = SpineArray.named("concrete-coarse")

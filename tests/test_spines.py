@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hand_models import InvalidInputError, Surface
-from hand_models.limit_pieces import bounds_gap
-from hand_models.limit_pieces import reach as reach_of
-from hand_models.spines import surface_names
+from hand_models.tile import bounds_gap, surface_names
+from hand_models.tile import reach as reach_of
 
 DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
 """Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""

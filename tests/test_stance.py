@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from stances import PALM_TO_WALL, ROCK, ask, on_wall, wall
 
-from hand_models.errors import InvalidInputError
-from hand_models.frames import Pose
-from hand_models.holds import Cylinder
-from planner.question import Limits, Load, Question
-from planner.settling import hand_space, settle
-from planner.solve import plan
-from planner.stance import HandOnHold, Stance
+from hand_models.base import InvalidInputError, Pose
+from hand_models.rock import Cylinder
+from planner.prepare import hand_space, settle
+from planner.question import HandOnHold, Limits, Load, Question, Stance
+from planner.solving import plan
 
 NAN, INF = float("nan"), float("inf")
 UPRIGHT = replace(on_wall(), body=Pose(np.array([1.0, 2.0, 3.0]), np.eye(3)))

@@ -14,17 +14,17 @@ from patience import PATIENCE
 from stances import ask, on_wall
 from test_loads_check import streamable
 
-from hand_models.errors import InvalidInputError, UnsupportedError
-from hand_models.holds import Cylinder
-from planner.interpolation import PER_RADIUS, Interpolation
+from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.rock import Cylinder
+from planner.programs import used_effort
 from planner.question import Limits, Question
-from planner.reading import Reader
-from planner.set_points import SetPoints
-from planner.solve import plan
-from planner.stance_data import used_effort
-from planner.stream import RADIUS, WrenchStream
-from planner.stream_stance import StreamStance
-from planner.verify import Check
+from planner.result import Reader, SetPoints
+from planner.solving import plan
+from planner.streaming import WrenchStream
+from planner.streaming.interpolation import PER_RADIUS, Interpolation
+from planner.streaming.stream import RADIUS
+from planner.streaming.stream_stance import StreamStance
+from planner.verification import Check
 
 WALL = ask(on_wall())
 WEIGHT = WALL.needed_wrench()

@@ -18,25 +18,16 @@ from test_command import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process
 from test_messages import departures
 from test_service import free_endpoint
 
-from planner.set_points import no_set_points
-from planner.stream import WrenchStream
-from service import (
-    CruxClient,
-    PlanRequest,
-    SetPointsRequest,
-    StreamRequest,
-    dispatch,
-    stream_command,
-    streams,
-)
-from service.codec import Format, decode_request
-from service.command import run
-from service.config import open_session, zenoh_config
-from service.errors import ServiceError
-from service.keys import SET_POINTS, STREAM, service_key
-from service.server import PlanService
-from service.stream_messages import SetPointsReply, StreamReply
-from service.streams import KEPT, Streams
+from planner.result import no_set_points
+from planner.streaming import WrenchStream
+from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
+from service.answering import Streams, dispatch, streams
+from service.answering.streams import KEPT
+from service.commands import stream as stream_command
+from service.commands.cli import run
+from service.replies import SetPointsReply, StreamReply
+from service.serving import PlanService, open_session, zenoh_config
+from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
 
 __all__ = ["stance"]
 

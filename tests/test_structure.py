@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stances import CALIBRATION_LOAD, ask, on_wall
 
-from hand_models import InvalidInputError, wrench_space
-from hand_models.frames import Pose
-from hand_models.structure import HELD
-from planner.plan import LimitName
-from planner.solve import plan
+from hand_models import InvalidInputError
+from hand_models.base import Pose
+from hand_models.hand import HELD
+from hand_models.wrench_spaces import space as wrench_space
+from planner.result import LimitName
+from planner.solving import plan
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError
+from hand_models.experiments import PalmExperiment
 from hand_models.parameters import hand_table
 from hand_models.studies import STUDIES, as_json, load_study, run_study
-from hand_models.studies.hard_stop import PalmExperiment
-from service.command import run
+from service.commands.cli import run
 
 PALM_STUDIES = ("fig06", "fig07")
 SPRINGS = {1: 1400.0, 2: 2200.0, 3: 4900.0}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from hand_models.row_layout import named_row
-from hand_models.wrench_space import Row
-from service.command import crux, run
-from service.surveys import failures_table
+from hand_models.fixed_wrist import named_row
+from hand_models.wrench_spaces import Row
+from service.commands.cli import crux, run
+from service.commands.surveys import failures_table
 
 STANCE = "wall-300-floating"
 

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError
-from hand_models.gripper import gripper_table
-from hand_models.parameters import ParameterTable, Quantity, hand_table
-from hand_models.studies.force_limits import force_limits, rest_state
-from hand_models.studies.sweep import (
-    CUTS,
-    RAYS,
-    STARTS,
+from hand_models.compliance import gripper_table
+from hand_models.experiments import (
+    Axis,
+    Conditions,
     Sweep,
     failing,
     radius_axes,
+    rest_state,
     sweep_cell,
     sweep_grid,
 )
-from hand_models.studies.sweep_axis import Axis, Conditions
-from hand_models.studies.sweep_picture import entry_name
-from service.command import run
+from hand_models.experiments.force_limits import force_limits
+from hand_models.experiments.sweep import CUTS, RAYS, STARTS
+from hand_models.experiments.sweep_picture import entry_name
+from hand_models.parameters import ParameterTable, Quantity, hand_table
+from service.commands.cli import run
 
 CONDITIONS = Conditions(0.3, 46.0)
 FINE = "concrete-fine"

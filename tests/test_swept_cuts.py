@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
-from hand_models.cuts import Cut, Face
-from hand_models.holds import Hold
-from hand_models.ovals import Oval
-from hand_models.swept_cuts import cut_of
+from hand_models.rock import Hold
+from hand_models.sections import Cut, Face, cut_of
+from hand_models.sections.ellipses import Oval
 
 seeds = st.integers(0, 2**32 - 1)
 

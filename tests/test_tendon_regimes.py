@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hand_models.compliant_finger import STEP
-from hand_models.tendon import FingerTendon
-from hand_models.tendon_regimes import MOTOR_SCHEMES, TendonRegimes
+from hand_models.compliance import STEP
+from hand_models.tendon import FingerTendon, TendonRegimes
+from hand_models.tendon.regimes import MOTOR_SCHEMES
 
 
 def random_tendon(rng, friction, entry):

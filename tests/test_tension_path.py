@@ -11,15 +11,14 @@ from jointed import random_jointed_question
 from rich.console import Console
 from stances import ask, on_wall, random_question
 
-from planner.binding import limit_name
-from planner.gathering import gather
-from planner.plan import LimitName, Plan, TensionPath
-from planner.posture import posture
+from planner.explanation import limit_name, unsafe_sentence
+from planner.explanation.path_safety import GIVE
+from planner.prepare import gather, posture
 from planner.question import Limits, Question
-from planner.solve import plan
-from planner.tension_path import GIVE, unsafe_sentence
-from service.answers import plan_reply
-from service.tables import print_plan
+from planner.result import LimitName, Plan, TensionPath
+from planner.solving import plan
+from service.answering.answers import plan_reply
+from service.commands.tables import print_plan
 
 ROOM = 0.1
 """What is no room on the way [N]."""

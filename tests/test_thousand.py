@@ -16,14 +16,13 @@ import peer
 import pytest
 from random_requests import random_request
 
-from hand_models.errors import InvalidInputError
-from hand_models.wrench_space import WrenchSpace
-from planner.gathering import gather
-from planner.plan import Plan
-from planner.posture import posture
+from hand_models.base import InvalidInputError
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import gather, posture
 from planner.question import Question
-from planner.solve import plan
-from service.questions import question as planner_question
+from planner.result import Plan
+from planner.solving import plan
+from service.answering.questions import question as planner_question
 from service.requests import PlanRequest
 
 COUNT = 1000

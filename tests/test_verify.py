@@ -15,15 +15,15 @@ from stances import (
     random_surface,
 )
 
-from hand_models.holds import Cylinder
-from planner import recomputing, verify
-from planner.carried import Carried
-from planner.equilibrium import equilibrium
-from planner.limit_curve import LimitCurves
-from planner.plan import Plan
-from planner.settling import settle
-from planner.solve import plan
-from planner.verify import problems
+from hand_models.rock import Cylinder
+from planner.prepare import settle
+from planner.result import Carried, Plan
+from planner.solving import plan
+from planner.verification import check as verify
+from planner.verification import problems
+from planner.verification import recomputation as recomputing
+from planner.verification.equilibrium import equilibrium
+from planner.verification.limit_surface import LimitCurves
 
 QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 HAND, FINGER = 2, 1

@@ -9,13 +9,12 @@ import pytest
 from jointed import random_jointed_question
 from stances import on_wall
 
-from planner import verify_limbs
-from planner.plan import Plan
-from planner.posture import Posture, posture
+from planner.prepare import Posture, posture, settle
 from planner.question import ForceCap, Limits, Load, Question
-from planner.settling import settle
-from planner.solve import plan
-from planner.verify import problems
+from planner.result import Plan
+from planner.solving import plan
+from planner.verification import limbs as verify_limbs
+from planner.verification import problems
 
 LIMB = "rear_left"
 INDEX = 2

@@ -13,8 +13,8 @@ import pytest
 import workshop
 from patience import PATIENCE
 
-from service import workers as workers_module
-from service.workers import NO_START, THREADS, Lost, Workers
+from service.processes import workers as workers_module
+from service.processes.workers import NO_START, THREADS, Lost, Workers
 
 
 def logged(log: Path) -> Counter[int]:

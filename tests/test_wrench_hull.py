@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from hand_models.studies.wrench_hull import (
+from hand_models.experiments import (
     UNITS,
     cut,
     extents,

@@ -7,23 +7,28 @@ import pytest
 from scipy.optimize import brentq, minimize
 
 from hand_models import InvalidInputError
-from hand_models.compliant_hand import CompliantHand
-from hand_models.errors import EmptySetError
-from hand_models.finger import FingerModel
-from hand_models.floating_wrist import FloatingWrist
-from hand_models.gripper import Gripper, gripper_table
+from hand_models.base import EmptySetError
+from hand_models.compliance import (
+    PLANAR,
+    CompliantHand,
+    FloatingWrist,
+    Gripper,
+    boundary,
+    farthest,
+    gripper_table,
+    linear_extreme,
+    pieces,
+    search,
+    search_box,
+    wrist_pose,
+)
+from hand_models.finger import FingerModel, settle
 from hand_models.hand import Grasp
-from hand_models.holds import Cylinder, Plane, Sphere
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
-from hand_models.settling import settle
-from hand_models.spines import Surface
+from hand_models.rock import Cylinder, Plane, Sphere
 from hand_models.tendon import FingerTendon
-from hand_models.wrench_space import SCALE
-from hand_models.wrist_box import search_box
-from hand_models.wrist_inverse import wrist_pose
-from hand_models.wrist_limit import farthest, linear_extreme
-from hand_models.wrist_pieces import pieces
-from hand_models.wrist_search import PLANAR, boundary, search
+from hand_models.tile import Surface
+from hand_models.wrench_spaces import SCALE
 from tests.hands import HAND
 
 PINCH = Grasp(outer_rotation=math.pi)

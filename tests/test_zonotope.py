@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial import KDTree
 
-from hand_models.cross_products import cross_products, expansion
-from hand_models.errors import InvalidInputError, UnsupportedError
-from hand_models.half_spaces import affine_hull
-from hand_models.polytopes import hull_facets
-from hand_models.wrench_space import SCALE, Row, WrenchSpace
-from hand_models.zonotope import half_spaces
+from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.wrench_spaces import SCALE, Row, WrenchSpace, hull_facets
+from hand_models.wrench_spaces.cross_products import cross_products, expansion
+from hand_models.wrench_spaces.half_spaces import affine_hull
+from hand_models.wrench_spaces.zonotope import half_spaces
 
 SEEDS = st.integers(0, 10**6)
 

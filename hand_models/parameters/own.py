@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.errors import InvalidInputError
-from hand_models.parameters import LONGEST_QUOTE, ParameterTable, Quantity, hand_table
+from hand_models.base import InvalidInputError
+from hand_models.parameters.tables import LONGEST_QUOTE, ParameterTable, Quantity, hand_table
 
 __all__ = ["load_own_hand", "own_hand"]
 

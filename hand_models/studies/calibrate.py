@@ -22,16 +22,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq, least_squares
 
-from hand_models.errors import CruxError, SolverError
+from hand_models.base import Array, CruxError, SolverError
+from hand_models.compliance import Gripper, boundary, gripper_table, linear_box
+from hand_models.experiments import cut, extents, in_paper_signs
 from hand_models.finger import PHALANGES
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
-from hand_models.spines import Surface
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.wrench_hull import cut, extents, in_paper_signs
-from hand_models.wrist_box import linear_box
-from hand_models.wrist_search import boundary
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.tile import Surface
 
 __all__ = ["plot", "run"]
 

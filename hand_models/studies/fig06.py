@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from hand_models.palm import share_load
+from hand_models.experiments import PalmExperiment
 from hand_models.parameters import ParameterTable
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.hard_stop import PalmExperiment
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.tendon import share_load
 
 __all__ = ["plot", "run"]
 

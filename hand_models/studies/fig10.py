@@ -19,20 +19,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from hand_models.frames import Array
-from hand_models.limit_pieces import bounds_gap, reach
+from hand_models.base import Array
 from hand_models.parameters import ParameterTable
-from hand_models.spine_array import SpineArray, statistics
-from hand_models.spine_calibration import (
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.tile import (
     LEAST_SPINES,
     LineFit,
+    SpineArray,
+    Surface,
+    bounds_gap,
     fit_lateral,
     fit_line,
     measured_tile_shear,
+    reach,
+    statistics,
     within_law,
 )
-from hand_models.spines import Surface
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

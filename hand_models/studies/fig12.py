@@ -14,13 +14,12 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.compliant_finger import FingerLoads
+from hand_models.base import Array
+from hand_models.compliance import FingerLoads, Gripper, gripper_table
+from hand_models.experiments import BALANCED, pull, unloaded, wrist_poses
 from hand_models.finger import PHALANGES
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.pulling import BALANCED, pull, unloaded, wrist_poses
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["balance_matrix", "plot", "run"]
 

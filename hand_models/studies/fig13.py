@@ -16,26 +16,25 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
-from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.polytopes import hull
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.pulling import even_pulls, pull, unloaded
-from hand_models.studies.wrench_hull import (
+from hand_models.base import Array
+from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
+from hand_models.experiments import (
     UNITS,
     Extents,
     cut,
+    even_pulls,
     extents,
     in_paper_signs,
     label_solid,
+    pull,
     reach,
     section,
+    unloaded,
     vertices,
 )
-from hand_models.wrist_limit import linear_extreme
-from hand_models.wrist_pieces import pieces
-from hand_models.wrist_search import PLANAR, search
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.wrench_spaces import hull
 
 __all__ = ["plot", "run"]
 

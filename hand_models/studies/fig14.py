@@ -17,22 +17,26 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.finger import PHALANGES
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
-from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.polytopes import TOLERANCE
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.pulling import DRAGGED, UNBALANCED, Pulled, even_pulls, pull, unloaded
-from hand_models.studies.wrench_hull import (
+from hand_models.base import Array
+from hand_models.compliance import Gripper, gripper_table, search
+from hand_models.experiments import (
+    DRAGGED,
+    UNBALANCED,
+    Pulled,
     cut,
+    even_pulls,
     extents,
     in_paper_signs,
     label_solid,
+    pull,
     section,
+    unloaded,
     volume,
 )
-from hand_models.wrist_search import search
+from hand_models.finger import PHALANGES
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.wrench_spaces import TOLERANCE
 
 __all__ = ["loading_planes", "plot", "run"]
 

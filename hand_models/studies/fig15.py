@@ -15,21 +15,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import bisect
 
-from hand_models.errors import EmptySetError, InvalidInputError
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
-from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.force_limits import (
+from hand_models.base import Array, EmptySetError, InvalidInputError
+from hand_models.compliance import Gripper, gripper_table
+from hand_models.experiments import (
     PARAMETER_STUDIES,
+    Conditions,
     HullPoints,
     Limit,
+    cut,
     limit,
+    reach,
     rest_state,
     sharpened,
+    volume,
 )
-from hand_models.studies.sweep_axis import Conditions
-from hand_models.studies.wrench_hull import cut, reach, volume
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

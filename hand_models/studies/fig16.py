@@ -15,21 +15,24 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.frames import Array
-from hand_models.gripper import Gripper, gripper_table
-from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies import Claim, Progress, StudyResult, save_picture
-from hand_models.studies.force_limits import Measure
-from hand_models.studies.sweep import (
+from hand_models.base import Array
+from hand_models.compliance import Gripper, gripper_table
+from hand_models.experiments import (
+    Axis,
     Cell,
+    Conditions,
+    Measure,
+    conditions_title,
+    draw_map,
     failing,
+    legend,
     map_data,
     radius_axes,
     sweep_cell,
     sweep_grid,
 )
-from hand_models.studies.sweep_axis import Axis, Conditions
-from hand_models.studies.sweep_picture import conditions_title, draw_map, legend
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

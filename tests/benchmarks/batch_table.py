@@ -11,9 +11,9 @@ from measured_stances import question_of, request
 from race import WARM, Race, Way, race
 from results import Line, Table, times
 
-from planner import beside
-from planner.solve import plan
-from service.many import Planners
+from planner.deadline import overlap as beside
+from planner.solving import plan
+from service.processes import Planners
 
 __all__ = ["batch_tables", "batches", "rates"]
 

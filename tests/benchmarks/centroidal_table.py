@@ -10,7 +10,7 @@ from race import race
 from results import Line, Table, span, times
 from test_centroidal import EDGES, our_margin, random_case, stance_of
 
-from planner import program
+from planner.programs import program
 
 __all__ = ["centroidal_tables"]
 

@@ -12,7 +12,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from hand_models.wrench_space import WrenchSpace
+from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["Parametrised", "Query", "rebuilt"]
 

@@ -19,12 +19,11 @@ from race import TURN, WARM, Way, race
 from test_many_hands import crawler_in
 from test_many_hands import question as crawler_question
 
-from hand_models.wrench_space import WrenchSpace
-from planner import program
-from planner.gathering import gather
-from planner.hand_sets import Hands, Sets
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import Hands, Sets, gather
+from planner.programs import program
 from planner.question import Question
-from planner.solve import plan
+from planner.solving import plan
 
 __all__ = ["Curve", "draw", "growth", "steps"]
 

@@ -12,11 +12,11 @@ from race import TURN, WARM, race
 from results import Table, lines
 from whole_blocks import WholeBlocks
 
-from planner import program
-from planner.gathering import gather
-from planner.known_stance import KnownStance
-from planner.stance_data import WRENCH_UNIT
-from planner.stream import SetPoints, WrenchStream
+from planner.prepare import gather
+from planner.programs import WRENCH_UNIT, program
+from planner.result import SetPoints
+from planner.solving import KnownStance
+from planner.streaming import WrenchStream
 
 __all__ = ["known_tables"]
 

@@ -9,11 +9,11 @@ import msgspec
 import numpy as np
 from asked import wall_request
 
-from hand_models.holds import Cylinder
+from hand_models.rock import Cylinder
 from planner.question import Question
-from service.codec import decode_request
-from service.questions import question
+from service.answering.questions import question
 from service.requests import PlanRequest
+from service.wire import decode_request
 
 __all__ = ["document", "payload", "question_of", "request", "twin_of"]
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from hand_models.finger import SettledFinger
-from hand_models.half_spaces import affine_hull
 from hand_models.hand import FINGERS, SettledHand
+from hand_models.wrench_spaces.half_spaces import affine_hull
 
 __all__ = ["searched"]
 

@@ -19,8 +19,8 @@ import numpy as np
 import peer
 import scipy.sparse as sp
 
-from planner.hand_sets import Sets
-from planner.program import SLACK, tie_weight
+from planner.prepare import Sets
+from planner.programs import SLACK, tie_weight
 from planner.question import Question
 
 __all__ = ["Clarabel", "Conic", "Data", "Qoco", "highs", "least", "scaled", "si", "tie", "unique"]

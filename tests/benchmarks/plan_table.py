@@ -15,15 +15,14 @@ from race import TURN, WARM, Way, race
 from results import Line, Table, lines, span
 from whole_blocks import WholeBlocks
 
-from planner import program
 from planner.deadline import DeadlineError
-from planner.gathering import gather
-from planner.hand_sets import Hands, Sets
+from planner.prepare import Hands, Sets, gather
+from planner.programs import program
 from planner.question import Question
-from planner.solve import plan
-from service import dispatch
-from service.keys import PLAN
-from service.questions import question
+from planner.solving import plan
+from service.answering import dispatch
+from service.answering.questions import question
+from service.wire import PLAN
 
 __all__ = ["plan_tables"]
 

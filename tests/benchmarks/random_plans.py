@@ -18,11 +18,9 @@ from plain_programs import Clarabel, Conic, scaled, si, unique
 from results import Line, Table
 from stances import random_question
 
-from planner import program
-from planner.gathering import gather
-from planner.hand_sets import Sets
-from planner.solve import plan
-from planner.stance_data import LOAD_UNIT
+from planner.prepare import Sets, gather
+from planner.programs import LOAD_UNIT, program
+from planner.solving import plan
 
 __all__ = ["Answer", "answer", "answers", "iteration_tables"]
 

@@ -13,10 +13,9 @@ from race import race
 from results import Table, lines
 from scipy.spatial import KDTree
 
-from hand_models import zonotope
 from hand_models.fixed_wrist import wrench_space
-from hand_models.parallelepiped import parallelepiped
-from hand_models.wrench_space import SCALE
+from hand_models.fixed_wrist.tension_box import parallelepiped
+from hand_models.wrench_spaces import SCALE, zonotope
 
 __all__ = ["set_tables"]
 
@@ -59,7 +58,7 @@ def _zonotope(rounds: int, tick: Callable[[], object]) -> Table:
         lines(
             timed,
             ["ours"],
-            ("`hand_models.zonotope`", "ours"),
+            ("`hand_models.wrench_spaces.zonotope`", "ours"),
             ("pycapacity, `hyper_plane_shift_method`", "pycapacity"),
         ),
         f"The same half-spaces, to {far:.0e}.",

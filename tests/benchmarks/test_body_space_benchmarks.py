@@ -8,7 +8,7 @@ import peer
 import pytest
 from stances import ask, on_wall
 
-from planner.body_space import BodySpace
+from planner.capability import BodySpace
 from planner.question import Load
 
 WAY = np.array([0.0, 0.6, 0.8, 0.0, 0.0, 0.0])

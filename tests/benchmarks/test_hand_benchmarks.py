@@ -13,12 +13,14 @@ from rocks import random_axes
 from scipy.spatial.transform import Rotation
 from stances import SANDPAPER, ask, on_wall
 
-from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits, wrench_space
-from hand_models.contact_states import Closing, close, close_all
+from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits
+from hand_models.finger import Closing, close_all
+from hand_models.finger.contact_states import close
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import Placement
-from hand_models.palm import share_load
-from planner.gathering import gather
+from hand_models.tendon import share_load
+from hand_models.wrench_spaces import space as wrench_space
+from planner.prepare import gather
 
 HOLDS = {
     "pinch on 300 mm": (Cylinder(0.3), math.pi),

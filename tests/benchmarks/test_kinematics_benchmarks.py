@@ -9,8 +9,7 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from planner.inverse_kinematics import solve_limbs
-from planner.robosimian import robosimian
+from planner.robots import robosimian, solve_limbs
 
 EARTH = np.array([0.0, 0.0, -9.81])
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from measured_stances import request
 
-from service.many import Planners
-from service.workers import cores
+from service.processes import Planners
+from service.processes.workers import cores
 
 MANY = 200
 """New stances of four hands."""

@@ -10,7 +10,7 @@ import pytest
 from hands import HAND, ROCK
 
 from hand_models import Grasp
-from hand_models.mesh import Mesh
+from hand_models.rock import Mesh
 
 
 def scan(triangles: int = 200_000, roughness: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:

@@ -7,16 +7,15 @@ import peer
 import pytest
 from stances import PLACES, ask, on_wall, program_data
 
-from hand_models.holds import Cylinder
-from planner import program
-from planner.dual_bounds import unique_bound
-from planner.equilibrium import equilibrium
-from planner.gathering import gather
-from planner.reading import Reader
-from planner.solve import plan
-from planner.stacked import stacked
-from planner.verify import Check
-from service.answers import plan_reply
+from hand_models.rock import Cylinder
+from planner.prepare import gather, stacked
+from planner.programs import program
+from planner.result import Reader
+from planner.solving import plan
+from planner.solving.dual_bounds import unique_bound
+from planner.verification import Check
+from planner.verification.equilibrium import equilibrium
+from service.answering.answers import plan_reply
 
 LIMBS = tuple(PLACES)
 HOLDS = {"held": Cylinder(0.3), "overloaded": Cylinder(0.7)}

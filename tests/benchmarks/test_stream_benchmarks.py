@@ -11,14 +11,13 @@ import pytest
 from stances import ask, on_wall
 from test_stream_service import stream_request
 
-from planner.interpolation import Interpolation
-from planner.known_stance import KnownStance
-from planner.stream import WrenchStream
-from planner.stream_stance import StreamStance
-from service import dispatch
-from service.keys import SET_POINTS, STREAM
-from service.stream_messages import SetPointsReply, SetPointsRequest, StreamReply
-from service.streams import Streams
+from planner.solving import KnownStance
+from planner.streaming import WrenchStream
+from planner.streaming.interpolation import Interpolation
+from planner.streaming.stream_stance import StreamStance
+from service.answering import Streams, dispatch
+from service.replies import SetPointsReply, SetPointsRequest, StreamReply
+from service.wire import SET_POINTS, STREAM
 
 QUESTION = ask(on_wall())
 CENTRE = QUESTION.needed_wrench()

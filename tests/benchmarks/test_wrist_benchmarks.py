@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from hands import HAND, ROCK
 
-from hand_models import Cylinder, Grasp, wrench_space
-from hand_models.compliant_hand import CompliantHand
-from hand_models.floating_wrist import FloatingWrist
-from hand_models.gripper import Gripper
-from hand_models.wrist_box import search_box
-from hand_models.wrist_inverse import wrist_pose
-from hand_models.wrist_limit import farthest
-from hand_models.wrist_search import search
+from hand_models import Cylinder, Grasp
+from hand_models.compliance import (
+    CompliantHand,
+    FloatingWrist,
+    Gripper,
+    farthest,
+    search,
+    search_box,
+    wrist_pose,
+)
+from hand_models.wrench_spaces import space as wrench_space
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 

@@ -8,8 +8,7 @@ from typing import Any
 import clarabel
 import scipy.sparse as sp
 
-from planner import program
-from planner.stance_data import StanceData
+from planner.programs import StanceData, program
 
 __all__ = ["WholeBlocks"]
 

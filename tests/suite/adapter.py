@@ -14,8 +14,8 @@ from unittest.mock import patch
 from click.testing import CliRunner
 
 from hand_models.studies import load_study
-from service import dispatch
-from service.command import run
+from service.answering import dispatch
+from service.commands.cli import run
 
 __all__ = ["KEYS", "ask"]
 

@@ -1,0 +1,5 @@
+"""Frames and wrench transports, the project's exceptions, one bounded store."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,204 @@
+"""Poses and the transport of wrenches between frames.
+
+Wrenches are ``[fx, fy, fz, mx, my, mz]``: force first, moment about the frame's origin, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.base.errors import InvalidInputError
+
+__all__ = [
+    "QUATERNION_NORM_TOLERANCE",
+    "Array",
+    "Indices",
+    "Pose",
+    "skew",
+    "wrench_transport",
+    "wrench_transports",
+]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+QUATERNION_NORM_TOLERANCE: Final = 1e-3
+"""How far a quaternion's norm may be from one before it is refused (the contract's figure)."""
+
+
+def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
+    """Return ``value`` as a float array of shape ``(size,)``.
+
+    Raises
+    ------
+    InvalidInputError
+        If the shape differs or an entry is not finite.
+    """
+    try:
+        vector = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"expected {size} numbers, got {value!r}", field=field) from None
+    if vector.shape != (size,):
+        raise InvalidInputError(f"expected {size} numbers, got shape {vector.shape}", field=field)
+    numbers = vector.tolist()
+    if not all(map(math.isfinite, numbers)):
+        raise InvalidInputError(f"every number must be finite, got {numbers}", field=field)
+    return vector
+
+
+def _finite_numbers(value: ArrayLike, size: int, field: str) -> list[float]:
+    """Return the same as a list, at once where it is one of floats; raises as `finite_vector`."""
+    if isinstance(value, list) and len(value) == size and {*map(type, value)} == {float}:
+        numbers: list[float] = value
+        if all(map(math.isfinite, numbers)):
+            return numbers
+    found: list[float] = finite_vector(value, size, field).tolist()
+    return found
+
+
+def skew(v: ArrayLike) -> Array:
+    """Return the matrix ``[v]×`` of shape (3, 3), so that ``[v]× w`` is the cross product."""
+    x, y, z = np.asarray(v, dtype=float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a child frame is in its parent.
+
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        Origin of the child in the parent [m].
+    rotation : ndarray, shape (3, 3)
+        Columns are the child's axes in the parent.
+    proper : bool
+        Whether it is known to be finite, its axes orthonormal and right-handed; then its arrays are
+        read-only. False where nobody has looked.
+    """
+
+    position: Array
+    rotation: Array
+    proper: bool = field(default=False, init=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a copy's arrays can be written, so nothing is known of it
+        return Pose, (self.position, self.rotation)
+
+    @classmethod
+    def identity(cls) -> Pose:
+        """Return the pose of a frame that coincides with its parent."""
+        return cls(np.zeros(3), np.eye(3))
+
+    @classmethod
+    def from_quaternion(
+        cls, position: Sequence[float] | Array, orientation: Sequence[float] | Array
+    ) -> Pose:
+        """Return the pose with a quaternion ``[x, y, z, w]``, normalised.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is not finite or the norm is off by more than
+            `QUATERNION_NORM_TOLERANCE`.
+        """
+        q = _finite_numbers(orientation, 4, "orientation")
+        norm = math.hypot(*q)
+        if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
+            raise InvalidInputError(
+                f"a quaternion [x, y, z, w] of norm 1 ± {QUATERNION_NORM_TOLERANCE:g} is needed, "
+                f"the norm is {norm:.6g}",
+                field="orientation",
+            )
+        x, y, z, w = [component / norm for component in q]
+        rotation = np.array(
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+                [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+                [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+        )
+        place = np.array(_finite_numbers(position, 3, "position"))
+        place.setflags(write=False)
+        rotation.setflags(write=False)
+        pose = cls(place, rotation)
+        object.__setattr__(pose, "proper", True)
+        return pose
+
+    def quaternion(self) -> Array:
+        """Return the orientation as ``[x, y, z, w]``, shape (4,), with w ≥ 0."""
+        rows = self.rotation.tolist()
+        trace = rows[0][0] + rows[1][1] + rows[2][2]
+        # from the largest of its components, which is never small
+        i = max(range(3), key=lambda axis: rows[axis][axis])
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = [0.0] * 4
+        if trace > rows[i][i]:
+            q[3], (i, j, k) = 1.0 + trace, (0, 1, 2)
+            q[i], q[j] = rows[k][j] - rows[j][k], rows[i][k] - rows[k][i]
+            q[k] = rows[j][i] - rows[i][j]
+        else:
+            q[i], q[3] = 1.0 - trace + 2.0 * rows[i][i], rows[k][j] - rows[j][k]
+            q[j], q[k] = rows[j][i] + rows[i][j], rows[k][i] + rows[i][k]
+        return np.array(q) * (math.copysign(1.0, q[3]) / math.hypot(*q))
+
+    def inverse(self) -> Pose:
+        """Return the pose of the parent in the child."""
+        return Pose(-self.rotation.T @ self.position, self.rotation.T)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        return Pose(self.position + self.rotation @ other.position, self.rotation @ other.rotation)
+
+    def apply(self, point: ArrayLike) -> Array:
+        """Return a point (or an array (n, 3) of points) of the child in the parent [m]."""
+        return np.asarray(point, dtype=float) @ self.rotation.T + self.position
+
+
+def wrench_transport(pose: Pose) -> Array:
+    """Return the matrix that carries a wrench from the child frame to the parent.
+
+    Parameters
+    ----------
+    pose : Pose
+        The child in the parent.
+
+    Returns
+    -------
+    ndarray, shape (6, 6)
+        ``Ad`` with ``f' = R f`` and ``m' = R m + p × R f``.
+    """
+    transport = np.zeros((6, 6))
+    transport[:3, :3] = transport[3:, 3:] = pose.rotation
+    transport[3:, :3] = skew(pose.position) @ pose.rotation
+    return transport
+
+
+SKEW: Final = np.stack([skew(axis) for axis in np.eye(3)])
+"""``SKEW[i]`` is `skew` of the unit vector along axis i."""
+
+
+def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
+    """Return the matrices that carry wrenches from some frames to a body's, shape (n, 6, 6).
+
+    Parameters
+    ----------
+    body : Pose
+        The body in the world.
+    poses : sequence of Pose
+        The frames in the world.
+    """
+    inverse = body.rotation.T
+    rotations = inverse @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+    places = np.concatenate([pose.position for pose in poses]).reshape(-1, 3)
+    places = (places - body.position) @ body.rotation
+    transports = np.zeros((len(poses), 6, 6))
+    transports[:, :3, :3] = transports[:, 3:, 3:] = rotations
+    crosses = (places @ SKEW.reshape(3, 9)).reshape(-1, 3, 3)
+    np.matmul(crosses, rotations, out=transports[:, 3:, :3])
+    return transports

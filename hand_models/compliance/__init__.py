@@ -1,0 +1,5 @@
+"""A settled hand, or a gripper, whose wrist gives way: loads, set, search, limits."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

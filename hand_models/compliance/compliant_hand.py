@@ -1,0 +1,286 @@
+"""A hand whose wrist gives way while its motors stand still (Sections 5.3 and 5.4).
+
+The hand is settled and its tendons hold a preload. Then the wrist moves by a small twist
+ξ = (v, ω), of the hand frame about its origin at rest. In its plane each finger settles anew
+(`compliant_finger`); out of it, its tiles give as springs on a beam that leaves the base along the
+finger (Section 5.3: linear elasticity),
+
+    Y = (F + diag(1 / k))⁻¹ y,    F_ij = ℓ_i² (3 ℓ_j − ℓ_i) / (6 EI) + h_i h_j ℓ_i / GJ,  ℓ_i ≤ ℓ_j,
+
+with y the displacement of each tile across the finger's plane, ℓ its distance along the finger from
+the joint and h its distance from the finger's axis. The engaged palm tiles drag the rock as their
+tendon shares the load when the palm moves toward −x, and press on it when it moves into it; they
+neither push nor pull.
+
+Forces and places are in H *at rest*: the tiles are anchored in the rock, and it is the rock's side
+that stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError, skew
+from hand_models.compliance.compliant_finger import STEP, CompliantFinger, FingerLoads
+from hand_models.compliance.rolling import Numbers
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, SettledHand
+from hand_models.tendon import FingerTendon, MotorScheme, share_load
+
+__all__ = ["CompliantHand", "HandLoads"]
+
+NOTHING: Final = 1e-20
+"""Load of the palm that is none: the square of a complex step leaves as much [N]."""
+
+UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+class HandLoads(NamedTuple):
+    """A hand's loads at m twists of its wrist; n tiles in the order of `SettledHand.tiles`.
+
+    Attributes
+    ----------
+    shears, normals, laterals : ndarray, shape (m, n)
+        [N]
+    tensions : ndarray, shape (m, 4)
+        Of each tendon where it leaves its motor [N].
+    stop_torques : ndarray, shape (m, k)
+        What pushes each joint at a limit, in the order of `SettledHand.stops`, against it [N·m].
+    palm : ndarray, shape (m, 2)
+        Shear along −x and pressing [N].
+    positions : ndarray, shape (m, n, 3)
+        Of the contacts, in H at rest [m].
+    axes : ndarray, shape (m, n, 3, 3)
+        Rows: the unit force on the rock of shear, normal and lateral load, in H at rest.
+    reached : ndarray of bool, shape (m,)
+        Whether every phalanx still finds its rock.
+    """
+
+    shears: Numbers
+    normals: Numbers
+    laterals: Numbers
+    tensions: Numbers
+    stop_torques: Numbers
+    palm: Numbers
+    positions: Numbers
+    axes: Numbers
+    reached: NDArray[np.bool_]
+
+    @property
+    def tile_loads(self) -> Numbers:
+        """Shear, normal and lateral load of each tile, shape (m, n, 3) [N]."""
+        return np.stack([self.shears, self.normals, self.laterals], axis=-1)
+
+
+class CompliantHand:
+    """A settled hand about which its wrist may move.
+
+    Parameters
+    ----------
+    settled : SettledHand
+        Not one that clings with its nails.
+    preload : array_like, shape (4,), optional
+        Tensions that the tendons hold before the wrist moves [N]; the closing tension by default.
+    scheme : {'held', 'tension'}
+        Whether the motors stand still, or keep their tension.
+
+    Raises
+    ------
+    InvalidInputError
+        If a preload is negative or above the tendon's maximum.
+    UnsupportedError
+        If the hand clings with its nails, whose stiffness is not known.
+    """
+
+    def __init__(
+        self,
+        settled: SettledHand,
+        preload: ArrayLike | None = None,
+        scheme: MotorScheme = "held",
+    ) -> None:
+        if settled.grasp.fingernail:
+            raise UnsupportedError("a hand that clings with its nails cannot float")
+        hand = settled.hand
+        self.settled = settled
+        self.preload = _preload(preload, settled)
+        self.frames = hand.frames(settled.grasp.outer_rotation)
+        self.fingers = tuple(self._finger(i, name, scheme) for i, name in enumerate(FINGERS))
+        self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
+        self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
+        self.palm_shear_stiffness = self.palm_pressing_stiffness = 0.0
+        if settled.palm.engaged:
+            sharing = share_load(
+                tuple(hand.palm_contact[i] for i in settled.palm.engaged),
+                hand.palm_spring,
+                hand.palm_friction,
+                hand.palm_own_friction,
+            )
+            self.palm_shear_stiffness = float(sharing.tile_stiffness.sum())
+            self.palm_pressing_stiffness = hand.palm_pressing_stiffness * len(settled.palm.engaged)
+
+    def _finger(self, i: int, name: str, scheme: MotorScheme) -> CompliantFinger:
+        settled, hand = self.settled, self.settled.hand
+        base_tile = name.startswith("outer")
+        own = settled.finger_of == i
+        tension = float(self.preload[i])
+        tendon = FingerTendon.from_table(hand.table, base_tile)
+        shears = settled.loads[own, 0] @ np.array([1.0, tension])
+        stiffness = np.where(settled.touching[own], np.array(tendon.contact_stiffness), 0.0)
+        return CompliantFinger(
+            settled.fingers[i],
+            hand.section(name, settled.hold, settled.grasp, settled.seating.pose),
+            replace(
+                tendon,
+                contact_stiffness=tuple(stiffness.tolist()),
+                friction=max(tendon.friction, hand.tendon_friction),
+            ),
+            tendon.closed(tension, shears),
+            scheme,
+        )
+
+    def _lateral_stiffness(self, i: int) -> Array:
+        """Return the stiffness of a finger's tiles across its plane, shape (n_i, n_i) [N/m]."""
+        settled, hand = self.settled, self.settled.hand
+        own = self._own[i]
+        stiffness = np.zeros((len(own), len(own)))
+        those = np.flatnonzero(settled.touching[own])
+        if not (settled.grasp.lateral and len(those)):
+            return stiffness
+        arms = settled.positions[own[those]] - self.frames[i].joint
+        out = np.maximum(arms @ self.frames[i].along, 0.0)
+        shorter, longer = np.minimum(out[:, None], out), np.maximum(out[:, None], out)
+        flexibility = shorter**2 * (3.0 * longer - shorter) / (6.0 * hand.bending_stiffness)
+        flexibility += np.outer(arms[:, 2], arms[:, 2]) * shorter / hand.torsional_stiffness
+        flexibility += np.eye(len(those)) / hand.lateral_stiffness
+        stiffness[np.ix_(those, those)] = np.linalg.inv(flexibility)
+        return stiffness
+
+    def loads(self, twists: Numbers) -> HandLoads:
+        """Return every load at some twists of the wrist, shape (m, 6) [m, rad]."""
+        m, settled = len(twists), self.settled
+        n = len(settled.tiles)
+        kind = twists.dtype
+        shears, normals, laterals = (np.zeros((m, n), dtype=kind) for _ in range(3))
+        tensions = np.zeros((m, len(FINGERS)), dtype=kind)
+        positions = np.broadcast_to(settled.positions, (m, n, 3)).astype(kind)
+        axes = np.broadcast_to(settled.axes, (m, n, 3, 3)).astype(kind)
+        reached = np.ones(m, dtype=bool)
+        torques = []
+        for i, (frame, own) in enumerate(zip(self.frames, self._own, strict=True)):
+            found = self.finger_loads(i, twists)
+            reached &= found.reached
+            shears[:, own] = found.shears
+            tensions[:, i] = found.tensions[:, 0]
+            laterals[:, own] = self.lateral_loads(i, twists)
+            phalanges = own[-len(PHALANGES) :]
+            normals[:, phalanges] = found.normals
+            positions[:, phalanges] = (
+                frame.joint + found.points[..., :1] * frame.along + found.points[..., 1:] * UP
+            )
+            u = found.directions
+            axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * UP)
+            axes[:, phalanges, 1] = u[..., :1] * UP - u[..., 1:] * frame.along
+            torques.append(found.stop_torques)
+        palm = self.palm_loads(twists)
+        return HandLoads(
+            shears=shears,
+            normals=normals,
+            laterals=laterals,
+            tensions=tensions,
+            stop_torques=self._pushing(torques, m),
+            palm=np.where(palm.real > NOTHING, palm, 0.0 * palm),
+            positions=positions,
+            axes=axes,
+            reached=reached,
+        )
+
+    def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
+        """Return the loads of one finger in its plane at some twists of the wrist."""
+        x, z, turned, base_slip = self._base(i, twists[:, :3], twists[:, 3:])
+        return self.fingers[i].loads(x, z, turned, base_slip)
+
+    def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
+        """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
+        v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
+        places = self.settled.positions[self.tiles_of(i)]
+        # b · (v + ω × p + ω × (ω × p) / 2) for all places p at once
+        first = (v @ across)[:, None] + turn @ np.cross(places, across).T
+        square = (turn * turn).sum(axis=1)[:, None]
+        second = (turn @ across)[:, None] * (turn @ places.T) - square * (places @ across)
+        return np.asarray((first + 0.5 * second) @ self._across[i].T)
+
+    def tiles_of(self, i: int) -> Indices:
+        """Return the tiles of a finger."""
+        return self._own[i]
+
+    def _base(self, i: int, v: Numbers, turn: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """Return how the base of a finger moves in its plane, and its base tile along the rock."""
+        frame = self.frames[i]
+        moved = _moved(frame.joint, v, turn)
+        base = self.settled.positions[self._own[i][0]]
+        slip = -(_moved(base, v, turn) @ frame.along)
+        # from x toward z is against the sense of the axis across, z × x
+        return moved @ frame.along, moved[:, 2], -(turn @ frame.across), slip
+
+    def _pushing(self, torques: Sequence[Numbers], m: int) -> Numbers:
+        """Return the torques on stops, positive where they are pushed."""
+        pushing = [
+            torques[i][:, j]
+            * (1.0 if self.settled.fingers[i].contacts[j].stop == "upper" else -1.0)
+            for i, j, _ in self.settled.stops
+        ]
+        return np.stack(pushing, axis=-1) if pushing else np.zeros((m, 0), dtype=torques[0].dtype)
+
+    def palm_loads(self, twists: Numbers) -> Numbers:
+        """Return what the palm's shear and pressing would be as two-sided springs, (m, 2) [N].
+
+        Negative where the palm moves away and so carries nothing.
+        """
+        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
+        shear = -self.palm_shear_stiffness * moved[:, 0]
+        return np.stack([shear, self.palm_pressing_stiffness * moved[:, 2]], axis=-1)
+
+    def wrenches(self, loads: HandLoads) -> Numbers:
+        """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""
+        forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
+        moments = np.cross(loads.positions, forces).sum(axis=1)
+        shear, pressing = loads.palm[:, 0], loads.palm[:, 1]
+        palm = np.stack([-shear, 0.0 * shear, pressing], axis=-1)
+        return np.concatenate(
+            [forces.sum(axis=1) + palm, moments + np.cross(self.settled.palm.centre, palm)], axis=1
+        )
+
+    def stiffness(self, twist: ArrayLike | None = None) -> Array:
+        """Return K_g = ∂w_g/∂x_g (Eq. 11) at a twist of the wrist, shape (6, 6).
+
+        By complex steps: exact but for rounding. At a kink, of one of its sides.
+        """
+        at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
+        loads = self.loads(at + 1j * STEP * np.eye(6))
+        return np.asarray(self.wrenches(loads).imag.T / STEP)
+
+
+def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:
+    """Return how far a place moves with the wrist, to second order in its turn, shape (m, 3)."""
+    # ω × p, and ω × (ω × p) = ω (ω · p) − p (ω · ω)
+    first = turn @ skew(place)
+    square = (turn * turn).sum(axis=1)[:, None]
+    return np.asarray(v + first + 0.5 * ((turn @ place)[:, None] * turn - square * place))
+
+
+def _preload(preload: ArrayLike | None, settled: SettledHand) -> Array:
+    if preload is None:
+        return np.full(len(FINGERS), settled.closing_tension)
+    tensions = np.asarray(preload, dtype=float)
+    most = settled.hand.maximum_tension
+    if tensions.shape != (len(FINGERS),) or not ((tensions >= 0.0) & (tensions <= most)).all():
+        raise InvalidInputError(
+            f"four tensions from 0 to {most:g} N are needed, got {tensions.tolist()}",
+            field="tendon_preload",
+        )
+    return tensions

@@ -1,0 +1,232 @@
+"""How far a compliant grasp can be loaded in a direction: successive linear programs.
+
+The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses of the
+wrist at which nothing lets go. About a pose everything is linear: a linear program over a small box
+gives the next pose, and the box grows or shrinks with how well the program foretold what happened.
+Near the maximum, which is most often a corner of as many limits as the pose has components, the
+poses converge quadratically. The set is not convex: the maximum is a local one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+
+from hand_models.base import Array, EmptySetError, SolverError
+from hand_models.compliance.grasp import CompliantGrasp, Evaluation
+from hand_models.wrench_spaces import Row, WrenchSpace
+
+__all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
+
+UNITS: Final = {"v": 1e-3, "w": 1e-2}
+"""By which displacements and turns of a wrist are measured [m, rad]."""
+
+FIRST_BOX: Final = 1.0
+LARGEST_BOX: Final = 4.0
+SMALLEST_BOX: Final = 1e-9
+"""Half width of the box about a pose, in `UNITS`: at first, at most, and when to end."""
+
+ROUNDS: Final = 50
+WEIGHTS: Final = (1e3, 1e4, 1e5)
+"""What a limit exceeded by the whole of its capacity counts, in units of d · w: the next if the
+last left one exceeded."""
+
+CLOSE: Final = 1e-6
+"""Promise of a linear program at which the poses have converged, relative to the objective."""
+
+KEPT: Final = 1e-5
+"""By what share of its capacity a limit may be exceeded at the pose found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Farthest:
+    """Where a grasp lets go in a direction.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (d,)
+        Pose of the wrist [m, rad].
+    wrench : ndarray, shape (6,)
+        On the rock there [N, N·m].
+    reach : float
+        d · w.
+    limiting : Row or None
+        The limit that is nearest; None if hard rows alone end the way.
+    rounds : int
+        Linear programs solved.
+    """
+
+    twist: Array
+    wrench: Array
+    reach: float
+    limiting: Row | None
+    rounds: int
+
+
+def pose_units(columns: tuple[str, ...]) -> Array:
+    """Return by what each component of a pose is measured, from its name [m, rad]."""
+    return np.array([UNITS[name.split("/")[1][0]] for name in columns])
+
+
+def farthest(
+    grasp: CompliantGrasp,
+    direction: ArrayLike,
+    start: ArrayLike | None = None,
+    below: tuple[Array, Array] | None = None,
+) -> Farthest:
+    """Return the wrench farthest in a direction at which nothing lets go.
+
+    Parameters
+    ----------
+    grasp : CompliantGrasp
+    direction : array_like, shape (6,)
+        d.
+    start : array_like, shape (d,), optional
+        Pose to begin at; rest by default.
+    below : tuple of ndarray, shapes (k, 6) and (k,), optional
+        (G, g): only wrenches with G w ≤ g.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near the way taken holds.
+    SolverError
+        If a linear program fails.
+    """
+    d = np.asarray(direction, dtype=float)
+    units = pose_units(grasp.linearised(start).columns)
+    at = np.zeros(len(units)) if start is None else np.asarray(start, dtype=float)
+    rounds, excess = 0, np.inf
+    for weight in WEIGHTS:
+        at, found, taken = _climb(grasp, d, at, units, below, weight)
+        rounds += taken
+        excess = _excess(found, below)
+        if excess <= KEPT:
+            break
+    if excess > KEPT:
+        # the nearest that holds
+        at, found, taken = _climb(grasp, np.zeros(6), at, units, below, WEIGHTS[-1])
+        rounds += taken
+        excess = _excess(found, below)
+    if excess > KEPT:
+        raise EmptySetError(
+            "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
+            f"{100.0 * excess:.2g} %"
+        )
+    verdict = found.verdict
+    binding = float(verdict.utilisation[0]) >= 1.0 - KEPT
+    return Farthest(
+        twist=at,
+        wrench=found.wrenches[0],
+        reach=float(d @ found.wrenches[0]),
+        limiting=grasp.limits[int(verdict.limiting[0])] if binding else None,
+        rounds=rounds,
+    )
+
+
+def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, float]:
+    """Return the pose of a linearised set with the largest d · w, and that; None, −∞ if empty.
+
+    Raises
+    ------
+    SolverError
+        If the linear program fails.
+    """
+    units = pose_units(space.columns)
+    result = linprog(
+        -(direction @ space.generators) * units,
+        A_ub=space.A * units,
+        b_ub=space.b,
+        bounds=[(None, None)] * len(units),
+        method="highs",
+    )
+    if result.status == 2:
+        return None, -np.inf
+    if result.status != 0 or result.x is None:
+        raise SolverError(f"extreme of a linearised set: {result.message}")
+    pose = result.x * units
+    return pose, float(direction @ space.wrench(pose))
+
+
+def _climb(
+    grasp: CompliantGrasp,
+    d: Array,
+    at: Array,
+    units: Array,
+    below: tuple[Array, Array] | None,
+    weight: float,
+) -> tuple[Array, Evaluation, int]:
+    """Follow linear programs from a pose until they promise nothing more; also their number."""
+    space = grasp.linearised(at)
+    found = grasp.evaluate(at[None])
+    merit = _merit(found, d, below, weight)
+    box, rounds = FIRST_BOX, 0
+    while rounds < ROUNDS and box > SMALLEST_BOX:
+        rounds += 1
+        step, foretold = _step(space, d, at, box * units, units, below, weight)
+        promised = foretold - merit
+        if promised <= CLOSE * max(1.0, abs(merit)):
+            break
+        there = grasp.evaluate((at + step)[None])
+        gained = _merit(there, d, below, weight) - merit
+        size = float(np.abs(step / units).max())
+        if gained <= 0.0:
+            box = 0.25 * min(box, size)
+            continue
+        if gained > 0.75 * promised:
+            box = min(2.0 * max(box, size), LARGEST_BOX)
+        at, found, merit = at + step, there, merit + gained
+        space = grasp.linearised(at)
+    return at, found, rounds
+
+
+def _excess(found: Evaluation, below: tuple[Array, Array] | None) -> float:
+    """Return by what share a limit is exceeded, or a hard row in newtons; the most of all."""
+    verdict = found.verdict
+    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]), 0.0)
+    if below is not None:
+        G, g = below
+        excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))
+    return excess
+
+
+def _merit(found: Evaluation, d: Array, below: tuple[Array, Array] | None, weight: float) -> float:
+    """Return d · w less what is exceeded."""
+    excess = _excess(found, below)
+    return float(d @ found.wrenches[0]) - weight * excess if np.isfinite(excess) else -np.inf
+
+
+def _step(
+    space: WrenchSpace,
+    d: Array,
+    at: Array,
+    half_widths: Array,
+    units: Array,
+    below: tuple[Array, Array] | None,
+    weight: float,
+) -> tuple[Array, float]:
+    """Return the best step within a box by the linear model, and the merit that it foretells."""
+    # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
+    rows = [space.L / space.s[:, None], space.H]
+    most: list[Array] = [np.asarray(1.0 - space.l0 / space.s), space.h]
+    if below is not None:
+        G, g = below
+        rows.append(np.asarray(G @ space.generators))
+        most.append(np.asarray(g - G @ space.origin))
+    A: Array = np.vstack(rows)
+    b: Array = np.concatenate(most) - A @ at
+    gain = d @ space.generators
+    result = linprog(
+        np.append(-gain * units, weight),
+        A_ub=np.column_stack([A * units, -np.ones(len(b))]),
+        b_ub=b,
+        bounds=[*zip(-half_widths / units, half_widths / units, strict=True), (0.0, None)],
+        method="highs",
+    )
+    if result.status != 0 or result.x is None or result.fun is None:
+        raise SolverError(f"farthest: {result.message}")
+    return result.x[:-1] * units, float(d @ space.wrench(at)) - float(result.fun)

@@ -1,0 +1,208 @@
+"""Where the poses of a compliant grasp's wrist are searched: a box in axes of its own.
+
+The axes are those of the ellipsoid about the set linearised at rest, and the range along each is
+that set's, or grows and shrinks with sparse grids until it just covers the poses that hold (the
+reduction of the search space of Fig. 9).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import linprog
+
+from hand_models.base import Array, EmptySetError, SolverError
+from hand_models.compliance.directional_limit import pose_units
+from hand_models.compliance.grasp import CompliantGrasp
+from hand_models.wrench_spaces import WrenchSpace
+
+__all__ = ["SearchBox", "linear_box", "search_box"]
+
+SPARSE: Final = {3: 13, 6: 5}
+"""Poses per axis of the grids that find the range, by how many axes there are."""
+
+RESIZES: Final = 6
+"""How often the range is adapted at most."""
+
+RECENTRINGS: Final = 6
+"""How often the set is linearised anew at most, until its middle holds."""
+
+NEWTON_STEPS: Final = 50
+
+FARTHEST: Final = 20.0
+"""How far motions are looked at that no limit ends, such as those that load nothing, in
+`pose_units`."""
+
+NEAR: Final = 1e-3
+"""Newton decrement of a middle that is good enough where rounding keeps it from being better."""
+
+SINGULAR: Final = 1e12
+"""Condition from which on a matrix of second derivatives counts as singular."""
+
+NOTHING_HOLDS: Final = "no pose of the wrist near rest holds: the preload alone breaks a limit"
+
+
+@dataclass(frozen=True, eq=False)
+class SearchBox:
+    """Poses ``centre + axes · t`` with |t_i| ≤ range_i.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (d,)
+        A pose that holds [m, rad].
+    axes : ndarray, shape (d, d)
+        A column for each axis [m, rad].
+    range : ndarray, shape (d,)
+    """
+
+    centre: Array
+    axes: Array
+    range: Array
+
+    def poses(self, t: Array) -> Array:
+        """Return poses of coordinates t, shape (m, d)."""
+        return np.asarray(self.centre + t @ self.axes.T)
+
+    def grid(self, per_axis: int, start: int, end: int) -> Array:
+        """Return coordinates of the grid's poses from one number to another, shape (m, d)."""
+        d = len(self.centre)
+        numbers = np.unravel_index(np.arange(start, end), (per_axis,) * d)
+        steps = np.stack(numbers, axis=-1) * (2.0 / (per_axis - 1)) - 1.0
+        return np.asarray(steps * self.range)
+
+
+def linear_box(grasp: CompliantGrasp) -> SearchBox:
+    """Return the ellipsoid about the set linearised at rest, its range that set's.
+
+    Where neither its centre nor rest holds, it is linearised at the centre again.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near rest holds.
+    """
+    at = np.zeros(len(grasp.linearised().columns))
+    for _ in range(RECENTRINGS):
+        space, centre, axes = _ellipsoid(grasp, at)
+        holds = grasp.evaluate(np.stack([centre, at])).verdict.holds
+        if holds.any():
+            at = centre if holds[0] else at
+            return SearchBox(at, axes, _range(space, at, axes))
+        at = centre
+    raise EmptySetError(NOTHING_HOLDS)
+
+
+def search_box(grasp: CompliantGrasp) -> SearchBox:
+    """Return where to search: the ellipsoid about the linearised set, its range by sparse grids.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near rest holds.
+    """
+    box = linear_box(grasp)
+    centre = box.centre
+    per_axis = SPARSE[len(centre)]
+    # odd grids: the middle is among their poses, and it holds
+    for _ in range(RESIZES):
+        t = box.grid(per_axis, 0, per_axis ** len(centre))
+        t = t[grasp.sieve(box.poses(t))]
+        held = t[grasp.evaluate(box.poses(t)).verdict.holds]
+        step = 2.0 * box.range / (per_axis - 1)
+        outermost = np.abs(held).max(axis=0)
+        # a layer more than holds: outward while the outermost holds, inward where none does
+        wanted = np.minimum(outermost + step, 1.5 * box.range)
+        settled = bool((np.abs(wanted - box.range) <= 0.5 * step).all())
+        box = SearchBox(box.centre, box.axes, wanted)
+        if settled:
+            break
+    return box
+
+
+def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Array]:
+    """Return the set linearised at a pose, its analytic centre and Dikin ellipsoid's axes.
+
+    A set that no limit ends in some direction is kept within `FARTHEST`.
+
+    Raises
+    ------
+    EmptySetError
+        If there is no point inside.
+    """
+    space = grasp.linearised(at)
+    units = pose_units(space.columns)
+    found = _analytic_centre(space.A * units, space.b)
+    if found is None:
+        space = grasp.linearised(at, within=FARTHEST * units)
+        found = _analytic_centre(space.A * units, space.b)
+    if found is None:
+        raise SolverError("search: the middle of the linearised set was not found")
+    y, hessian = found
+    lengths, directions = np.linalg.eigh(hessian)
+    return space, y * units, units[:, None] * directions / np.sqrt(lengths)
+
+
+def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
+    """Return the y with the least −Σ log(b − A y) and its second derivatives; None without a least.
+
+    By damped Newton steps from the centre of the largest ball inside; every row counts alike.
+
+    Raises
+    ------
+    EmptySetError
+        If there is no point inside.
+    """
+    size = np.linalg.norm(A, axis=1)
+    if (b[size == 0.0] < 0.0).any():
+        raise EmptySetError(NOTHING_HOLDS)
+    keep = size > 0.0
+    A, b = A[keep] / size[keep, None], b[keep] / size[keep]
+    d = A.shape[1]
+    result = linprog(
+        np.append(np.zeros(d), -1.0),
+        A_ub=np.column_stack([A, np.ones(len(b))]),
+        b_ub=b,
+        bounds=[(None, None)] * d + [(None, 1e3)],
+        method="highs",
+    )
+    if result.status != 0 or result.x is None:
+        raise SolverError(f"search: {result.message}")
+    if not result.x[-1] > 0.0:
+        raise EmptySetError(NOTHING_HOLDS)
+    y, hessian, decrement = result.x[:-1], np.eye(d), np.inf
+    for _ in range(NEWTON_STEPS):
+        gap = b - A @ y
+        gradient = A.T @ (1.0 / gap)
+        hessian = (A / gap[:, None] ** 2).T @ A
+        if not np.linalg.cond(hessian) < SINGULAR:
+            return None
+        step = -np.linalg.solve(hessian, gradient)
+        decrement = math.sqrt(max(-float(gradient @ step), 0.0))
+        y = y + step / (1.0 + decrement)
+        if decrement < 1e-9:
+            break
+    return (y, hessian) if decrement < NEAR else None
+
+
+def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
+    """Return how far the linearised set reaches along each axis from the centre."""
+    A, b = space.A @ axes, space.b - space.A @ centre
+    reach = []
+    for i in range(len(centre)):
+        ends = []
+        for sign in (1.0, -1.0):
+            result = linprog(
+                -sign * np.eye(len(centre))[i],
+                A_ub=A,
+                b_ub=b,
+                bounds=[(None, None)] * len(centre),
+                method="highs",
+            )
+            if result.status != 0 or result.fun is None:
+                raise SolverError(f"search: {result.message}")
+            ends.append(-float(result.fun))
+        reach.append(max(ends))
+    return np.array(reach)

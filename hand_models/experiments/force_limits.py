@@ -1,0 +1,331 @@
+"""How much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
+
+Signs are the paper's. A limit is a linear program over the points of which the hull is made; its
+multipliers tell in which direction a farther point would raise it, and there a point is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from scipy.optimize import brentq, linprog
+
+from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, SolverError
+from hand_models.compliance import (
+    PLANAR,
+    Farthest,
+    Gripper,
+    boundary,
+    farthest,
+    pulled_off,
+    sandpaper,
+    search_box,
+)
+from hand_models.experiments.wrench_hull import PULL_OFF, cut, in_paper_signs, volume
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.tile import Surface
+from hand_models.wrench_spaces import Row
+
+__all__ = [
+    "MEASURES",
+    "PARAMETER_STUDIES",
+    "SANDPAPER",
+    "HullPoints",
+    "Limit",
+    "Measure",
+    "State",
+    "force_limits",
+    "limit",
+    "rest_state",
+    "sharpened",
+    "surface_named",
+    "unloaded_pose",
+]
+
+Measure = Literal["shear", "normal", "moment", "volume"]
+State = Literal["holds", "contact fails", "ejects"]
+
+MEASURES: Final[dict[Measure, str]] = {
+    "shear": "N",
+    "normal": "N",
+    "moment": "N·m",
+    "volume": "N³·m",
+}
+"""Units of what is measured of the part of a hull with F_z ≤ 0.
+
+``shear`` is the largest F_x in the loading plane, the printed ratio of F_x to M_y; ``normal`` the
+largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y.
+"""
+
+PARAMETER_STUDIES: Final = "parameter_studies"
+"""Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
+
+SANDPAPER: Final = "sandpaper-36"
+"""The preset in whose place stands what the gripper's experiments tell of the same sandpaper."""
+
+MIRRORED: Final = np.array([-1.0, 1.0, -1.0])
+"""Of a pose or a wrench, when left and right change places."""
+
+CUTS: Final = 12
+"""How many points are added for one limit at most."""
+
+GAIN: Final = 1e-3
+"""What a new point must promise to be worth another, relative to the limit."""
+
+STEPS: Final = 101
+"""Poses on the way back from the rock at which the fingers' push is looked at first."""
+
+
+@dataclass(frozen=True, eq=False)
+class HullPoints:
+    """Wrenches at poses of the wrist at which every tile holds, each beside its mirror image.
+
+    Attributes
+    ----------
+    wrenches : ndarray, shape (n, 3)
+        F_x, F_z, M_y in the paper's signs [N, N, N·m].
+    poses : ndarray, shape (n, 3)
+        [m, rad].
+    phalanges : tuple of (str or None), length n
+        Whose contact fails there first; None where a tile is about to be dragged backwards.
+    """
+
+    wrenches: Array
+    poses: Array
+    phalanges: tuple[str | None, ...]
+
+    @classmethod
+    def explored(cls, grasp: Gripper, rays: int) -> HullPoints:
+        """Follow rays from the middle of the poses that hold.
+
+        Raises
+        ------
+        EmptySetError
+            If no pose near rest holds.
+        """
+        found = boundary(grasp, search_box(grasp), rays)
+        points = cls(np.zeros((0, 3)), np.zeros((0, 3)), ())
+        return points.joined(in_paper_signs(found.wrenches), found.poses, found.limiting)
+
+    def joined(self, wrenches: Array, poses: Array, limiting: Sequence[Row | None]) -> HullPoints:
+        """Return these points, and some more with their mirror images."""
+        phalanges = tuple(None if row is None else row.phalanx for row in limiting)
+        return HullPoints(
+            np.vstack([self.wrenches, wrenches, wrenches * MIRRORED]),
+            np.vstack([self.poses, poses, poses * MIRRORED]),
+            self.phalanges + phalanges + phalanges,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """The farthest wrench of a hull in the sense of a measure.
+
+    Attributes
+    ----------
+    value : float
+        Of the measure.
+    wrench : ndarray, shape (3,)
+        In the paper's signs.
+    direction : ndarray, shape (3,)
+        A wrench farther in it than every point would raise the limit.
+    corners : ndarray of int
+        Of the points, those between which the wrench lies.
+    weights : ndarray
+        Of the corners; their sum is 1.
+    """
+
+    value: float
+    wrench: Array
+    direction: Array
+    corners: Indices
+    weights: Array
+
+
+def surface_named(name: str, table: ParameterTable) -> Surface:
+    """Return what a tile of the gripper holds on a surface of ``surfaces.toml``.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is none of that name.
+    """
+    if name == SANDPAPER:
+        return sandpaper(table)
+    try:
+        return pulled_off(Surface.named(name), table)
+    except InvalidInputError as error:
+        raise error.within("surface") from None
+
+
+def limit(points: Array, measure: Measure) -> Limit:
+    """Return how far the hull of some wrenches goes.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        In the paper's signs.
+    measure : {'shear', 'normal', 'moment'}
+
+    Raises
+    ------
+    EmptySetError
+        If no wrench of the hull is in question.
+    """
+    if measure == "normal":
+        goal, planes = np.array([0.0, -1.0, 0.0]), np.zeros((0, 3))
+    elif measure == "moment":
+        goal, planes = np.array([0.0, 0.0, 1.0]), np.zeros((0, 3))
+    else:
+        ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
+        goal, planes = np.array([1.0, 0.0, 0.0]), np.array([[1.0, 0.0, -ratio]])
+    result = linprog(
+        -points @ goal,
+        A_eq=np.vstack([planes @ points.T, np.ones(len(points))]),
+        b_eq=np.append(np.zeros(len(planes)), 1.0),
+        A_ub=(points @ PULL_OFF)[None],
+        b_ub=[0.0],
+        method="highs",
+    )
+    if result.status == 2:
+        raise EmptySetError(f"no wrench of the hull to measure its {measure} by")
+    if result.status != 0 or result.x is None or result.fun is None:
+        raise SolverError(f"limit: {result.message}")
+    corners = np.flatnonzero(result.x > 0.0)
+    return Limit(
+        value=-float(result.fun),
+        wrench=result.x @ points,
+        direction=goal
+        + result.eqlin.marginals[:-1] @ planes
+        + result.ineqlin.marginals[0] * np.array(PULL_OFF),
+        corners=corners,
+        weights=result.x[corners],
+    )
+
+
+def sharpened(
+    grasp: Gripper, points: HullPoints, measure: Measure, cuts: int = CUTS, starts: int = 1
+) -> tuple[HullPoints, Limit]:
+    """Add points until the hull goes as far as local search finds, and return how far that is.
+
+    The search begins at the point farthest in the direction that matters.
+
+    Parameters
+    ----------
+    grasp : Gripper
+    points : HullPoints
+    measure : {'shear', 'normal', 'moment'}
+    cuts : int
+        How many points are added at most.
+    starts : int
+        At how many points the search begins at most: where that one leads nowhere, at the farthest
+        points at which other phalanges fail.
+
+    Raises
+    ------
+    EmptySetError
+        If no wrench of the hull is in question.
+    """
+    found = limit(points.wrenches, measure)
+    for _ in range(cuts):
+        farther = _farther(grasp, points, found, starts)
+        if farther is None:
+            break
+        points = points.joined(
+            in_paper_signs(farther.wrench[None]), farther.twist[None], (farther.limiting,)
+        )
+        found = limit(points.wrenches, measure)
+    return points, found
+
+
+def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> Farthest | None:
+    """Return a wrench that raises a limit by more than it is worth, if one is found."""
+    reached = points.wrenches @ found.direction
+    direction = np.zeros(6)
+    # to the contract's signs, whose M_y is minus the paper's
+    direction[list(PLANAR)] = found.direction * (1.0, 1.0, -1.0)
+    first: dict[str | None, int] = {}
+    for i in np.argsort(-reached, kind="stable"):
+        first.setdefault(points.phalanges[i], int(i))
+    for start in list(first.values())[:starts]:
+        try:
+            end = farthest(grasp, direction, points.poses[start])
+        except EmptySetError:
+            continue
+        if end.reach - reached.max() > GAIN * abs(found.value):
+            return end
+    return None
+
+
+def force_limits(
+    grasp: Gripper, rays: int, measures: Sequence[Measure], cuts: int = CUTS, starts: int = 1
+) -> dict[Measure, float]:
+    """Return how far a gripper's hull goes, by measure.
+
+    Parameters
+    ----------
+    grasp : Gripper
+    rays : int
+        Of the first, coarse hull.
+    measures : sequence of str
+        Of `MEASURES`, whose units apply.
+    cuts, starts : int
+        For each, as of `sharpened`.
+
+    Raises
+    ------
+    EmptySetError
+        If nothing holds.
+    """
+    points = HullPoints.explored(grasp, rays)
+    found: dict[Measure, float] = {}
+    for measure in measures:
+        if measure == "volume":
+            continue
+        points, end = sharpened(grasp, points, measure, cuts, starts)
+        found[measure] = end.value
+    if "volume" in measures:
+        below = cut(points.wrenches)
+        found["volume"] = volume(below) if len(below) else 0.0
+    return found
+
+
+def rest_state(grasp: Gripper) -> State:
+    """Return what closing the fingers alone does, before any external load.
+
+    ``ejects``: the fingers push the wrist off the rock, and there is no pose at which they cease to
+    with every tile holding: the gripper cannot rest unloaded. ``contact fails``, otherwise: with
+    the wrist where it is (Section 5.5.1), or where it would rest unloaded, a tile is loaded beyond
+    its limit or dragged backwards.
+    """
+    at_rest = grasp.evaluate(np.zeros((1, 3)))
+    held, pushed = bool(at_rest.verdict.holds[0]), float(at_rest.wrenches[0, 2]) > 0.0
+    pose = unloaded_pose(grasp)
+    rests = pose is not None and bool(grasp.evaluate(pose[None]).verdict.holds[0])
+    if pushed and not rests:
+        return "ejects"
+    return "holds" if held and rests else "contact fails"
+
+
+def unloaded_pose(grasp: Gripper) -> Array | None:
+    """Return the pose nearest to rest, straight off the rock or toward it, of no wrench.
+
+    By symmetry only F_z is to vanish. None if it does not within the printed shift of the base, or
+    only where a phalanx has lost the rock.
+    """
+    far = experiment_table().scalar(PARAMETER_STUDIES, "base_shift")
+
+    def push(z: float) -> float:
+        return float(grasp.evaluate(np.array([[0.0, z, 0.0]])).wrenches[0, 2])
+
+    way = -np.sign(push(0.0)) * np.linspace(0.0, far, STEPS)
+    pushes = grasp.evaluate(np.column_stack([0.0 * way, way, 0.0 * way])).wrenches[:, 2]
+    crossed = np.flatnonzero(pushes[:-1] * pushes[1:] <= 0.0)
+    lost = np.flatnonzero(~np.isfinite(pushes))
+    if not len(crossed) or (len(lost) and lost[0] <= crossed[0]):
+        return None
+    root = brentq(push, way[crossed[0]], way[crossed[0] + 1])
+    return np.array([0.0, float(root), 0.0])

@@ -1,0 +1,82 @@
+"""The palm experiments of Section 4.2: springs for contacts, a hard stop on the softest.
+
+The stop's travel is not printed. Everything is proportional to it, so loads are given per metre of
+it; a gain by friction does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.tendon import share_load
+
+__all__ = ["PalmExperiment"]
+
+
+@dataclass(frozen=True)
+class PalmExperiment:
+    """What does not change from one configuration of springs to the next.
+
+    Attributes
+    ----------
+    springs : tuple of float
+        Contact stiffness of springs 1, 2, 3 [N/m].
+    preload_stiffness : float
+        k_p [N/m].
+    friction : float
+        μ of pulleys that are fixed rods.
+    """
+
+    springs: tuple[float, ...]
+    preload_stiffness: float
+    friction: float
+
+    @classmethod
+    def from_tables(cls, hand: ParameterTable) -> PalmExperiment:
+        """Take the springs from ``experiments.toml``, the palm from a hand's table."""
+        return cls(
+            springs=experiment_table().vector("load_sharing", "contact_springs"),
+            preload_stiffness=hand.scalar("palm", "spring_stiffness"),
+            friction=hand.scalar("palm", "pulley_friction"),
+        )
+
+    def with_preload(self, stiffness: float) -> PalmExperiment:
+        """Return the experiment with another k_p [N/m]."""
+        return replace(self, preload_stiffness=stiffness)
+
+    def load(self, sequence: Sequence[int], friction: float, own_friction: float = 0.0) -> float:
+        """Return the palm's load when the first of its softest contacts is at its stop.
+
+        Parameters
+        ----------
+        sequence : sequence of int
+            Numbers of the springs from the left, from 1.
+        friction, own_friction : float
+            At the tiles' pulleys, and at the palm's own.
+
+        Returns
+        -------
+        float
+            Per metre of the stop's travel [N/m].
+        """
+        stiffness = [self.springs[number - 1] for number in sequence]
+        sharing = share_load(stiffness, self.preload_stiffness, friction, own_friction)
+        softest = np.array(stiffness) == min(stiffness)
+        return float(sharing.tile_stiffness.sum() / sharing.tile_travel[softest].max())
+
+    def gain(self, sequence: Sequence[int], own: bool = False) -> float:
+        """Return what rods in place of bearings do to the load, relative to bearings everywhere.
+
+        Parameters
+        ----------
+        sequence : sequence of int
+            As of `load`.
+        own : bool, optional
+            Whether the palm's own pulleys are rods too.
+        """
+        with_rods = self.load(sequence, self.friction, self.friction if own else 0.0)
+        return with_rods / self.load(sequence, 0.0) - 1.0

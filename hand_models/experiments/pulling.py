@@ -1,0 +1,216 @@
+"""A planar gripper loaded along directions of the wrench until a tile lets go (Section 5.5.2).
+
+The pose of the wrist follows the load in small increments, each solved by Newton steps on exact
+stiffnesses (Section 5.4.2). Where the hull of a wrench space fills the hollows of the set, this
+finds the set's own boundary, and what fails there. Wrenches are (F_x, F_z, M_y) in the paper's
+signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, EmptySetError, Indices
+from hand_models.compliance import SIDES, STEP, Gripper, Numbers
+from hand_models.experiments.wrench_hull import UNITS, in_paper_signs
+from hand_models.finger import PHALANGES
+
+__all__ = ["DRAGGED", "UNBALANCED", "Pulled", "even_pulls", "pull", "unloaded", "wrist_poses"]
+
+DRAGGED: Final = "dragged_backwards"
+UNBALANCED: Final = "no_pose"
+"""How a load ends, where not at a tile's limit: a tile is without shear, or nothing balances."""
+
+NEWTON_STEPS: Final = 12
+"""For each increment of the load, at most."""
+
+BALANCED: Final = 1e-8
+"""Largest part of a wrench that a pose may leave over [N]."""
+
+INCREMENT: Final = 1.0
+"""Of the load along each direction; halved where the next load does not hold [N]."""
+
+FINEST: Final = 2.0**-7
+"""Increment at which a direction is done [N]."""
+
+LARGEST: Final = 1e4
+"""Load at which a direction is given up [N]."""
+
+GOLDEN: Final = np.pi * (3.0 - np.sqrt(5.0))
+"""Golden angle, by which points of a spiral spread evenly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """Where a gripper lets go.
+
+    Attributes
+    ----------
+    wrenches : ndarray, shape (m, 3)
+        The last that hold [N, N, N·m].
+    poses : ndarray, shape (m, 3)
+        Of the wrist there, (x, z, ω_y) [m, rad].
+    side, phalanx : tuple of (str or None), length m
+        The tile that fails; None where no pose balances the next load.
+    way : tuple of str, length m
+        The name of the tile's limit, or ``dragged_backwards``, or ``no_pose``.
+    """
+
+    wrenches: Array
+    poses: Array
+    side: tuple[str | None, ...]
+    phalanx: tuple[str | None, ...]
+    way: tuple[str, ...]
+
+
+def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array, Array]:
+    """Return the poses at which a gripper exerts some wrenches on the rock, by Newton steps.
+
+    Parameters
+    ----------
+    gripper : Gripper
+    wrenches : ndarray, shape (m, 3)
+    start : ndarray, shape (m, 3)
+        Poses to begin at, near the solutions.
+
+    Returns
+    -------
+    poses : ndarray, shape (m, 3)
+    residual : ndarray, shape (m,)
+        Largest part of each wrench that is left over; not a number where a phalanx lost its rock
+        [N].
+    """
+    poses, m = start.copy(), len(start)
+    steps = 1j * STEP * np.eye(3)
+    with np.errstate(invalid="ignore"):
+        for _ in range(NEWTON_STEPS):
+            moved = (poses[:, None, :] + steps).reshape(-1, 3)
+            found = _wrenches(gripper, moved).reshape(m, 3, 3)
+            left = found[:, 0].real - wrenches
+            residual = np.abs(left * UNITS).max(axis=1)
+            # tiny steps move no real part: all three rows have the wrench itself
+            stiffness = found.imag.swapaxes(1, 2) / STEP
+            going = (residual > BALANCED) & (np.abs(np.linalg.det(stiffness)) > 0.0)
+            if not going.any():
+                break
+            poses[going] -= np.linalg.solve(stiffness[going], left[going, :, None])[..., 0]
+        left = _wrenches(gripper, poses) - wrenches
+    return poses, np.asarray(np.abs(left * UNITS).max(axis=1))
+
+
+def unloaded(gripper: Gripper) -> Array:
+    """Return the pose of a closed gripper that nothing loads, shape (3,) [m, rad].
+
+    Raises
+    ------
+    EmptySetError
+        If it does not hold itself.
+    """
+    poses, residual = wrist_poses(gripper, np.zeros((1, 3)), np.zeros((1, 3)))
+    if not (residual[0] <= BALANCED and gripper.evaluate(poses).verdict.holds[0]):
+        raise EmptySetError("the gripper lets go before any load: closing alone is too much")
+    return np.asarray(poses[0])
+
+
+def pull(
+    gripper: Gripper, directions: Array, progress: Callable[[Array], None] | None = None
+) -> Pulled:
+    """Load a gripper along directions of the wrench until something lets go.
+
+    Parameters
+    ----------
+    gripper : Gripper
+    directions : ndarray, shape (m, 3)
+        Of any length.
+    progress : callable, optional
+        Told which directions are done, as booleans of shape (m,), after each increment.
+
+    Raises
+    ------
+    EmptySetError
+        If it does not hold without load.
+    """
+    m = len(directions)
+    unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
+    poses = np.repeat(unloaded(gripper)[None], m, axis=0)
+    loads, increments = np.zeros(m), np.full(m, INCREMENT)
+    failing, ways = np.zeros(m, dtype=int), np.full(m, UNBALANCED, dtype=object)
+    going = np.ones(m, dtype=bool)
+    while going.any():
+        i = np.flatnonzero(going)
+        tried, residual = wrist_poses(
+            gripper, (loads[i] + increments[i])[:, None] * unit[i], poses[i]
+        )
+        found = gripper.evaluate(tried).verdict
+        balanced = residual <= BALANCED
+        holds = found.holds & balanced
+        poses[i[holds]] = tried[holds]
+        loads[i[holds]] += increments[i[holds]]
+        over = i[~holds]
+        failing[over], ways[over] = _failures(gripper, tried[~holds], balanced[~holds])
+        increments[over] *= 0.5
+        going[over] = increments[over] >= FINEST
+        going &= loads < LARGEST
+        if progress is not None:
+            progress(~going)
+    tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+    fails = [
+        (None, None) if way == UNBALANCED else tiles[tile]
+        for tile, way in zip(failing, ways, strict=True)
+    ]
+    return Pulled(
+        wrenches=loads[:, None] * unit,
+        poses=poses,
+        side=tuple(side for side, _ in fails),
+        phalanx=tuple(phalanx for _, phalanx in fails),
+        way=tuple(ways),
+    )
+
+
+def _failures(
+    gripper: Gripper, poses: Array, balanced: NDArray[np.bool_]
+) -> tuple[Indices, NDArray[np.object_]]:
+    """Return which tile fails at some poses, right side first, and how."""
+    limits = gripper.limits
+    per_tile = len(limits) // (len(SIDES) * len(PHALANGES))
+    names = np.array([row.limit for row in limits], dtype=object)
+    shears = np.concatenate([side.shears for side in gripper.finger_loads(poses)], axis=1)
+    verdict = gripper.evaluate(poses).verdict
+    exceeded, rows = verdict.utilisation > 1.0, verdict.limiting
+    tiles = np.where(exceeded, rows // per_tile, shears.argmin(axis=1))
+    ways = np.where(exceeded, names[rows], DRAGGED)
+    return tiles, np.where(balanced, ways, UNBALANCED)
+
+
+def even_pulls(count: int, size: Array) -> Array:
+    """Return directions with F_z < 0, evenly spread where wrenches are measured by ``size``.
+
+    On a spiral over half of a half sphere, and the same mirrored, (F_x, M_y) → (−F_x, −M_y).
+
+    Parameters
+    ----------
+    count : int
+        About how many.
+    size : ndarray, shape (3,)
+        Wrenches that count alike.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+    """
+    k = np.arange(count)
+    height = (k + 0.5) / count
+    turn = GOLDEN * k
+    around = np.sqrt(1.0 - height**2)
+    spiral = np.column_stack([around * np.cos(turn), -height, around * np.sin(turn)])
+    half = spiral[spiral[:, 0] > 0.0]
+    return np.vstack([half, half * (-1.0, 1.0, -1.0)]) * size
+
+
+def _wrenches(gripper: Gripper, poses: Numbers) -> Numbers:
+    return in_paper_signs(gripper.wrenches(gripper.finger_loads(poses)))

@@ -1,0 +1,208 @@
+"""What a sweep varies and what it keeps: entries of the gripper's table, and the rock."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import InvalidInputError
+from hand_models.compliance import Gripper
+from hand_models.experiments.force_limits import PARAMETER_STUDIES, surface_named
+from hand_models.parameters import (
+    LARGEST,
+    ParameterTable,
+    Quantity,
+    experiment_table,
+    hand_table,
+    own_hand,
+)
+
+__all__ = ["CONCRETE", "Axis", "Conditions"]
+
+CONCRETE: Final = "concrete-fine"
+"""The surface of Figs. 15 and 16."""
+
+MOST_POINTS: Final = 201
+"""Of an axis."""
+
+IDLE: Final = frozenset({("tile", "contact_stiffness"), ("tile", "base_engagement")})
+"""Entries that are read and do nothing: the gripper has its own stiffnesses, and no base tile."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a gripper holds on to: diameter [m], both tendons' tension [N], and a surface's name."""
+
+    diameter: float
+    tension: float
+    surface: str = CONCRETE
+
+    @classmethod
+    def of_fig16(cls) -> tuple[Conditions, ...]:
+        """Return those of Fig. 16, surface A first."""
+        settings = experiment_table()
+        tension = settings.scalar("fig16", "tension")
+        return tuple(cls(d, tension) for d in settings.vector(PARAMETER_STUDIES, "diameters"))
+
+    def check(self, table: ParameterTable) -> None:
+        """Refuse a rock that no hand is made for, and a tension that the tendon does not bear.
+
+        Raises
+        ------
+        InvalidInputError
+            The field is the option that has the number.
+        """
+        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
+        if not least <= self.diameter <= most:
+            raise InvalidInputError(
+                f"must be from {least:g} to {most:g} m, got {self.diameter:g}", field="--diameter"
+            )
+        strongest = table.scalar("tendon", "maximum_tension")
+        if not 0.0 < self.tension <= strongest:
+            raise InvalidInputError(
+                f"must be above 0 and at most the tendon's {strongest:g} N, got {self.tension:g}",
+                field="--tension",
+            )
+
+    def gripper(self, table: ParameterTable) -> Gripper:
+        """Return a gripper of these numbers.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is out of range, there is no such surface, or the fingers do not lie on it.
+        """
+        if not (math.isfinite(self.tension) and self.tension > 0.0):
+            raise InvalidInputError(f"must be above 0 N, got {self.tension:g}", field="tension")
+        return Gripper(self.diameter, self.tension, surface_named(self.surface, table), table)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An entry of the gripper's table, and the values that it takes.
+
+    Attributes
+    ----------
+    section, name : str
+    index : int or None
+        Of a list's number.
+    values : tuple of float
+        Ascending, in SI units.
+    unit : str
+    """
+
+    section: str
+    name: str
+    index: int | None
+    values: tuple[float, ...]
+    unit: str
+
+    @property
+    def entry(self) -> str:
+        """Its name as a caller writes it."""
+        place = "" if self.index is None else f"[{self.index}]"
+        return f"{self.section}.{self.name}{place}"
+
+    @classmethod
+    def parse(cls, text: str, table: ParameterTable, surface: str) -> Axis:
+        """Read ``SECTION.NAME=LOW:HIGH:N``, or ``SECTION.NAME[i]=LOW:HIGH:N`` of a list.
+
+        Parameters
+        ----------
+        text : str
+            LOW and HIGH in SI units.
+        table : ParameterTable
+            The gripper's.
+        surface : str
+            What it holds on to, on which it depends which numbers it reads.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not of this form, the gripper reads no such number, or the number cannot have
+            such values.
+        """
+        entry, _, span = text.partition("=")
+        try:
+            ends, count = [float(end) for end in span.split(":")[:-1]], int(span.split(":")[-1])
+            low, high = ends
+        except ValueError:
+            raise InvalidInputError(
+                f"must be SECTION.NAME=LOW:HIGH:N or SECTION.NAME[i]=LOW:HIGH:N, got {text!r}"
+            ) from None
+        known = _entries(table, surface)
+        if entry not in known:
+            like = difflib.get_close_matches(entry, known)
+            hint = f"; did you mean {' or '.join(like)}?" if like else ""
+            listed = ", ".join(sorted(known))
+            raise InvalidInputError(f"the gripper reads no {entry!r}{hint}; known are {listed}")
+        section, name, index = known[entry]
+        old = table.quantity(section, name)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=entry)
+        if low < 0.0 <= np.min(old.value):
+            raise InvalidInputError(f"LOW must not be negative, got {low:g}", field=entry)
+        if high > (most := LARGEST.get(old.unit, math.inf)):
+            raise InvalidInputError(
+                f"HIGH must not exceed {most:.4g} {old.unit}, got {high:g}", field=entry
+            )
+        if not 2 <= count <= MOST_POINTS:
+            raise InvalidInputError(f"N must be from 2 to {MOST_POINTS}, got {count}", field=entry)
+        axis = cls(section, name, index, tuple(np.linspace(low, high, count).tolist()), old.unit)
+        if section in hand_table().sections:
+            for value in (low, high):
+                own_hand(
+                    ParameterTable(
+                        {section: {name: axis.set(table, value).quantity(section, name)}}
+                    )
+                )
+        return axis
+
+    def set(self, table: ParameterTable, value: float) -> ParameterTable:
+        """Return a table in which the entry has a value."""
+        old = table.quantity(self.section, self.name)
+        new: float | list[float] = value
+        if isinstance(old.value, list):
+            new = list(old.value)
+            new[self.index or 0] = value
+        quantity = Quantity(new, old.unit, old.source, old.note)
+        return table.replaced(ParameterTable({self.section: {self.name: quantity}}))
+
+    def current(self, table: ParameterTable) -> float:
+        """Return the value in a table."""
+        value = table.quantity(self.section, self.name).value
+        return float(value[self.index or 0] if isinstance(value, list) else value)
+
+
+class _Read(ParameterTable):
+    """A table that remembers what was read of it."""
+
+    def __init__(self, table: ParameterTable) -> None:
+        super().__init__(table.sections)
+        self.entries: set[tuple[str, str]] = set()
+
+    def quantity(self, section: str, name: str) -> Quantity:
+        self.entries.add((section, name))
+        return super().quantity(section, name)
+
+
+def _entries(table: ParameterTable, surface: str) -> dict[str, tuple[str, str, int | None]]:
+    """Return section, name and index of the numbers that a gripper reads, by a caller's names."""
+    reading = _Read(table)
+    settings = experiment_table()
+    diameter = settings.vector(PARAMETER_STUDIES, "diameters")[0]
+    Conditions(diameter, settings.scalar("fig16", "tension"), surface).gripper(reading)
+    found: dict[str, tuple[str, str, int | None]] = {}
+    for section, name, quantity in table:
+        if (section, name) not in reading.entries - IDLE:
+            continue
+        if isinstance(quantity.value, list):
+            for i in range(len(quantity.value)):
+                found[f"{section}.{name}[{i}]"] = section, name, i
+        else:
+            found[f"{section}.{name}"] = section, name, None
+    return found

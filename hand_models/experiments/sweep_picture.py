@@ -1,0 +1,96 @@
+"""A sweep's map as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hand_models.experiments.force_limits import MEASURES, Measure
+from hand_models.finger import PHALANGES
+
+__all__ = ["NO_GRASP", "conditions_title", "draw_map", "entry_name", "legend"]
+
+NO_GRASP: Final = "no grasp"
+STATES: Final = {
+    "contact fails": ("tab:blue", "closing alone overloads a tile"),
+    "ejects": ("navy", "the gripper ejects itself"),
+    NO_GRASP: ("0.6", "no such grasp"),
+}
+"""Colour and legend of cells without limits."""
+
+OWN: Final = ("finger", "gripper")
+"""Sections whose entries need no more words than their own."""
+
+SINGULAR: Final = {"pulley_radii": "pulley radius"}
+"""Of entries that are lists of one number a phalanx, where their names are plurals."""
+
+SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
+"""By SI unit, the scale and the unit that pictures have instead."""
+
+
+def conditions_title(conditions: dict[str, Any]) -> str:
+    """Return conditions in words."""
+    return (
+        f"{1e3 * conditions['diameter']:g} mm, tendons at {conditions['tension']:g} N, "
+        f"{conditions['surface']}"
+    )
+
+
+def entry_name(entry: str) -> str:
+    """Return an entry in words, such as ``middle pulley radius`` of ``finger.pulley_radii[1]``."""
+    section, _, name = entry.partition(".")
+    name, _, place = name.partition("[")
+    words = SINGULAR.get(name, name.replace("_", " "))
+    whose = PHALANGES[int(place[:-1])] if place else "" if section in OWN else section
+    return f"{whose} {words}".strip()
+
+
+def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
+    """Draw a map of a measure, cells without limits by their state, the table's own values white.
+
+    Parameters
+    ----------
+    axes : Axes
+    data : dict
+        From `map_data`.
+    measure : str
+    """
+    states = np.array(data["state"])
+    values = np.array(data["limits"][measure], dtype=float)
+    sides, labels = [], []
+    for side in (data["x"], data["y"]):
+        scale, unit = SHOWN.get(side["unit"], (1.0, side["unit"]))
+        sides.append((scale * np.array(side["values"]), scale * side["current"]))
+        labels.append(f"{entry_name(side['entry'])} [{unit}]")
+    (x, current_x), (y, current_y) = sides
+    mesh = axes.pcolormesh(x, y, values, cmap="YlOrRd", vmin=0.0, shading="nearest")
+    for state, (colour, _) in STATES.items():
+        if (states == state).any():
+            shown = np.ma.masked_where(states != state, np.ones(states.shape))
+            axes.pcolormesh(x, y, shown, cmap=ListedColormap([colour]), shading="nearest")
+    axes.plot(current_x, current_y, "D", color="white", markeredgecolor="k", markersize=11)
+    # the range that was asked for: half of each cell at its ends is beyond
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    unit = MEASURES[measure]
+    name = measure if measure == "volume" else f"{measure} limit"
+    axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{unit}]")
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+
+
+def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
+    """Tell below the maps of a figure what their colours and the diamond mean."""
+    met = {state for data in maps for row in data["state"] for state in row}
+    handles: list[Any] = [
+        Patch(color=colour, label=text) for state, (colour, text) in STATES.items() if state in met
+    ]
+    handles.append(
+        Line2D([], [], marker="D", color="white", markeredgecolor="k", linestyle="", label="in use")
+    )
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=True)

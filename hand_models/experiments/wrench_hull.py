@@ -1,0 +1,206 @@
+"""Convex hulls of a planar gripper's wrenches: extents, cuts, sections, limits along directions.
+
+Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus the contract's. A hull is
+given by any points whose convex hull it is; what comes back are vertices.
+
+A cut through the origin leaves the origin on a face, where "inside" and "beyond" differ by rounding
+alone. So what is within `TOLERANCE` of a plane, as a share of the hull's size, counts as lying on
+it, and what lies on a face counts as within: nothing jumps where a wrench crosses a face by less.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from hand_models.base import Array, Indices
+from hand_models.compliance import PLANAR
+from hand_models.wrench_spaces import SCALE, TOLERANCE, hull, hull_facets
+
+__all__ = [
+    "PULL_OFF",
+    "UNITS",
+    "Extents",
+    "cut",
+    "extents",
+    "in_paper_signs",
+    "label_solid",
+    "reach",
+    "section",
+    "vertices",
+    "volume",
+]
+
+UNITS: Final = SCALE[list(PLANAR)]
+"""Per newton, newton and newton metre: what makes wrenches commensurate."""
+
+PULL_OFF: Final = (0.0, 1.0, 0.0)
+"""Normal of the cut that keeps F_z ≤ 0, the part of a hull that the paper shows."""
+
+LABEL_GAP: Final = 8.0
+"""Between numbers and labels of three-dimensional axes [pt]."""
+
+CORNER: Final = 0.1
+"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
+
+
+class Extents(NamedTuple):
+    """How far a set of wrenches goes: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
+
+    force_x: float
+    force_z: float
+    moment: float
+
+
+def in_paper_signs(wrenches: Array) -> Array:
+    """Return (F_x, F_z, M_y) in the paper's signs of wrenches (n, 6) in the contract's."""
+    return wrenches[:, PLANAR] * (1.0, 1.0, -1.0)
+
+
+def extents(points: Array) -> Extents:
+    """Return how far some wrenches, shape (n, 3), go."""
+    largest = np.abs(points).max(axis=0)
+    return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
+
+
+def vertices(points: Array) -> Array:
+    """Return the vertices of a hull, shape (k, 3).
+
+    Raises
+    ------
+    SolverError
+        If the points span no volume.
+    """
+    return points[hull(points * UNITS).vertices]
+
+
+def volume(points: Array) -> float:
+    """Return the volume of a hull over F_x, F_z and M_y [N³·m]."""
+    return float(hull(points * UNITS).volume / np.prod(UNITS))
+
+
+def cut(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
+    """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
+
+    None, shape (0, 3), if no vertex of the hull is below the plane.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
+    normal : array_like, shape (3,)
+        By default `PULL_OFF`.
+    offset : float
+    """
+    way = np.asarray(normal, dtype=float) / UNITS
+    height = (points @ np.asarray(normal, dtype=float) - offset) / np.linalg.norm(way)
+    slack = _slack(points)
+    if not (height < -slack).any():
+        return np.zeros((0, 3))
+    if (height <= slack).all():
+        return vertices(points)
+    met = _met(points, height, slack)
+    # exactly on the plane: the part's face there is one face
+    beyond = (met @ np.asarray(normal, dtype=float) - offset) / (way @ way)
+    face = met - beyond[:, None] * way / UNITS
+    return vertices(np.vstack([points[height < -slack], face]))
+
+
+def section(points: Array, normal: ArrayLike) -> Array:
+    """Return the polygon in which the plane normal · w = 0 meets a hull, in order, shape (k, 3).
+
+    A face, an edge's two ends or one vertex where the plane only touches the hull; no corners,
+    shape (0, 3), if it misses it.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
+    normal : array_like, shape (3,)
+    """
+    way = np.asarray(normal, dtype=float) / UNITS
+    slack = _slack(points)
+    met = _met(points, (points * UNITS) @ way / np.linalg.norm(way), slack)
+    if not len(met):
+        return met
+    # coordinates in the plane, of commensurate units
+    basis = np.linalg.svd(way[None])[2][1:]
+    return met[_outermost(met * UNITS @ basis.T, slack)]
+
+
+def reach(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
+    """Return the largest s ≥ 0 with start + s · direction in a hull, shape (m,).
+
+    Not a number where the line misses the hull, or meets it only behind. A start on a face counts
+    as within it: along the face, rounding decides neither whether the line is in the hull nor where
+    it ends.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
+    directions : ndarray, shape (m, 3)
+        In the wrenches' units, of any length.
+    start : array_like, shape (3,) or (m, 3), optional
+        The origin by default [N, N, N·m].
+    """
+    normals, offsets = hull_facets(points * UNITS)
+    slack = _slack(points)
+    gaps = offsets - np.broadcast_to(start, directions.shape) * UNITS @ normals.T
+    gaps = np.where(gaps < -slack, gaps, np.maximum(gaps, slack))
+    slopes = (directions * UNITS) @ normals.T
+    with np.errstate(divide="ignore", over="ignore"):
+        ratios = gaps / slopes
+    most = np.where(slopes > 0.0, ratios, np.inf).min(axis=1)
+    least = np.where(slopes < 0.0, ratios, -np.inf).max(axis=1)
+    blocked = ((slopes == 0.0) & (gaps < 0.0)).any(axis=1)
+    return np.where((most >= np.maximum(least, 0.0)) & ~blocked, most, np.nan)
+
+
+def _slack(points: Array) -> float:
+    """Return how near wrenches of a hull are that rounding alone may part [N]."""
+    return TOLERANCE * float(np.abs(points * UNITS).max(initial=0.0))
+
+
+def _met(points: Array, height: Array, slack: float) -> Array:
+    """Return where a hull meets the plane at which its height is zero, shape (k, 3).
+
+    Vertices no farther than ``slack`` from it, and where edges cross it between the others.
+    """
+    triangles = hull(points * UNITS).simplices
+    pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
+    near, far = np.unique(np.sort(pairs), axis=0).T
+    side = np.where(np.abs(height) <= slack, 0.0, np.sign(height))
+    across = side[near] * side[far] < 0.0
+    near, far = near[across], far[across]
+    part = height[near] / (height[near] - height[far])
+    crossings = points[near] + part[:, None] * (points[far] - points[near])
+    return np.vstack([points[side == 0.0], crossings])
+
+
+def _outermost(flat: Array, slack: float) -> Indices:
+    """Return which of some points (n, 2) are corners of their hull, two ends of it, or one."""
+    _, widths, axes = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
+    if len(widths) > 1 and widths[1] > slack:
+        return np.asarray(hull(flat).vertices, dtype=np.intp)
+    along = flat @ axes[0]
+    return np.unique([along.argmin(), along.argmax()] if widths[0] > slack else [0])
+
+
+def label_solid(axes: Any, title: str) -> None:
+    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
+    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(5))
+        axis.labelpad = LABEL_GAP
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        corner = CORNER * (high - low)
+        ticks = MaxNLocator(4).tick_values(low, high)
+        axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
+    axes.invert_zaxis()
+    axes.set_box_aspect(None, zoom=0.85)
+    axes.view_init(elev=25.0, azim=-50.0)

@@ -1,0 +1,5 @@
+"""One finger on rock: how it closes, its contact states, its loads, its nail."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

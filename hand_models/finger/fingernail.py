@@ -1,0 +1,235 @@
+"""The fingernail: an ultrashort phalanx at each fingertip, for shallow edges (Section 3.2).
+
+It turns about a pin at the end of the distal phalanx, from straight ahead (ψ = 0) toward the rock,
+on the softest spring of the finger, so the tendon moves it first. Where it meets rock on its way it
+*hooks*, with its tip or with its flank on an edge; where it meets none it turns by 180° and is out
+of the way.
+
+To cling, the finger stays straight and only the nails carry. With w the unit vector along the nail
+and v the one across it, in which the tendon turns it, a nail that touches at the distance c from
+its pin loads the rock with F = P v − A w. P follows from the tendon's tension f by the balance
+about the pin; A goes through the pin and is passive. The rock, with its normal n (of the nail's
+flank where that touches), holds F by friction, and F must not close the finger: its joints stand
+on stops against opening (``assumed``; nothing is published), and tendon and nail both turn them.
+With joint i at q_i and the local tensions f_i of Eq. 8,
+
+    P = (f_n r_n − K_n ψ − p_n) / c,
+    |F along the rock| ≤ μ_n · (F into the rock),
+    f_i r_i − p_i + (F × (tip − q_i), from x toward z) ≤ 0.
+
+So a straight finger is much like a rope: it pulls toward its base, but hardly off the rock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.finger.model import SettledFinger
+from hand_models.parameters import ParameterTable
+from hand_models.sections import Section, Vector2
+
+__all__ = ["CONE_ROWS", "Cling", "Fingernail", "Hook"]
+
+CONE_ROWS: Final = 3
+"""Rows of a nail's friction cone, the first of them that it cannot pull; after them the joints'."""
+
+ROOT: Final = 1e-4
+"""Rock nearer the pin than this is not looked for [m]."""
+
+
+class Hook(NamedTuple):
+    """A nail on the rock, in the coordinates (x, z) of F.
+
+    Attributes
+    ----------
+    angle : float
+        ψ from straight ahead toward the rock [rad].
+    distance : float
+        c, of the contact from the pin [m].
+    normal : tuple of float
+        Unit vector out of the rock.
+    """
+
+    angle: float
+    distance: float
+    normal: Vector2
+
+    @property
+    def along(self) -> Array:
+        """w, shape (2,)."""
+        return np.array([math.cos(self.angle), math.sin(self.angle)])
+
+    @property
+    def across(self) -> Array:
+        """v, shape (2,)."""
+        return np.array([-math.sin(self.angle), math.cos(self.angle)])
+
+
+class Cling(NamedTuple):
+    """A nail that hooks, and what rock and finger bear of it.
+
+    Attributes
+    ----------
+    hook : Hook
+    force : tuple of float
+        P, affine in the tendon's tension: at zero [N], per newton.
+    H : ndarray, shape (6, 2)
+        The rock and the straight finger bear tension f and A where H (f, A) ≤ h. First `CONE_ROWS`
+        rows, then those of the joints, proximal first, in newtons at the nail's pin.
+    h : ndarray, shape (6,)
+        [N]
+    """
+
+    hook: Hook
+    force: tuple[float, float]
+    H: Array
+    h: Array
+
+    def lasts(self, tension: float) -> bool:
+        """Whether the nail gets to where it hooks at a tension, and some A keeps it there."""
+        if self.force[0] + self.force[1] * tension < 0.0:
+            return False
+        slope, left = self.H[:, 1], self.h - self.H[:, 0] * tension
+        below, above, still = slope < 0.0, slope > 0.0, slope == 0.0
+        least = (left[below] / slope[below]).max(initial=-math.inf)
+        most = (left[above] / slope[above]).min(initial=math.inf)
+        return bool(least <= most and left[still].min(initial=0.0) >= 0.0)
+
+
+@dataclass(frozen=True)
+class Fingernail:
+    """The nail's numbers, alike for the four fingers. SI units.
+
+    Attributes
+    ----------
+    length : float
+        From the pin to the tip [m].
+    pulley_radius : float
+        r_n [m].
+    stiffness, preload : float
+        K_n [N·m/rad], p_n [N·m].
+    retraction : float
+        How far it turns to be out of the way [rad].
+    friction : float
+        μ_n of it on rock.
+    """
+
+    length: float
+    pulley_radius: float
+    stiffness: float
+    preload: float
+    retraction: float
+    friction: float
+
+    @classmethod
+    def from_table(cls, table: ParameterTable) -> Fingernail:
+        """Read the nail from ``hand.toml``.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is missing or impossible.
+        """
+        numbers = {
+            name: table.scalar("nail", name)
+            for name in (
+                "length",
+                "pulley_radius",
+                "stiffness",
+                "preload",
+                "retraction",
+                "friction",
+            )
+        }
+        for name, value in numbers.items():
+            if name in ("length", "pulley_radius", "retraction") and not value > 0.0:
+                raise InvalidInputError(f"must be above 0, got {value:g}", field=f"nail.{name}")
+            if not value >= 0.0:
+                raise InvalidInputError(f"must be at least 0, got {value:g}", field=f"nail.{name}")
+        return cls(**numbers)
+
+    @property
+    def retracting_tension(self) -> float:
+        """Tension at which a nail that meets no rock is out of the way [N]."""
+        return (self.preload + self.stiffness * self.retraction) / self.pulley_radius
+
+    def stuck(self, section: Section | None, pin: Vector2) -> bool:
+        """Whether rock is in the way of the nail before it turns; arguments as of `hook`."""
+        if section is None:
+            return False
+        return section.face_clearance(pin, ROOT, self.length, 0.0, 0.0) <= 0.0
+
+    def hook(self, section: Section | None, pin: Vector2) -> Hook | None:
+        """Turn the nail until it meets the rock.
+
+        Parameters
+        ----------
+        section : Section or None
+            Rock in the finger's plane, in the coordinates (x, z) of F; it is not `stuck` there.
+        pin : tuple of float
+            (x, z) of the nail's pin, the finger straight along x [m].
+
+        Returns
+        -------
+        Hook or None
+            None if there is no rock on its way.
+        """
+        if section is None:
+            return None
+        rest = section.rest(pin, ROOT, self.length, 0.0, 0.0, self.retraction)
+        if rest is None:
+            return None
+        met = Hook(rest.angle, rest.distance, (0.0, 0.0))
+        if rest.distance < self.length:
+            s, t = -met.across
+            return met._replace(normal=(float(s), float(t)))
+        s, t = np.asarray(pin) + self.length * met.along
+        return met._replace(normal=section.normal((float(s), float(t))))
+
+    def cling(
+        self, section: Section | None, finger: SettledFinger, tension: float, base_tile: bool
+    ) -> Cling | None:
+        """Return how the nail of a straight finger clings.
+
+        Parameters
+        ----------
+        section : Section or None
+            As of `hook`.
+        finger : SettledFinger
+        tension : float
+            Of closing [N].
+        base_tile : bool
+            Whether a base tile comes first on the tendon.
+
+        Returns
+        -------
+        Cling or None
+            None if there is no rock on the nail's way, or the nail does not stay on it at the
+            closing tension without closing the finger.
+        """
+        hook = self.hook(section, finger.pin)
+        if hook is None:
+            return None
+        model = finger.model
+        losses = finger.losses(base_tile)
+        arm = self.pulley_radius * float(losses[-1]) * (1.0 - model.friction)
+        held = self.preload + self.stiffness * hook.angle
+        at_zero, per_newton = -held / hook.distance, arm / hook.distance
+        # columns: the force on the rock at zero tension, per newton of tension, per newton of A
+        force = np.column_stack([at_zero * hook.across, per_newton * hook.across, -hook.along])
+        n = np.array(hook.normal)
+        slip, side = self.friction * n, np.array([-n[1], n[0]])
+        # the reaction −F turns a joint, at the distance D from the pin, from x toward z
+        D = finger.pin[0] - np.array([contact.joint[0] for contact in finger.contacts])
+        x, z = hook.distance * hook.along
+        closing = np.column_stack([z / D, -1.0 - x / D])
+        rows = np.vstack([n, slip + side, slip - side, closing]) @ force
+        rows[CONE_ROWS:, 0] -= np.asarray(model.joint_preload) / D
+        rows[CONE_ROWS:, 1] += losses * np.asarray(model.pulley_radii) / D
+        made = Cling(hook, (at_zero, per_newton), rows[:, 1:], -rows[:, 0])
+        return made if made.lasts(tension) else None

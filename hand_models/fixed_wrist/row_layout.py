@@ -1,0 +1,267 @@
+"""Names of a hand's rows and columns, and whose they are: what its limits are, whatever loads it.
+
+They only depend on which tiles touch, on how many half-planes limit a tile and on the joints'
+stops, so that hands share layouts; wrench spaces of fixed and of floating wrists have the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final, Literal
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, FINGERTIP_FORCE, HELD, NAIL, NAIL_SHEAR, SettledHand, Tile
+from hand_models.tile import HalfPlane, Surface
+from hand_models.wrench_spaces import Row
+
+__all__ = [
+    "HAND_LOAD",
+    "PALM_PRESSING",
+    "PALM_SHEAR",
+    "TENDON_TENSION",
+    "RowLayout",
+    "layout_of",
+    "named_row",
+    "row_layout",
+]
+
+PALM_SHEAR = "palm_shear"
+PALM_PRESSING = "palm_pressing"
+HAND_LOAD = "hand_load"
+TENDON_TENSION = "tendon_tension"
+TENDON_LIMITS = (TENDON_TENSION, "motor_torque", "motor_current")
+"""Limits of each tendon, in the order of their rows."""
+
+
+KEPT: Final = 512
+"""Layouts that are kept, those used last; each takes some 30 kB."""
+
+
+@dataclass(frozen=True, eq=False)
+class RowLayout:
+    """Names, and which tile and column each row is about. Arrays are read-only.
+
+    Attributes
+    ----------
+    columns : tuple of str
+    limits, hard : tuple of Row
+    rows : tuple of Row
+        Both.
+    finger_of : ndarray of int, shape (n,)
+        Index of each tile's finger.
+    shared_by : ndarray of int, shape (n,)
+        How many tiles carry a finger's lateral reaction, each alike; 0 for one that does not.
+    touching, frames, tips, nails : ndarray of int
+        Tiles on rock; tiles whose phalanx rests beside them; distal tiles whose phalanx presses on
+        rock; nails that hook.
+    plane_tiles, plane_pieces, plane_signs : ndarray of int
+        Tile, half-plane, and sign of the lateral load (0 where there is none), of each limit row of
+        a tile.
+    pieces : int
+        How many half-planes limit each tile.
+    engaged, reacting, drawing : tuple of int
+        Fingers with a tile on rock; those of them that resist sideways; the engaged ones and those
+        whose nail hooks.
+    lateral_columns, nail_columns : tuple of int
+        Of the reactions of fingers that resist, of the loads along nails that hook.
+    stops : tuple of (int, int)
+        Finger and joint of those at a limit.
+    palm : bool
+        Whether it is on rock: then its columns are the last two.
+    sticking : bool
+        Whether the tendons have friction, so that they must not be slackened.
+    """
+
+    columns: tuple[str, ...]
+    limits: tuple[Row, ...]
+    hard: tuple[Row, ...]
+    rows: tuple[Row, ...]
+    finger_of: Indices
+    shared_by: Indices
+    touching: Indices
+    frames: Indices
+    tips: Indices
+    nails: Indices
+    plane_tiles: Indices
+    plane_pieces: Indices
+    plane_signs: Indices
+    pieces: int
+    engaged: tuple[int, ...]
+    reacting: tuple[int, ...]
+    drawing: tuple[int, ...]
+    lateral_columns: tuple[int, ...]
+    nail_columns: tuple[int, ...]
+    stops: tuple[tuple[int, int], ...]
+    palm: bool
+    sticking: bool
+
+    def planes(self, pieces: Sequence[HalfPlane]) -> tuple[Indices, Array, Array, Array, Array]:
+        """Return what each of the tiles' limit rows says.
+
+        Returns
+        -------
+        tile : ndarray of int
+        a_shear, a_normal, a_lateral : ndarray
+            Its coefficients, the last with its sign.
+        capacity : ndarray
+            [N]
+        """
+        table = np.array([(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in pieces])
+        shear, normal, lateral, capacity = table[self.plane_pieces].T
+        return self.plane_tiles, shear, normal, lateral * self.plane_signs, capacity
+
+
+def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
+    """Return the rows of a settled hand; ``sticking`` as of `RowLayout`."""
+    return _layout_on(
+        settled.tiles,
+        settled.grasp.lateral,
+        settled.surface,
+        tuple([(finger, joint) for finger, joint, _ in settled.stops]),
+        bool(settled.palm.engaged),
+        sticking,
+    )
+
+
+@lru_cache(maxsize=4 * KEPT)
+def _layout_on(
+    tiles: tuple[Tile, ...],
+    lateral: bool,
+    surface: Surface,
+    stops: tuple[tuple[int, int], ...],
+    palm: bool,
+    sticking: bool,
+) -> RowLayout:
+    # nothing depends on what of a tile touches, and of a surface only the names
+    alike = tuple(
+        tile if tile.contact != "edge" else tile._replace(contact="face") for tile in tiles
+    )
+    names = tuple(piece.limit for piece in surface.pieces())
+    return row_layout(alike, lateral, names, stops, palm, sticking)
+
+
+@lru_cache(maxsize=KEPT)
+def row_layout(
+    tiles: tuple[Tile, ...],
+    lateral: bool,
+    pieces: tuple[str, ...],
+    stops: tuple[tuple[int, int], ...],
+    palm: bool,
+    sticking: bool,
+) -> RowLayout:
+    """Return the rows of hands that touch alike.
+
+    Parameters
+    ----------
+    tiles : tuple of Tile
+    lateral : bool
+        Whether fingers with a tile on rock resist sideways.
+    pieces : tuple of str
+        Names of the half-planes that limit each tile.
+    stops : tuple of (int, int)
+        Finger and joint of those at a limit.
+    palm : bool
+        Whether it is on rock.
+    sticking : bool
+        Whether tendons must not be slackened.
+    """
+    finger_of = [FINGERS.index(tile.finger) for tile in tiles]
+    touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
+    frames = [i for i, tile in enumerate(tiles) if tile.contact == "frame"]
+    tips = [i for i, t in enumerate(tiles) if t.phalanx == "distal" and t.contact != "none"]
+    nails = [i for i, tile in enumerate(tiles) if tile.contact == NAIL]
+    holding = [finger_of[i] for i in touching]
+    engaged = sorted(set(holding))
+    reacting = engaged if lateral else []
+    drawing = sorted({*engaged, *(finger_of[i] for i in nails)})
+    columns = [f"{finger}/tension" for finger in FINGERS]
+    lateral_columns = range(len(columns), len(columns) + len(reacting))
+    columns += [f"{FINGERS[i]}/lateral" for i in reacting]
+    nail_columns = range(len(columns), len(columns) + len(nails))
+    clinging = [tiles[i].finger for i in nails]
+    columns += [f"{finger}/{NAIL}" for finger in clinging]
+    limits, hard = [], []
+    planes: list[tuple[int, int, int]] = []
+    signs = (("+", 1), ("-", -1)) if lateral else (("", 0),)
+    for i in touching:
+        finger, phalanx = tiles[i].finger, tiles[i].phalanx
+        pulls = 0
+        for k, piece in enumerate(pieces):
+            pulls += piece == "pull_off"
+            label = f"{finger}/{phalanx}/{piece}" + (f"_{pulls}" if pulls > 1 else "")
+            for name, sign in signs:
+                limits.append(Row(finger, phalanx, piece, "limit", label + name))
+                planes.append((i, k, sign))
+    for name in TENDON_LIMITS:
+        limits += [named_row(finger, None, name, "limit") for finger in FINGERS]
+    limits += [named_row(FINGERS[i], None, "finger_shear", "limit") for i in engaged]
+    limits += [named_row(tiles[i].finger, "distal", FINGERTIP_FORCE, "limit") for i in tips]
+    for finger in clinging:
+        limits += [named_row(finger, NAIL, name, "limit") for name in (NAIL_SHEAR, FINGERTIP_FORCE)]
+    hard += [named_row(finger, None, "slack_tendon", "hard") for finger in FINGERS]
+    for name, those in (("dragged_backwards", touching), ("frame_pulled", frames)):
+        hard += [named_row(tiles[i].finger, tiles[i].phalanx, name, "hard") for i in those]
+    for finger_index, joint in stops:
+        hard.append(named_row(FINGERS[finger_index], PHALANGES[joint], "joint_stop", "hard"))
+    for finger in clinging:
+        for name, label in (("nail_lifts", ""), ("nail_slips", "+"), ("nail_slips", "-")):
+            hard.append(Row(finger, NAIL, name, "hard", f"{finger}/{NAIL}/{name}{label}"))
+        hard += [named_row(finger, phalanx, "joint_stop", "hard") for phalanx in PHALANGES]
+    if sticking:
+        hard += [named_row(FINGERS[i], None, "tendon_sticks", "hard") for i in drawing]
+    if palm:
+        columns += [PALM_SHEAR, PALM_PRESSING]
+        limits += [Row(None, None, name, "limit", name) for name in (PALM_SHEAR, PALM_PRESSING)]
+        hard += [
+            Row(None, None, f"{name}_reversed", "hard", f"{name}_reversed")
+            for name in (PALM_SHEAR, PALM_PRESSING)
+        ]
+    limits += [
+        Row(None, None, HAND_LOAD, "limit", f"{HAND_LOAD}/{k + 1}") for k in range(len(HELD))
+    ]
+    shared_by = [
+        holding.count(finger) if i in touching else 0 for i, finger in enumerate(finger_of)
+    ]
+    plane_tiles, plane_pieces, plane_signs = np.array(planes, dtype=np.intp).reshape(-1, 3).T
+    return RowLayout(
+        columns=tuple(columns),
+        limits=tuple(limits),
+        hard=tuple(hard),
+        rows=(*limits, *hard),
+        finger_of=_kept(finger_of),
+        shared_by=_kept(shared_by),
+        touching=_kept(touching),
+        frames=_kept(frames),
+        tips=_kept(tips),
+        nails=_kept(nails),
+        plane_tiles=_kept(plane_tiles),
+        plane_pieces=_kept(plane_pieces),
+        plane_signs=_kept(plane_signs),
+        pieces=len(pieces),
+        engaged=tuple(engaged),
+        reacting=tuple(reacting),
+        drawing=tuple(drawing),
+        lateral_columns=tuple(lateral_columns),
+        nail_columns=tuple(nail_columns),
+        stops=stops,
+        palm=palm,
+        sticking=sticking,
+    )
+
+
+def _kept(numbers: Sequence[int] | Indices) -> Indices:
+    """Return numbers as an array that nobody changes."""
+    array = np.array(numbers, dtype=np.intp)
+    array.setflags(write=False)
+    return array
+
+
+def named_row(finger: str, phalanx: str | None, limit: str, kind: Literal["limit", "hard"]) -> Row:
+    """Return a row of a finger, labelled by its names."""
+    label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
+    return Row(finger, phalanx, limit, kind, label)

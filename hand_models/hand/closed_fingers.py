@@ -1,0 +1,243 @@
+"""All fingers of some hands closed on the rock.
+
+Fingers over smooth rock are laid on it (`hand_models.finger.sequential_closure`) and loaded by
+their tendons (`hand_models.finger.closure_loads`) one by one, of those that are alike one. Fingers
+that do not rest on all their phalanges, or whose contacts would break, are left to
+`hand_models.finger.contact_states`, as are fingers over other rock.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Hashable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.finger import (
+    FREE,
+    KINDS,
+    PHALANGES,
+    STOPS,
+    ClosedFinger,
+    Closing,
+    Laid,
+    LaidLoads,
+    cling,
+    close_all,
+    intrusion,
+    stays,
+)
+from hand_models.hand.placement import PlacedHands, Placement
+from hand_models.hand.settled_hand import FINGERS, HandPostures
+
+if TYPE_CHECKING:
+    from hand_models.hand.spinyhand import SpinyHand
+
+__all__ = ["ClosedFingers", "close_fingers"]
+
+Row = list[float]
+"""All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
+
+ANGLE, ALONG, JOINT, LOADS, CODES, PLACES = 0, 1, slice(2, 4), slice(4, 8), slice(8, 10), 10
+"""Numbers of a phalanx: its angle [rad], contact and joint [m]; its shear and normal load, each at
+zero tension [N] and per newton; the codes of its contact and its joint's stop; and in the finger's
+plane, each in homogeneous coordinates, its contact and its axes of shear and of normal load."""
+
+TILE: Final = slice(LOADS.start, CODES.stop - 1)
+"""Those that are its tile's as they are: the loads, and the code of the contact."""
+
+NUMBERS: Final = PLACES + 9
+
+NOWHERE: Final = [0.0] * (len(PHALANGES) * NUMBERS)
+"""In place of a finger of a hand that cannot be where it is."""
+
+
+class ClosedFingers:
+    """The fingers of n hands, closed.
+
+    Parameters
+    ----------
+    rows : sequence of list of float
+        Of fingers that differ.
+    row_of : sequence of int, length 4 n
+        Index of each finger's row, hand by hand.
+    alone : dict of int to ClosedFinger
+        Fingers that could not be left as they were laid.
+
+    Attributes
+    ----------
+    places : ndarray, shape (n, 4, 9, 3)
+        In each finger's plane, phalanx by phalanx, where its contact is [m] and its axes of shear
+        and of normal load; (x, z, 1) for places, (x, z, 0) for directions.
+    tiles : ndarray, shape (n, 4, 3, 5)
+        Shear and normal load of each phalanx, each at zero tension [N] and per newton, and the code
+        of its contact.
+    """
+
+    def __init__(
+        self, rows: Sequence[Row], row_of: Sequence[int], alone: dict[int, ClosedFinger]
+    ) -> None:
+        self.alone = alone
+        count = len(FINGERS)
+        shape = len(row_of) // count, count, len(PHALANGES), NUMBERS
+        self._table = np.array(rows).take(row_of, axis=0).reshape(shape)
+        self._table.setflags(write=False)
+        self.places = self._table[..., PLACES:].reshape(-1, count, 3 * len(PHALANGES), 3)
+        self.tiles = self._table[..., TILE]
+
+    def of_hands(self) -> list[HandPostures]:
+        """Return how the fingers of each hand stand; arrays are read-only."""
+        table = self._table
+        codes = table[..., CODES].astype(np.int8)
+        codes.setflags(write=False)
+        joints = table[..., JOINT].view(complex)
+        numbers = (table[..., ANGLE], joints[..., 0], table[..., ALONG], codes[..., 0])
+        return [HandPostures(*hand) for hand in zip(*numbers, codes[..., 1], strict=True)]
+
+    def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
+        """Return finger, joint and torque of each joint of a hand that stands at a limit."""
+        if not self.alone:
+            return ()
+        stops = []
+        for finger in range(len(FINGERS)):
+            alone = self.alone.get(len(FINGERS) * index + finger)
+            if alone is None or not alone.finger.bearing:
+                continue
+            for joint, contact in enumerate(alone.finger.contacts):
+                if contact.stop in ("upper", "lower"):
+                    torque = alone.torques[joint] * (1.0 if contact.stop == "upper" else -1.0)
+                    torque.setflags(write=False)
+                    stops.append((finger, joint, torque))
+        return tuple(stops)
+
+
+def close_fingers(
+    placed: PlacedHands,
+    laid: Sequence[Sequence[list[Laid]]],
+    tensions: Sequence[float],
+    errors: dict[int, InvalidInputError],
+) -> ClosedFingers:
+    """Close the fingers of hands on their holds.
+
+    Parameters
+    ----------
+    placed : PlacedHands
+    laid : sequence of sequence of list of Laid, lengths n and 4
+        Phalanges of their fingers that rest on smooth rock, one after the other; the same ones for
+        fingers that are alike.
+    tensions : sequence of float, length n
+        Closing tension of each hand [N].
+    errors : dict of int to InvalidInputError
+        Why hands cannot be where they are; those that cannot close are added.
+    """
+    hand, rows, row_of = placed.hand, [NOWHERE], [0] * (len(FINGERS) * len(laid))
+    left: list[int] = []
+    for i, (placement, tension) in enumerate(zip(placed.placements, tensions, strict=True)):
+        if i in errors:
+            continue
+        known: dict[Hashable, int] = {}
+        for k, (phalanges, base_tile) in enumerate(
+            zip(laid[i], hand.rubbing, strict=True), len(FINGERS) * i
+        ):
+            key = id(phalanges), base_tile
+            if key not in known:
+                row = _row_laid(hand, placement, phalanges, tension, base_tile)
+                if row is None:
+                    left.append(k)
+                    continue
+                known[key] = len(rows)
+                rows.append(row)
+            row_of[k] = known[key]
+    alone: dict[int, ClosedFinger] = {}
+    for k, finger in zip(left, _alone(placed, left, tensions), strict=True):
+        i = k // len(FINGERS)
+        if finger is not None:
+            alone[k], row_of[k] = finger, len(rows)
+            rows.append(_row_alone(finger))
+        elif i not in errors:
+            errors[i] = _no_way(placed, i, k % len(FINGERS))
+    return ClosedFingers(rows, row_of, alone)
+
+
+def _row_laid(
+    hand: SpinyHand, placement: Placement, laid: list[Laid], tension: float, base_tile: bool
+) -> Row | None:
+    """Return the numbers of a finger that can be left as it is laid."""
+    if len(laid) < len(PHALANGES) or placement.grasp.fingernail:
+        return None
+    loads = hand.tendon_loads.loads(laid, tension, base_tile)
+    if loads is None or not stays(laid, loads, placement.surface, tension):
+        return None
+    return _row(laid, hand.finger.tile_height, loads)
+
+
+def _alone(
+    placed: PlacedHands, left: Sequence[int], tensions: Sequence[float]
+) -> list[ClosedFinger | None]:
+    """Close fingers that could not be left as laid, those that are alike once."""
+    hand = placed.hand
+    keys: list[Hashable] = []
+    closings: dict[Hashable, Closing] = {}
+    closed: dict[Hashable, ClosedFinger | None] = {}
+    for k in left:
+        i, finger = divmod(k, len(FINGERS))
+        placement, cuts = placed.placements[i], placed.cuts(i)
+        if placement.grasp.fingernail:
+            keys.append(k)
+            closed[k] = cling(hand.finger, placed.section(i, finger))
+            continue
+        given = placement.surface, tensions[i], hand.rubbing[finger]
+        key = (k if cuts is None else (cuts[0], cuts[1][finger]), *given)
+        keys.append(key)
+        if key not in closings:
+            closings[key] = Closing(placed.section(i, finger), *given)
+    if closings:
+        found = close_all(hand.finger, list(closings.values()))
+        closed.update(zip(closings, found, strict=True))
+    return [closed[key] for key in keys]
+
+
+def _no_way(placed: PlacedHands, index: int, finger: int) -> InvalidInputError:
+    """Return why a finger cannot close."""
+    straight = placed.placements[index].grasp.fingernail
+    section = placed.section(index, finger)
+    assert section is not None
+    depth = 1e3 * intrusion(placed.hand.finger, section, straight=straight)
+    how = "straight, to cling with its nail" if straight else "even with its joints fully open"
+    return InvalidInputError(
+        f"the hold stands {depth:.1f} mm inside {FINGERS[finger]} {how}; "
+        "move the hand away from the rock",
+        field="hold",
+    )
+
+
+def _row(
+    phalanges: Sequence[Laid],
+    height: float,
+    loads: LaidLoads,
+    stops: Sequence[int] = (FREE,) * len(PHALANGES),
+) -> Row:
+    """Return the numbers of a finger; ``height`` of its tiles above the phalanges [m]."""
+    row: Row = []
+    for (angle, u, joint, along, kind), t, n, stop in zip(phalanges, *loads, stops, strict=True):
+        place = joint + complex(along, height) * u
+        row += (angle, along, joint.real, joint.imag)
+        row += (t.real, t.imag, n.real, n.imag, kind, stop)
+        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
+    return row
+
+
+def _row_alone(closed: ClosedFinger) -> Row:
+    """Return the numbers of a finger that was closed on its own."""
+    contacts, model = closed.finger.contacts, closed.finger.model
+    phalanges = [
+        Laid(c.angle, cmath.rect(1.0, c.angle), complex(*c.joint), c.along, KINDS.index(c.kind))
+        for c in contacts
+    ]
+    (t_0, t_1, t_2), (n_0, n_1, n_2) = (
+        [complex(*load) for load in loads.tolist()] for loads in (closed.shears, closed.normals)
+    )
+    stops = [STOPS.index(c.stop) for c in contacts]
+    return _row(phalanges, model.tile_height, LaidLoads((t_0, t_1, t_2), (n_0, n_1, n_2)), stops)

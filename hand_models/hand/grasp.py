@@ -1,0 +1,53 @@
+"""How a hand takes a hold: what is chosen before it closes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from hand_models.base import InvalidInputError
+
+__all__ = ["Grasp"]
+
+OPPOSED: Final = 1e-6
+"""How close to π an outer rotation counts as a pinch [rad]."""
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """How a hand takes a hold.
+
+    Attributes
+    ----------
+    outer_rotation : float
+        Of the outer fingers, in [0, π] [rad].
+    closing_tension : float, optional
+        Of each tendon at the moment the tiles caught the rock [N]; the parameter file's default.
+    palm : bool
+        Whether the palm may carry load.
+    lateral : bool
+        Whether engaged spines may resist sideways.
+    fingernail : bool
+        Whether the fingers stay straight and cling with their nails alone.
+    """
+
+    outer_rotation: float = 0.0
+    closing_tension: float | None = None
+    palm: bool = True
+    lateral: bool = True
+    fingernail: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.outer_rotation <= math.pi + OPPOSED:
+            raise InvalidInputError(
+                f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
+            )
+        tension = self.closing_tension
+        if tension is not None and not (math.isfinite(tension) and tension > 0.0):
+            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="closing_tension")
+
+    @property
+    def pinch(self) -> bool:
+        """Whether the outer fingers oppose the inner ones."""
+        return self.outer_rotation >= math.pi - OPPOSED

@@ -1,0 +1,91 @@
+"""The nails of hands that cling with them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.finger import NONE, Fingernail
+from hand_models.hand.closed_fingers import ClosedFingers
+from hand_models.hand.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
+from hand_models.hand.placement import PlacedHands
+from hand_models.hand.settled_hand import CONTACTS, FINGERS, NAIL
+
+__all__ = ["Nails", "hook_nails", "no_nails"]
+
+
+class Nails(NamedTuple):
+    """The nails of one hand; attributes as of `SettledHand`.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (4,)
+    normals : ndarray, shape (4, 3)
+    rows : tuple of (ndarray, ndarray)
+    tiles : ndarray, shape (4, `COLUMNS`), or None
+        Numbers of the nails as tiles; None of a hand that does not cling with them.
+    """
+
+    angles: Array
+    normals: Array
+    rows: tuple[tuple[Array, Array], ...]
+    tiles: Array | None = None
+
+
+def no_nails(nail: Fingernail) -> Nails:
+    """Return nails that are all out of the way; arrays are read-only."""
+    angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
+    angles.setflags(write=False)
+    normals.setflags(write=False)
+    return Nails(angles, normals, ())
+
+
+def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: float) -> Nails:
+    """Return where the nails of a hand hook whose fingers are straight.
+
+    Parameters
+    ----------
+    placed : PlacedHands
+    closed : ClosedFingers
+    index : int
+        Of the hand.
+    closing : float
+        Its closing tension [N].
+
+    Raises
+    ------
+    InvalidInputError
+        If the rock is in the way of a nail.
+    """
+    nail = placed.hand.nail
+    angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
+    rows, tiles = [], np.zeros((len(FINGERS), COLUMNS))
+    tiles[:, KIND] = NONE
+    frames = placed.frames.hands[index].fingers
+    for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=True)):
+        section = placed.section(index, i)
+        finger = closed.alone[len(FINGERS) * index + i].finger
+        if nail.stuck(section, finger.pin):
+            raise InvalidInputError(
+                f"the hold is in the way of the nail of {name}, straight ahead; "
+                "move the hand away from the rock",
+                field="hold",
+            )
+        cling = nail.cling(section, finger, closing, name.startswith("outer"))
+        reach = nail.length
+        if cling is not None:
+            angles[i], reach = cling.hook.angle, cling.hook.distance
+            s, t = cling.hook.normal
+            normals[i] = s * frame.along + t * UP
+            rows.append((cling.H, cling.h))
+            tip[KIND], tip[NORMAL] = CONTACTS.index(NAIL), cling.force
+        cosine, sine = math.cos(angles[i]), math.sin(angles[i])
+        w = cosine * frame.along + sine * UP
+        tip[POSITION] = frame.joint + finger.pin[0] * frame.along + reach * w
+        tip[AXES] = np.concatenate([-w, cosine * UP - sine * frame.along, frame.across])
+    for array in (angles, normals, *(part for pair in rows for part in pair)):
+        array.setflags(write=False)
+    return Nails(angles, normals, tuple(rows), tiles)

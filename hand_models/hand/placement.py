@@ -1,0 +1,160 @@
+"""Hands at their holds before they close: what is under their fingers and their flat tiles."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Pose
+from hand_models.hand.finger_frames import ALONG, INTO, JOINTS, TILES
+from hand_models.hand.grasp import Grasp
+from hand_models.hand.seating import Seating
+from hand_models.rock import Hold
+from hand_models.sections import Plane, Section, Swept, entries
+from hand_models.tile import Surface
+
+if TYPE_CHECKING:
+    from hand_models.hand.spinyhand import SpinyHand
+
+__all__ = ["PlacedHands", "Placement", "PlacementKey"]
+
+DIGITS: Final = 15
+"""Of lengths in metres, and of directions, that count."""
+
+NOTHING: Final = Swept(0.0, 0.0, 0.0, 0.0, 0.0)
+"""In place of a hold that is not swept."""
+
+
+class Placement(NamedTuple):
+    """What a hand is to close on, and how.
+
+    Attributes
+    ----------
+    hold : Hold
+    surface : Surface
+        What a tile holds on it.
+    grasp : Grasp
+    hold_in_hand : Pose or None
+        The hold's frame in H; None if the hand is to be seated.
+    """
+
+    hold: Hold
+    surface: Surface
+    grasp: Grasp
+    hold_in_hand: Pose | None
+
+
+class PlacementKey:
+    """A placement as a key: equal where hands close alike; places are the same by their digits.
+
+    Its hash is worked out once, and asked for again and again.
+    """
+
+    __slots__ = ("_hash", "_parts")
+
+    def __init__(self, placement: Placement) -> None:
+        hold, surface, grasp, pose = placement
+        self._parts: Hashable = hold, surface, grasp
+        if pose is not None:
+            place = np.asarray(pose.position, dtype=float), np.asarray(pose.rotation, dtype=float)
+            self._parts = hold, surface, grasp, place[0].tobytes(), place[1].tobytes()
+        self._hash = hash(self._parts)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PlacementKey) and self._parts == other._parts
+
+
+class PlacedHands:
+    """Hands of one kind at their holds.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+    placements : sequence of Placement, length n
+    seatings : sequence of Seating, length n
+        Where their holds are.
+    shapes : sequence of Swept or None, length n
+        Of their holds.
+
+    Attributes
+    ----------
+    frames : FrameStack
+        Of the hands.
+    """
+
+    def __init__(
+        self,
+        hand: SpinyHand,
+        placements: Sequence[Placement],
+        seatings: Sequence[Seating],
+        shapes: Sequence[Swept | None],
+    ) -> None:
+        self.hand = hand
+        self.placements = placements
+        self.seatings = seatings
+        self.shapes = shapes
+        self.frames = hand.frame_stack(tuple([each.grasp.outer_rotation for each in placements]))
+        swept = np.array([shape or NOTHING for shape in shapes])
+        poses = [seating.pose for seating in seatings]
+        rotations = np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+        positions = np.concatenate([pose.position for pose in poses]).reshape(-1, 1, 3)
+        # from the centre of each hold's ball, in its axes
+        there = np.empty((len(poses), 4, 3))
+        there[:, :3], there[:, 3:] = rotations, -positions @ rotations
+        there[:, 3, 2] -= swept[:, 3]
+        # fingers that are alike but for rounding are alike
+        seen = (self.frames.rows @ there).round(DIGITS)
+        self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
+
+    def cuts(self, index: int) -> tuple[Swept, list[Plane]] | None:
+        """Return what the rock in the planes of a hand's fingers depends on, as `cut_of` takes it.
+
+        Planes are equal for fingers that are mirror images of one another. None if the rock is not
+        smooth.
+        """
+        shape, rows = self.shapes[index], self._seen[index]
+        if shape is None:
+            return None
+        into = rows[INTO]
+        planes: list[Plane] = []
+        for origin, along in zip(rows[JOINTS], rows[ALONG], strict=True):
+            (a, b, c), (d, e, f), (x, y, z) = along, into, origin
+            # every swept hold is its own mirror image in x and in y
+            if (a or d or x) < 0.0:
+                a, d, x = -a, -d, -x
+            if (b or e or y) < 0.0:
+                b, e, y = -b, -e, -y
+            planes.append((a, b, c, d, e, f, x, y, z))
+        return shape, planes
+
+    @cached_property
+    def gaps(self) -> list[list[float]]:
+        """From the base tiles and the palm's tiles of each hand to the rock along z of H [m].
+
+        Infinite where there is none.
+        """
+        return [
+            self._gaps_on(i) if shape is None else entries(shape, seen[TILES], seen[INTO])
+            for i, (shape, seen) in enumerate(zip(self.shapes, self._seen, strict=True))
+        ]
+
+    def _gaps_on(self, index: int) -> list[float]:
+        """Return the gaps of one hand on rock that is not smooth."""
+        there = self.seatings[index].pose.inverse()
+        into = there.rotation[:, 2]
+        hold = self.placements[index].hold
+        places = there.apply(self.frames.rows[index, TILES, :3])
+        return [hold.entry(place, into) for place in places]
+
+    def section(self, index: int, finger: int) -> Section | None:
+        """Return the rock in the plane of a finger of one hand; raw under one that clings."""
+        hold, grasp = self.placements[index].hold, self.placements[index].grasp
+        hand_in_hold = self.seatings[index].pose.inverse()
+        frame = self.frames.hands[index].fingers[finger]
+        return frame.cut(hold, hand_in_hold, raw=grasp.fingernail)

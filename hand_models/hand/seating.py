@@ -1,0 +1,273 @@
+"""Where a hand goes on a hold that was given no place.
+
+Axes of the hold are parallel to H's. The proximal tiles of the inner fingers touch at
+``seated_contact`` (c₁) from their joints: of the hold's place (x, z) in H one number is given by
+the grasp, and the other follows.
+
+- In a *pinch* the crest lies midway between the opposed finger bases, and the palm's stand-off z
+  follows.
+- Otherwise the *palm rests on the rock*, and the crest's place along x follows.
+- Where that cannot be had the palm rests on the rock with the crest under its centre.
+- On rock known by its outline only the palm rests on the highest rock found under it, on a few
+  lines along it; the crest of a pinch is the hold's origin.
+- On a plane every tile lies flat: the palm stands off by the tiles' height, within the spines'
+  travel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, TypeVar
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hand_models.base import Array, Pose
+from hand_models.finger import settle
+from hand_models.rock import Hold, Plane
+from hand_models.sections import PolylineSection
+
+if TYPE_CHECKING:
+    from hand_models.hand.grasp import Grasp
+    from hand_models.hand.spinyhand import SpinyHand
+
+__all__ = ["CENTRED", "Seating", "propose", "seat", "seating_given", "touches_seat"]
+
+Angle = TypeVar("Angle", float, Array)
+
+Place = tuple[float, float]
+"""(x, z) of a hold's frame in H [m]."""
+
+PLACED: Final = 1e-6
+"""How near c₁ a settled proximal contact must be for a seat to count [m]."""
+
+LEVEL: Final = 1e-3
+"""How far a finger that lies flat may be out of the palm's plane [rad]."""
+
+LINES: Final = 5
+"""Lines along the palm on which the highest rock under it is looked for."""
+
+NEAR: Final = 5e-5
+"""The same on an outline, on which a contact moves in small steps [m]."""
+
+TRIES: Final = 24
+"""Places tried to bracket a seat."""
+
+
+@dataclass(frozen=True)
+class Seating:
+    """Where a hold is in the hand. Arrays are read-only.
+
+    Attributes
+    ----------
+    pose : Pose
+        The hold's frame in H.
+    rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
+        How it was found.
+    """
+
+    pose: Pose
+    rule: str
+
+
+def seating_given(pose: Pose) -> Seating:
+    """Return the seating of a hold whose place is given, a copy that nobody can change."""
+    position, rotation = np.array(pose.position, dtype=float), np.array(pose.rotation, dtype=float)
+    position.setflags(write=False)
+    rotation.setflags(write=False)
+    return Seating(Pose(position, rotation), "given")
+
+
+LIKE_HAND: Final = np.eye(3)
+"""Axes of a hold that is seated."""
+
+LIKE_HAND.setflags(write=False)
+
+CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
+"""The palm on the rock, with the crest under its centre."""
+
+CENTRED.pose.position.setflags(write=False)
+
+
+def seat(hand: SpinyHand, hold: Hold, grasp: Grasp) -> Seating:
+    """Seat a hand on a hold that was given no place; see the module's text.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+    hold : Hold
+    grasp : Grasp
+    """
+    seating, meant = propose(hand, hold, grasp)
+    return seating if not meant or _holds(hand, hold, seating) else CENTRED
+
+
+def propose(hand: SpinyHand, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
+    """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
+
+    If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
+    """
+    _, y, z = hand.inner_place
+    if hold.shape == Plane.shape:
+        return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
+    pinch = grasp.pinch
+    crest = hand.pinch_crest if pinch else None
+    circle = hold.crest_circle(y)
+    if circle is None and hold.swept is None:
+        section = hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
+        if isinstance(section, PolylineSection):
+            return _on_outline(hand, section, _Top(hand, hold), crest), False
+    place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
+    if place is None:
+        return CENTRED, False
+    possible = place[1] >= 0.0 if pinch else abs(place[0]) <= 0.5 * hand.palm_length
+    if not possible:
+        return CENTRED, False
+    return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
+
+
+def touches_seat(hand: SpinyHand, kind: str, along: float) -> bool:
+    """Whether an inner finger's proximal contact is where a seat meant it to be."""
+    return kind == "face" and abs(along - hand.seated_contact) < PLACED
+
+
+def _shifted(x: float, z: float) -> Pose:
+    position = np.array([x, 0.0, z])
+    position.setflags(write=False)
+    return Pose(position, LIKE_HAND)
+
+
+def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) -> Place | None:
+    """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
+    x, _, z = hand.inner_place
+    reach = (radius + hand.finger.tile_height) ** 2 + hand.seated_contact**2
+    if crest is not None:
+        rise = reach - (x - crest) ** 2
+        return None if rise <= 0.0 else (crest, z + math.sqrt(rise) - depth)
+    run = reach - (depth - z) ** 2
+    return None if run <= 0.0 else (x - math.sqrt(run), 0.0)
+
+
+def _smooth(hand: SpinyHand, hold: Hold, crest: float | None) -> Place | None:
+    """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
+    x, y, z = hand.inner_joint.tolist()
+
+    def place(angle: Angle) -> tuple[Angle, Angle] | None:
+        point = hold.tangent_point(y, angle)
+        if point is None:
+            return None
+        # the tile's contact at that angle of the phalanx
+        u, v = np.cos(angle), np.sin(angle)
+        along, height = hand.seated_contact, hand.finger.tile_height
+        return x + along * u - height * v - point[0], z + along * v + height * u - point[1]
+
+    def miss(angle: Angle) -> Angle:
+        there = place(angle)
+        assert there is not None
+        return there[0] - crest if crest is not None else there[1]
+
+    if place(0.0) is None:
+        return None
+    angles = np.linspace(0.0, hand.finger.joint_upper[0], 64)
+    misses = miss(angles)
+    turns = np.flatnonzero(np.sign(misses[:-1]) * np.sign(misses[1:]) <= 0.0)
+    if not len(turns):
+        return None
+    first = int(turns[0])
+    root = brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
+    return place(float(root))
+
+
+def _holds(hand: SpinyHand, hold: Hold, seating: Seating) -> bool:
+    """Whether an inner finger's proximal tile does touch where seating meant it to."""
+    hand_in_hold = seating.pose.inverse()
+    section = hold.section(
+        hand_in_hold.apply(hand.inner_joint),
+        hand_in_hold.rotation[:, 0],
+        hand_in_hold.rotation[:, 2],
+    )
+    contact = settle(hand.finger, section, (0.0, 0.0)).contacts[0]
+    return touches_seat(hand, contact.kind, contact.along)
+
+
+# Rock that is known by its outline only -----------------------------------------------------------
+
+
+class _Top:
+    """How high the rock stands under a palm, on a few lines along it."""
+
+    def __init__(self, hand: SpinyHand, hold: Hold) -> None:
+        self._half = 0.5 * hand.palm_length
+        across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
+        sections = (
+            hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
+            for y in np.linspace(-across, across, LINES)
+        )
+        self._lines = [line for line in sections if isinstance(line, PolylineSection)]
+
+    def __call__(self, x: float) -> float | None:
+        """Return z, in the hold's frame, of the highest rock under a palm if the hold is at x."""
+        tops = [line.highest(-self._half - x, self._half - x) for line in self._lines]
+        return min((top for top in tops if top is not None), default=None)
+
+
+def _on_outline(
+    hand: SpinyHand, section: PolylineSection, top: _Top, crest: float | None
+) -> Seating:
+    """Seat a hand on a hold whose section under ``inner_left`` is a polyline."""
+    x, _, z = hand.inner_joint.tolist()
+    model = hand.finger
+    face = model.tile_range[0], model.joint_spacing, model.tile_height
+    limits = model.joint_lower[0], model.joint_upper[0]
+
+    def miss(place: Place | None) -> float:
+        """By how much the proximal contact misses c₁; least in rock, most where there is none."""
+        if place is None:
+            return math.nan
+        joint = x - place[0], z - place[1]
+        if section.face_clearance(joint, *face, limits[0]) <= 0.0:
+            return -hand.seated_contact
+        rest = section.rest(joint, *face, *limits)
+        return (model.joint_spacing if rest is None else rest.distance) - hand.seated_contact
+
+    def resting(along: float, stand_off: float = 0.0) -> Place | None:
+        highest = top(along)
+        return None if highest is None else (along, stand_off - highest)
+
+    level = resting(0.0, z + model.tile_height)
+    if level is None:
+        return CENTRED
+    lying = section.rest((x, z - level[1]), *face, *limits)
+    if lying is not None and lying.flat and abs(lying.angle) < LEVEL:
+        return Seating(_shifted(*level), "flat")
+    if crest is None:
+        half = 0.5 * hand.palm_length
+        place, rule = _first(miss, resting, np.linspace(-half, half, TRIES)), "palm_on_rock"
+    else:
+        offs = np.linspace(0.0, hand.finger.joint_spacing, TRIES)
+        place, rule = _first(miss, lambda off: resting(crest, off), offs), "pinch"
+    if place is None:
+        place, rule = resting(0.0), "palm_on_rock_centred"
+    assert place is not None
+    return Seating(_shifted(*place), rule)
+
+
+def _first(
+    miss: Callable[[Place | None], float],
+    place: Callable[[float], Place | None],
+    tries: Array,
+) -> Place | None:
+    """Return the place, nearest zero along its parameter, at which nothing is missed."""
+    misses = [miss(place(value)) for value in tries.tolist()]
+    roots = []
+    for i in np.flatnonzero(np.diff(np.sign(misses)) != 0.0).tolist():
+        if math.isfinite(misses[i] + misses[i + 1]):
+            low, high = float(tries[i]), float(tries[i + 1])
+            with suppress(ValueError):  # where the contact jumps over c₁ there is no root
+                root = float(brentq(lambda p: miss(place(p)), low, high, xtol=1e-9))
+                if abs(miss(place(root))) < NEAR:
+                    roots.append(root)
+    return place(min(roots, key=abs)) if roots else None

@@ -1,0 +1,251 @@
+"""A hand closed on a hold: where its tiles are, and what tension loads them with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, Indices
+from hand_models.finger import KINDS, STOPS, Contact, FingerModel, SettledFinger
+from hand_models.hand.grasp import Grasp
+from hand_models.hand.seating import Seating
+from hand_models.rock import Hold
+from hand_models.tile import HalfPlane, Surface
+
+if TYPE_CHECKING:
+    from hand_models.hand.spinyhand import SpinyHand
+    from hand_models.wrench_spaces import WrenchSpace
+
+__all__ = [
+    "CONTACTS",
+    "FINGERS",
+    "FINGERTIP_FORCE",
+    "NAIL",
+    "NAIL_SHEAR",
+    "STOPS",
+    "HandPostures",
+    "Palm",
+    "SettledHand",
+    "Tile",
+]
+
+FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
+"""Order of every list of four tensions; left is +y of H."""
+
+NAIL: Final = "nail"
+"""The ultrashort phalanx at a fingertip, by name, and the contact of one that hooks."""
+
+NAIL_SHEAR: Final = "nail_shear"
+"""Name of the limit of a nail that pulls toward its finger's base."""
+
+FINGERTIP_FORCE: Final = "fingertip_force"
+"""Name of the limit of a distal phalanx, or a nail, that presses into the rock."""
+
+
+CONTACTS: Final = (*KINDS, NAIL)
+"""What of a tile touches the rock, by code."""
+
+
+class HandPostures(NamedTuple):
+    """How four fingers stand; the attributes of their contacts, shapes (4, 3).
+
+    Attributes
+    ----------
+    angles : ndarray
+        θ of each phalanx [rad].
+    joints : ndarray of complex
+        x + i z of each joint in F [m].
+    alongs : ndarray
+        c, of each contact from its joint [m].
+    kinds, stops : ndarray of int8
+        Codes of `CONTACTS` and `hand_models.finger.postures.STOPS`.
+    """
+
+    angles: Array
+    joints: NDArray[np.complex128]
+    alongs: Array
+    kinds: NDArray[np.int8]
+    stops: NDArray[np.int8]
+
+    def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
+        """Return the fingers one by one."""
+        return tuple(
+            SettledFinger(
+                model,
+                tuple(
+                    Contact(angle, (joint.real, joint.imag), along, CONTACTS[kind], STOPS[stop])
+                    for angle, joint, along, kind, stop in zip(*finger, strict=True)
+                ),
+            )
+            for finger in zip(*(numbers.tolist() for numbers in self), strict=True)
+        )
+
+
+class Tile(NamedTuple):
+    """One finger tile's place among the hand's rows and columns.
+
+    Attributes
+    ----------
+    finger : str
+    phalanx : str
+        ``base``, ``proximal``, ``middle`` or ``distal``; ``nail`` where the hand clings with it.
+    contact : {'face', 'edge', 'frame', 'nail', 'none'}
+        What of it touches the rock; ``frame`` if its phalanx only rests beside the tile.
+    """
+
+    finger: str
+    phalanx: str
+    contact: str
+
+
+class Palm(NamedTuple):
+    """The palm on its rock.
+
+    Attributes
+    ----------
+    gaps : ndarray, shape (8,)
+        From each tile to the rock along z, infinite where there is none [m].
+    engaged : tuple of int
+        Tiles with rock within the spines' travel.
+    centre : ndarray, shape (3,)
+        Of the engaged tiles, where shear and pressing act [m]; the origin if none are engaged.
+    shear_limit : float
+        Along −x of H on the rock, by load sharing [N].
+    pressing_limit : float
+        Along +z [N].
+    """
+
+    gaps: Array
+    engaged: tuple[int, ...]
+    centre: Array
+    shear_limit: float
+    pressing_limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class SettledHand:
+    """A hand closed on a hold: where every tile is and what each newton of tension loads.
+
+    Attributes
+    ----------
+    hand : SpinyHand
+    hold : Hold
+    grasp : Grasp
+    surface : Surface
+    closing_tension : float
+        [N]
+    seating : Seating
+    postures : HandPostures
+        Of the fingers, in the order of `FINGERS`.
+    tiles : tuple of Tile
+        The 14 finger tiles, finger by finger, from the base outward; after each finger's, where the
+        hand clings, its nail.
+    finger_of : ndarray of int, shape (n,)
+        Index of each tile's finger.
+    positions : ndarray, shape (n, 3)
+        Of each tile's contact in H [m].
+    axes : ndarray, shape (n, 3, 3)
+        Rows: the unit force on the rock of shear, of normal and of lateral load, in H.
+    loads : ndarray, shape (n, 2, 2)
+        Shear and normal load, each at zero tension [N] and per newton of tension. A nail's normal
+        load is P across it; its shear A, along it, is passive.
+    nail_angles : ndarray, shape (4,)
+        How far each finger's nail has turned; all the way where it does not hook [rad].
+    nail_normals : ndarray, shape (4, 3)
+        Out of the rock where each finger's nail hooks, in H; zero where none does.
+    nail_rows : tuple of (ndarray, ndarray)
+        H and h of `Fingernail.rows` of each nail that hooks, in the order of the tiles.
+    stops : tuple of (int, int, ndarray)
+        Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
+    palm : Palm
+    sets : dict of float to WrenchSpace
+        What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
+    """
+
+    hand: SpinyHand
+    hold: Hold
+    grasp: Grasp
+    surface: Surface
+    closing_tension: float
+    seating: Seating
+    postures: HandPostures
+    tiles: tuple[Tile, ...]
+    finger_of: Indices
+    positions: Array
+    axes: Array
+    loads: Array
+    nail_angles: Array
+    nail_normals: Array
+    nail_rows: tuple[tuple[Array, Array], ...]
+    stops: tuple[tuple[int, int, Array], ...]
+    palm: Palm
+    sets: dict[float, WrenchSpace] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def fingers(self) -> tuple[SettledFinger, ...]:
+        """The fingers, in the order of `FINGERS`."""
+        return self.postures.fingers(self.hand.finger)
+
+    @cached_property
+    def touching(self) -> Array:
+        """Which tiles have rock under them, bool of shape (n,)."""
+        return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
+
+    @cached_property
+    def lateral_shares(self) -> Array:
+        """Share of its finger's lateral reaction that each tile carries, shape (n,)."""
+        counts = np.bincount(self.finger_of, weights=self.touching, minlength=len(FINGERS))
+        return np.where(self.touching, 1.0 / np.maximum(counts, 1.0)[self.finger_of], 0.0)
+
+    @cached_property
+    def nails(self) -> Array:
+        """Which tiles are nails that hook, bool of shape (n,)."""
+        return np.array([tile.contact == NAIL for tile in self.tiles])
+
+    @cached_property
+    def holding(self) -> Array:
+        """Which tiles and nails are on rock that they hold, bool of shape (n,)."""
+        return np.logical_or(self.touching, self.nails)
+
+    def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
+        """Return the limits of a nail's force, toward its finger's base and into the rock."""
+        structure = self.hand.structure
+        base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along
+        into = np.array([0.0, 0.0, 1.0])
+        (shear, normal), (pulled, pressed) = (
+            (self.axes[tile, :2] @ direction).tolist() for direction in (base, into)
+        )
+        return (
+            HalfPlane(NAIL_SHEAR, shear, normal, 0.0, structure.finger_shear),
+            HalfPlane(FINGERTIP_FORCE, pulled, pressed, 0.0, structure.fingertip_force),
+        )
+
+    def tile_loads(
+        self, tensions: Array, laterals: Array | None = None, axials: Array | None = None
+    ) -> Array:
+        """Return shear, normal and lateral load of each finger tile.
+
+        Parameters
+        ----------
+        tensions : ndarray, shape (4,)
+            Of the tendons [N].
+        laterals : ndarray, shape (4,), optional
+            Lateral reaction of each finger on the rock [N].
+        axials : ndarray, shape (4,), optional
+            A of each finger's nail [N].
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            [N]; c_sys + f c_act of Eq. 14.
+        """
+        f = np.asarray(tensions, dtype=float)[self.finger_of]
+        y = np.zeros(len(FINGERS)) if laterals is None else np.asarray(laterals, dtype=float)
+        planar = self.loads[..., 0] + self.loads[..., 1] * f[:, None]
+        if axials is not None:
+            planar[:, 0] += np.where(self.nails, np.asarray(axials)[self.finger_of], 0.0)
+        return np.column_stack([planar, self.lateral_shares * y[self.finger_of]])

@@ -1,0 +1,186 @@
+"""Many hands closed on their holds at once: seated, with their palms and their fingers on the rock.
+
+What is alike for all hands is worked out for all together, on arrays: where they are in the axes of
+their holds, the places and axes of their tiles. How each finger rests is found one by one
+(`hand_models.hand.closed_fingers`), for those that are mirror images once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from hand_models.base import InvalidInputError
+from hand_models.finger import KINDS, Laid
+from hand_models.hand.closed_fingers import close_fingers
+from hand_models.hand.finger_frames import BASES
+from hand_models.hand.hooked_nails import hook_nails
+from hand_models.hand.palms_on_rock import palms_on_rock
+from hand_models.hand.placement import PlacedHands, Placement
+from hand_models.hand.seating import CENTRED, propose, seat, seating_given, touches_seat
+from hand_models.hand.settled_hand import FINGERS, SettledHand
+from hand_models.hand.tiles_on_rock import hand_tiles, tiles_on_rock
+from hand_models.sections import Plane, cut_of
+
+if TYPE_CHECKING:
+    from hand_models.hand.spinyhand import SpinyHand
+
+__all__ = ["settle_hands"]
+
+Known = list[dict[Plane, list[Laid]]]
+"""Phalanges of each hand's fingers by what those depend on."""
+
+SEATED: Final = FINGERS.index("inner_left")
+"""The finger whose proximal contact seats a hand."""
+
+
+def settle_hands(
+    hand: SpinyHand, placements: Sequence[Placement]
+) -> list[SettledHand | InvalidInputError]:
+    """Close hands on their holds.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+        Which all of them are.
+    placements : sequence of Placement
+
+    Returns
+    -------
+    list of SettledHand or InvalidInputError
+        In order; an error in place of a hand that cannot be where it is, see `SpinyHand.settle`.
+    """
+    tensions = [each.grasp.closing_tension or hand.closing_tension for each in placements]
+    refused = {
+        i: InvalidInputError(
+            f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
+            field="grasp.closing_tension",
+        )
+        for i, tension in enumerate(tensions)
+        if tension > hand.maximum_tension
+    }
+    if not refused:
+        return _settle(hand, placements, tensions)
+    closable = [i for i in range(len(placements)) if i not in refused]
+    if not closable:
+        return list(refused.values())
+    settled = iter(
+        _settle(hand, [placements[i] for i in closable], [tensions[i] for i in closable])
+    )
+    return [refused[i] if i in refused else next(settled) for i in range(len(placements))]
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def _settle(
+    hand: SpinyHand, placements: Sequence[Placement], tensions: list[float]
+) -> list[SettledHand | InvalidInputError]:
+    placed, laid = _placed(hand, placements)
+    errors = {
+        i: _in_palm(hand, depth)
+        for i, depth in enumerate([min(depths[BASES:]) for depths in placed.gaps])
+        if depth < -hand.spine_travel
+    }
+    closed = close_fingers(placed, laid, tensions, errors)
+    tiles = tiles_on_rock(placed, closed, tensions)
+    nails = [hand.no_nails] * len(placements)
+    for i, each in enumerate(placements):
+        if each.grasp.fingernail and i not in errors:
+            try:
+                nails[i] = hook_nails(placed, closed, i, tensions[i])
+            except InvalidInputError as error:
+                errors[i] = error
+    palms = palms_on_rock(placed)
+    outcomes: list[SettledHand | InvalidInputError] = []
+    for i, (each, of_tiles, posture) in enumerate(
+        zip(placements, hand_tiles(tiles, nails), closed.of_hands(), strict=True)
+    ):
+        if i in errors:
+            outcomes.append(errors[i])
+            continue
+        settled = SettledHand(
+            hand=hand,
+            hold=each.hold,
+            grasp=each.grasp,
+            surface=each.surface,
+            closing_tension=tensions[i],
+            seating=placed.seatings[i],
+            postures=posture,
+            tiles=of_tiles.tiles,
+            finger_of=of_tiles.finger_of,
+            positions=of_tiles.positions,
+            axes=of_tiles.axes,
+            loads=of_tiles.loads,
+            nail_angles=nails[i].angles,
+            nail_normals=nails[i].normals,
+            nail_rows=nails[i].rows,
+            stops=closed.stops_of(i),
+            palm=palms[i],
+        )
+        outcomes.append(settled)
+    return outcomes
+
+
+def _in_palm(hand: SpinyHand, depth: float) -> InvalidInputError:
+    return InvalidInputError(
+        f"the hold stands {-1e3 * depth:.1f} mm inside the palm; "
+        f"at most {1e3 * hand.spine_travel:g} mm (the spines' travel) is possible",
+        field="hold",
+    )
+
+
+def _placed(
+    hand: SpinyHand, placements: Sequence[Placement]
+) -> tuple[PlacedHands, list[list[list[Laid]]]]:
+    """Return hands at their holds, seated where these have no place, and their fingers laid."""
+    shapes = [each.hold.swept for each in placements]
+    seatings, meant = [], []
+    for i, (each, shape) in enumerate(zip(placements, shapes, strict=True)):
+        if each.hold_in_hand is not None:
+            seatings.append(seating_given(each.hold_in_hand))
+            continue
+        seating, on_contact = propose(hand, each.hold, each.grasp)
+        if on_contact and shape is None:
+            seating, on_contact = seat(hand, each.hold, each.grasp), False
+        seatings.append(seating)
+        if on_contact:
+            meant.append(i)
+    known: Known = [{} for _ in placements]
+    placed = PlacedHands(hand, placements, seatings, shapes)
+    laid = _laid(placed, known)
+    off = [i for i in meant if not _on_seat(hand, laid[i][SEATED])]
+    if off:
+        for i in off:
+            seatings[i] = CENTRED
+        placed = PlacedHands(hand, placements, seatings, shapes)
+        laid = _laid(placed, known)
+    return placed, laid
+
+
+def _laid(placed: PlacedHands, known: Known) -> list[list[list[Laid]]]:
+    """Return the phalanges of the fingers of each hand that rest on smooth rock.
+
+    Of a hand's fingers that are alike the same ones, and those that are known.
+    """
+    laid: list[list[list[Laid]]] = []
+    for i, lain in enumerate(known):
+        cuts = placed.cuts(i)
+        if cuts is None:
+            laid.append([[] for _ in FINGERS])
+            continue
+        shape, planes = cuts
+        fingers: list[list[Laid]] = []
+        for plane in planes:
+            phalanges = lain.get(plane)
+            if phalanges is None:
+                cut = cut_of(shape, plane)
+                phalanges = lain[plane] = [] if cut is None else placed.hand.layer.lay(cut)
+            fingers.append(phalanges)
+        laid.append(fingers)
+    return laid
+
+
+def _on_seat(hand: SpinyHand, laid: list[Laid]) -> bool:
+    """Whether a finger's proximal contact is where a seat meant it to be."""
+    return bool(laid) and touches_seat(hand, KINDS[laid[0].kind], laid[0].along)

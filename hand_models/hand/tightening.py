@@ -1,0 +1,100 @@
+"""In which order a hand closes as its tendons are tightened, from its springs (Section 3.2).
+
+Each moving part of a finger holds against the tendon with a preload p and a spring K, and moves by
+x when the tendon's tension f at it, times its pulley's radius or ratio r, is more than both:
+
+    f M r = p + K x.
+
+So it starts at p / (M r), and is at rest, at its end of travel or on the rock, at (p + K x)/(M r).
+The fingernail turns until it is retracted (or hooks), each joint until its phalanx rests; the tiles
+slide until they catch the rock at the closing tension. The springs are meant to do this one after
+the other: nail, then joints from the base outward, then tiles.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.finger import PHALANGES
+from hand_models.hand.settled_hand import FINGERS, NAIL, SettledHand
+
+__all__ = ["TILES", "Closing", "Stage", "closing_sequence"]
+
+TILES = "tiles"
+"""Name of the last stage."""
+
+
+class Stage(NamedTuple):
+    """One part of a finger on its way.
+
+    Attributes
+    ----------
+    part : str
+        ``nail``, a phalanx (for its joint), or ``tiles``.
+    starts, ends : float
+        Tension of the tendon at which it begins to move and is at rest [N].
+    """
+
+    part: str
+    starts: float
+    ends: float
+
+
+class Closing(NamedTuple):
+    """How one finger closes.
+
+    Attributes
+    ----------
+    finger : str
+    stages : tuple of Stage
+        Nail, joints from the base outward, tiles.
+    in_order : bool
+        Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
+        sooner than the one before it ends.
+    """
+
+    finger: str
+    stages: tuple[Stage, ...]
+    in_order: bool
+
+
+def closing_sequence(settled: SettledHand) -> tuple[Closing, ...]:
+    """Return how each finger of a settled hand has closed, in the order of `FINGERS`.
+
+    A joint that the rock has pushed open, or that stands at its lower limit, has not been closed by
+    the tendon: its stage is over where it starts. The tiles' preload is not published, so it is
+    taken as zero and their start is not judged.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    """
+    hand = settled.hand
+    nail = hand.nail
+    sequence = []
+    for i, name in enumerate(FINGERS):
+        finger = settled.fingers[i]
+        model = finger.model
+        turned = nail.preload + nail.stiffness * float(settled.nail_angles[i])
+        stages = [Stage(NAIL, nail.preload / nail.pulley_radius, turned / nail.pulley_radius)]
+        pulls = finger.losses(name.startswith("outer")) * np.asarray(model.pulley_radii)
+        for phalanx, pull, stiffness, preload, angle in zip(
+            PHALANGES,
+            pulls.tolist(),
+            model.joint_stiffness,
+            model.joint_preload,
+            finger.joint_angles.tolist(),
+            strict=True,
+        ):
+            starts = max(0.0, preload / pull)
+            ends = max(starts, (preload + stiffness * angle) / pull)
+            stages.append(Stage(phalanx, starts, ends))
+        stages.append(Stage(TILES, 0.0, settled.closing_tension))
+        ordered = all(
+            later.starts >= earlier.ends for earlier, later in itertools.pairwise(stages[:-1])
+        )
+        sequence.append(Closing(name, tuple(stages), ordered))
+    return tuple(sequence)

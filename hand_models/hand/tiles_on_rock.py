@@ -1,0 +1,146 @@
+"""Where the tiles of closed hands are in H, along which axes they load the rock, and with what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.finger import FACE, PHALANGES
+from hand_models.hand.closed_fingers import ClosedFingers
+from hand_models.hand.finger_frames import (
+    AXES,
+    BASES,
+    COLUMNS,
+    KIND,
+    NORMAL,
+    OUTER,
+    POSITION,
+    SHEAR,
+)
+from hand_models.hand.hooked_nails import Nails
+from hand_models.hand.placement import PlacedHands
+from hand_models.hand.settled_hand import CONTACTS, FINGERS, NAIL, Tile
+
+__all__ = ["HandTiles", "hand_tiles", "tiles_on_rock"]
+
+
+def _names() -> list[tuple[str, str]]:
+    """Return finger and phalanx of each tile as they are worked out: base tiles, others, nails."""
+    bases = [(finger, "base") for finger in FINGERS[OUTER]]
+    bodies = [(finger, phalanx) for finger in FINGERS for phalanx in PHALANGES]
+    return [*bases, *bodies, *[(finger, NAIL) for finger in FINGERS]]
+
+
+NAMES: Final = _names()
+"""Finger and phalanx of each tile as they are worked out: first the base tiles, last the nails."""
+
+
+def _order(*, nails: bool) -> Indices:
+    tiles = len(NAMES) if nails else len(NAMES) - len(FINGERS)
+    # finger by finger, and of each the base, the phalanges, the nail
+    return np.array(sorted(range(tiles), key=lambda i: FINGERS.index(NAMES[i][0])))
+
+
+ORDER: Final = {nails: _order(nails=nails) for nails in (False, True)}
+"""Finger by finger, and of each from the base outward, the tiles of hands that cling or do not."""
+
+FINGER_OF: Final = {
+    nails: np.array([FINGERS.index(NAMES[i][0]) for i in order.tolist()])
+    for nails, order in ORDER.items()
+}
+"""Index of each tile's finger, of hands that cling or do not."""
+
+for finger_of in FINGER_OF.values():
+    finger_of.setflags(write=False)
+
+
+class HandTiles(NamedTuple):
+    """The tiles of one hand; attributes as of `SettledHand`."""
+
+    tiles: tuple[Tile, ...]
+    finger_of: Indices
+    positions: Array
+    axes: Array
+    loads: Array
+
+
+def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
+    """Return the tiles of hands that are closed: the base tiles, then the others.
+
+    Parameters
+    ----------
+    placed : PlacedHands
+    closed : ClosedFingers
+    tensions : sequence of float, length n
+        Closing tensions [N].
+
+    Returns
+    -------
+    ndarray, shape (n, 14, `COLUMNS`)
+    """
+    count, frames = len(tensions), placed.frames
+    # each phalanx's contact, axis of shear and axis of normal load, from the finger's plane to H
+    places = (closed.places @ frames.planes).reshape((*frames.across.shape[:3], 9))
+    bodies = np.concatenate([places, frames.across, closed.tiles], axis=3)
+    bases = _base_tiles(placed, tensions)
+    return np.concatenate([bases, bodies.reshape(count, -1, COLUMNS)], axis=1)
+
+
+def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
+    """Return the base tiles, which carry shear where rock is within the spines' travel."""
+    model, tiles = placed.hand.finger, placed.frames.base_tiles
+    engaged = [
+        (i, k, depth)
+        for i, (placement, depths) in enumerate(zip(placed.placements, placed.gaps, strict=True))
+        for k, depth in enumerate(depths[:BASES])
+        if abs(depth) <= placed.hand.spine_travel and not placement.grasp.fingernail
+    ]
+    if not engaged:
+        return tiles
+    tiles, gain = tiles.copy(), model.shear_gain
+    for i, k, depth in engaged:
+        tiles[i, k, POSITION.stop - 1] += depth
+        tiles[i, k, SHEAR] = (model.base_engagement - gain) * tensions[i], gain
+        tiles[i, k, KIND] = FACE
+    return tiles
+
+
+def hand_tiles(tiles: Array, nails: Sequence[Nails]) -> list[HandTiles]:
+    """Return the tiles of each hand, arrays read-only; of those that cling, their nails too."""
+    gripping = tiles.take(ORDER[False], axis=1)
+    made = _each_hand(gripping, nails=False)
+    for i, each in enumerate(nails):
+        if each.tiles is not None:
+            clinging = np.concatenate([tiles[i], each.tiles]).take(ORDER[True], axis=0)
+            made[i : i + 1] = _each_hand(clinging[None], nails=True)
+    return made
+
+
+def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
+    """Return the tiles of hands that all cling, or all do not, from their numbers."""
+    count, tiles, _ = numbers.shape
+    numbers.setflags(write=False)
+    kinds = numbers[..., KIND].astype(np.int8)
+    codes = kinds.tobytes()
+    axes = numbers[..., AXES].reshape(count, tiles, 3, 3)
+    loads = numbers[..., SHEAR.start : NORMAL.stop].reshape(count, tiles, 2, 2)
+    return [
+        HandTiles(_named(codes[i : i + tiles], nails), FINGER_OF[nails], *of_hand)
+        for i, *of_hand in zip(
+            range(0, count * tiles, tiles), numbers[..., POSITION], axes, loads, strict=True
+        )
+    ]
+
+
+@lru_cache(maxsize=4096)
+def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
+    """Return tiles from the codes of their contacts."""
+    names = [NAMES[i] for i in ORDER[nails].tolist()]
+    return tuple(
+        Tile(finger, part, CONTACTS[kind])
+        for (finger, part), kind in zip(names, kinds, strict=True)
+    )

@@ -1,0 +1,253 @@
+"""Parameter files: every physical number with its unit and its source.
+
+The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those of a tile's
+spines in ``spines.toml``, those of reading scanned rock in ``scan.toml``, those of the paper's
+experiments in ``experiments.toml``, beside this file. A caller's own file in the form of
+``hand.toml`` may replace some or all of the hand's (`hand_models.parameters.own`).
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from textwrap import shorten
+from typing import Any, Final, Literal, get_args
+
+import msgspec
+
+from hand_models.base import InvalidInputError
+
+__all__ = [
+    "ParameterTable",
+    "Quantity",
+    "experiment_table",
+    "hand_table",
+    "scan_table",
+    "spine_table",
+    "surface_table",
+]
+
+Source = Literal["paper", "measured", "calibrated", "assumed"]
+
+ENTRY: Final = "{ value, unit, source, note (optional) }"
+"""Form of an entry."""
+
+VALID: Final[Mapping[str, str]] = {
+    "value": "a number or a list of numbers",
+    "unit": "text",
+    "source": f"one of {', '.join(get_args(Source))}",
+    "note": "text",
+}
+"""What each part of an entry must be."""
+
+LONGEST_QUOTE: Final = 200
+"""Characters of a complaint about an entry: it may quote it."""
+
+
+class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A number, or a list of numbers, with where it comes from.
+
+    Attributes
+    ----------
+    value : float or list of float
+        In SI units.
+    unit : str
+        The SI unit, ``1`` for a ratio.
+    source : {'paper', 'measured', 'calibrated', 'assumed'}
+        How far to trust it.
+    note : str
+        Where exactly, or why.
+    """
+
+    value: float | list[float]
+    unit: str
+    source: Source
+    note: str = ""
+
+
+class ParameterTable:
+    """Quantities by section and name. Tables of the same content are equal.
+
+    Parameters
+    ----------
+    sections : mapping of str to mapping of str to Quantity
+        Not to be changed any more.
+    """
+
+    def __init__(self, sections: Mapping[str, Mapping[str, Quantity]]) -> None:
+        self.sections = {name: dict(section) for name, section in sections.items()}
+
+    @classmethod
+    def read(cls, text: str, origin: str) -> ParameterTable:
+        """Parse a parameter file.
+
+        Raises
+        ------
+        InvalidInputError
+            If the text is not TOML or an entry is not a quantity of finite numbers.
+        """
+        try:
+            return cls.of(tomllib.loads(text))
+        except (tomllib.TOMLDecodeError, InvalidInputError) as error:
+            raise InvalidInputError(str(error), field=origin) from None
+
+    @classmethod
+    def of(cls, raw: Mapping[str, Any]) -> ParameterTable:
+        """Take quantities as TOML or JSON has them.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is not a quantity of finite numbers; the field is its section and name.
+        """
+        sections: dict[str, dict[str, Quantity]] = {}
+        for section, entries in raw.items():
+            if not isinstance(entries, Mapping):
+                raise InvalidInputError("a section of entries is needed", field=section)
+            sections[section] = {
+                name: _quantity(entry, f"{section}.{name}") for name, entry in entries.items()
+            }
+        return cls(sections)
+
+    @classmethod
+    def load(cls, path: Path) -> ParameterTable:
+        """Read a parameter file from disk; raises what `read` raises, also if there is none."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
+        except UnicodeDecodeError:
+            raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
+        return cls.read(text, str(path))
+
+    def quantity(self, section: str, name: str) -> Quantity:
+        """Return one quantity.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is none of that name.
+        """
+        try:
+            return self.sections[section][name]
+        except KeyError:
+            raise InvalidInputError("missing parameter", field=f"{section}.{name}") from None
+
+    def scalar(self, section: str, name: str) -> float:
+        """Return a single number in SI units."""
+        value = self.quantity(section, name).value
+        if isinstance(value, list):
+            raise InvalidInputError("one number is needed, not a list", field=f"{section}.{name}")
+        return float(value)
+
+    def positive(self, section: str, name: str) -> float:
+        """Return a single number in SI units; refuse one that is not above 0."""
+        value = self.scalar(section, name)
+        if not value > 0.0:
+            raise InvalidInputError(f"must be above 0, got {value:g}", field=f"{section}.{name}")
+        return value
+
+    def vector(self, section: str, name: str) -> tuple[float, ...]:
+        """Return a list of numbers in SI units."""
+        value = self.quantity(section, name).value
+        if not isinstance(value, list):
+            raise InvalidInputError("a list of numbers is needed", field=f"{section}.{name}")
+        return tuple(float(v) for v in value)
+
+    def __iter__(self) -> Iterator[tuple[str, str, Quantity]]:
+        for section, quantities in self.sections.items():
+            for name, quantity in quantities.items():
+                yield section, name, quantity
+
+    def replaced(self, other: ParameterTable) -> ParameterTable:
+        """Return this table with the entries of ``other`` in place of its own."""
+        sections = {name: dict(section) for name, section in self.sections.items()}
+        for section, name, quantity in other:
+            sections.setdefault(section, {})[name] = quantity
+        return ParameterTable(sections)
+
+    def difference(self, other: ParameterTable) -> ParameterTable:
+        """Return the entries whose values are not those of ``other``."""
+        sections: dict[str, dict[str, Quantity]] = {}
+        for section, name, quantity in self:
+            theirs = other.sections.get(section, {}).get(name)
+            if theirs is None or theirs.value != quantity.value:
+                sections.setdefault(section, {})[name] = quantity
+        return ParameterTable(sections)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ParameterTable) and self.sections == other.sections
+
+    def __hash__(self) -> int:
+        # equal tables have equal names and values, in whatever order
+        return hash(
+            frozenset(
+                (section, name, tuple(q.value) if isinstance(q.value, list) else q.value)
+                for section, name, q in self
+            )
+        )
+
+
+def _quantity(raw: Any, field: str) -> Quantity:
+    try:
+        quantity = msgspec.convert(raw, Quantity)
+    except msgspec.ValidationError as error:
+        raise _refusal(raw, str(error), field) from None
+    value = quantity.value
+    numbers = enumerate(value) if isinstance(value, list) else [(None, value)]
+    for i, number in numbers:
+        if not math.isfinite(number):
+            place = f"{field}.value" if i is None else f"{field}.value[{i}]"
+            raise InvalidInputError(f"must be finite, got {number}", field=place)
+    return quantity
+
+
+def _refusal(raw: Any, complaint: str, field: str) -> InvalidInputError:
+    """Return the error of an entry that is no quantity, from msgspec's complaint about it."""
+    for name, valid in VALID.items():
+        # msgspec ends in the place of what is wrong
+        if isinstance(raw, Mapping) and f"`$.{name}" in complaint:
+            got = repr(raw[name])
+            got = got if len(got) <= LONGEST_QUOTE else f"{got[:LONGEST_QUOTE]} …"
+            return InvalidInputError(f"must be {valid}, got {got}", field=f"{field}.{name}")
+    said = shorten(complaint.replace("`", ""), LONGEST_QUOTE, placeholder=" …")
+    return InvalidInputError(f"{said[:1].lower()}{said[1:]}; an entry is {ENTRY}", field=field)
+
+
+def _bundled(name: str) -> ParameterTable:
+    text = resources.files("hand_models.parameters").joinpath(name).read_text(encoding="utf-8")
+    return ParameterTable.read(text, name)
+
+
+@cache
+def hand_table() -> ParameterTable:
+    """Return the numbers of the SpinyHand, ``hand.toml``."""
+    return _bundled("hand.toml")
+
+
+@cache
+def surface_table() -> ParameterTable:
+    """Return the numbers of the surfaces, ``surfaces.toml``."""
+    return _bundled("surfaces.toml")
+
+
+@cache
+def experiment_table() -> ParameterTable:
+    """Return the numbers of the paper's experiments, ``experiments.toml``."""
+    return _bundled("experiments.toml")
+
+
+@cache
+def scan_table() -> ParameterTable:
+    """Return the numbers of scanned rock, ``scan.toml``."""
+    return _bundled("scan.toml")
+
+
+@cache
+def spine_table() -> ParameterTable:
+    """Return the numbers of a tile's spines and of the rock's asperities, ``spines.toml``."""
+    return _bundled("spines.toml")

@@ -1,0 +1,245 @@
+"""A hold made of triangles: a scanned boulder, or any shape that has no formula.
+
+Triangles are counterclockwise seen from outside the rock. They need not close: rock is behind the
+side that they show. On loading they are welded, triangles without area are left out, spikes taken
+back and turned ones wound alike (`hand_models.rock.triangles`). A finger's plane cuts them, gaps of
+the cut up to a few millimetres are bridged, wider ones end the rock there, and the cut is smoothed
+to the scale of a tile (`hand_models.rock.smoothing`). The palm's and the base tiles' spines and the
+nails meet the raw triangles.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.parameters import ParameterTable, scan_table
+from hand_models.rock.outlined import OutlinedHold
+from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
+
+__all__ = ["Mesh", "read_mesh"]
+
+ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
+
+RAYS: Final = 5
+"""Rays along each side of the palm that look which way triangles face."""
+
+EDGE: Final = 1e-9
+"""By how much, of a triangle's size, a ray may pass beside it and still meet it."""
+
+
+def read_mesh(path: Path) -> tuple[Array, Indices]:
+    """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read, or has no triangles; the field is ``file``.
+    """
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(f"{path}: a mesh file ends in {', '.join(ENDINGS)}", field="file")
+    try:
+        if not path.is_file():
+            raise InvalidInputError(f"no such file: {path}", field="file")
+        mesh = trimesh.load_mesh(str(path), process=False)
+    except InvalidInputError:
+        raise
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
+    except ImportError:
+        # what is no text either, trimesh would have another package guess the encoding of
+        raise InvalidInputError(f"cannot read {path}: broken or cut short", field="file") from None
+    except Exception as error:
+        # every loader fails in its own way on what is no mesh
+        raise InvalidInputError(f"cannot read {path}: {error}", field="file") from None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise InvalidInputError(f"no triangles in {path}", field="file")
+    return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.intp)
+
+
+class Mesh(OutlinedHold):
+    """Triangles of rock.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3)
+        In the hold's frame [m].
+    faces : array_like of int, shape (m, 3)
+        Vertices of each triangle, counterclockwise from outside the rock.
+    hand : ParameterTable, optional
+        As of `OutlinedHold`.
+
+    Attributes
+    ----------
+    triangles : Triangles
+        As they are used.
+
+    Raises
+    ------
+    InvalidInputError
+        If numbers are not finite, faces name no vertices, nothing is left, nothing is near the
+        frame's origin, the size is that of another unit, or the triangles under the palm face away
+        from it.
+    """
+
+    shape = "mesh"
+
+    def __init__(
+        self, vertices: ArrayLike, faces: ArrayLike, hand: ParameterTable | None = None
+    ) -> None:
+        super().__init__(hand)
+        table = scan_table()
+        given = _checked(vertices, faces, table.scalar("scan", "largest"))
+        welded = weld(given)
+        if not len(welded.faces):
+            raise InvalidInputError("no triangle has an area", field="faces")
+        self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
+        self._view: _View | None = None
+        self._check_place(table.scalar("scan", "near"), table.vector("scan", "view"))
+
+    def _check_place(self, near: float, view: tuple[float, ...]) -> None:
+        corners = self.triangles.vertices[self.triangles.faces]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        if not ((low <= near) & (high >= -near)).all(axis=1).any():
+            nearest = np.linalg.norm(self.triangles.vertices, axis=1).min()
+            raise InvalidInputError(
+                f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
+                f"the rock under the palm; at most {near:g} m is possible",
+                field="vertices",
+            )
+        seen = self._facing(np.array([0.0, 0.0, 1.0]))
+        met = [
+            seen.first_side((x, y, 0.0))
+            for x in np.linspace(-view[0], view[0], RAYS)
+            for y in np.linspace(-view[1], view[1], RAYS)
+        ]
+        if sum(met) < 0:
+            raise InvalidInputError(
+                "the triangles under the palm face away from it; their vertices must be "
+                "counterclockwise seen from outside the rock: turn every face over, or close the "
+                "hole under the palm if it looks into the rock",
+                field="faces",
+            )
+
+    def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
+        """Return the cut through the triangles, small gaps bridged."""
+        o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
+        return bridge(cut(self.triangles, o, s, t, self._scale.reach), self._scale.bridged_gap)
+
+    def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
+        return self._facing(np.asarray(direction, dtype=float)).entry(point)
+
+    def _facing(self, direction: Array) -> _View:
+        """Return the triangles as seen along a direction; the last such view is kept."""
+        if self._view is None or not np.array_equal(self._view.direction, direction):
+            self._view = _View.along(self.triangles, direction)
+        return self._view
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """Triangles seen along a direction, for rays in that direction.
+
+    Attributes
+    ----------
+    direction : ndarray, shape (3,)
+    axes : ndarray, shape (3, 3)
+        Rows: two across the direction, and the direction.
+    corners : ndarray, shape (m, 3, 3)
+        Of each triangle, in these axes.
+    low, high : ndarray, shape (2, m)
+        Bounds of each triangle across the direction.
+    """
+
+    direction: Array
+    axes: Array
+    corners: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def along(cls, triangles: Triangles, direction: Array) -> _View:
+        across = np.linalg.svd(direction[None])[2][1:]
+        axes = np.vstack([across, direction])
+        corners = (triangles.vertices @ axes.T)[triangles.faces]
+        flat = np.ascontiguousarray(corners[:, :, :2].transpose(1, 2, 0))
+        return cls(direction, axes, corners, flat.min(axis=0), flat.max(axis=0))
+
+    def _hits(self, point: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+        """Return where a line meets triangles, in order, and which of these it enters."""
+        x, y, z = self.axes @ np.asarray(point, dtype=float)
+        hit = (self.low[0] <= x) & (x <= self.high[0])
+        hit &= (self.low[1] <= y) & (y <= self.high[1])
+        a, b, c = (self.corners[hit] - np.array([x, y, z])).transpose(1, 0, 2)
+        weights = np.stack([_area(b, c), _area(c, a), _area(a, b)])
+        area = weights.sum(axis=0)
+        slack = EDGE * np.abs(area)
+        met = ((weights >= -slack).all(axis=0) | (weights <= slack).all(axis=0)) & (area != 0.0)
+        depth = np.stack([a[:, 2], b[:, 2], c[:, 2]])
+        where = (weights * depth).sum(axis=0)[met] / area[met]
+        order = np.argsort(where, kind="stable")
+        # counterclockwise from outside is clockwise for a ray that enters
+        return where[order], (area[met] * np.linalg.det(self.axes) < 0.0)[order]
+
+    def first_side(self, point: ArrayLike) -> int:
+        """Return 1 if the first triangle on a line faces it, −1 if it shows its back, else 0."""
+        _, entering = self._hits(point)
+        return 0 if not len(entering) else 1 if entering[0] else -1
+
+    def entry(self, point: ArrayLike) -> float:
+        """Return how far from a point the rock begins: behind it if it is inside."""
+        where, entering = self._hits(point)
+        behind = np.flatnonzero(where <= 0.0)
+        if len(behind) and entering[behind[-1]]:
+            return float(where[behind[-1]])
+        ahead = np.flatnonzero((where > 0.0) & entering)
+        return float(where[ahead[0]]) if len(ahead) else math.inf
+
+
+def _area(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _checked(vertices: ArrayLike, faces: ArrayLike, largest: float) -> Triangles:
+    try:
+        points, corners = np.asarray(vertices, dtype=float), np.asarray(faces)
+    except (TypeError, ValueError):
+        raise InvalidInputError("three numbers each are needed", field="vertices") from None
+    if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 3:
+        raise InvalidInputError(
+            f"at least three points [x, y, z] are needed, got shape {points.shape}",
+            field="vertices",
+        )
+    if corners.ndim != 2 or corners.shape[1:] != (3,) or not len(corners):
+        raise InvalidInputError(
+            f"at least one triangle [i, j, k] is needed, got shape {corners.shape}", field="faces"
+        )
+    if not np.issubdtype(corners.dtype, np.integer):
+        raise InvalidInputError(f"whole numbers are needed, got {corners.dtype}", field="faces")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise InvalidInputError(
+            f"every number must be finite, got {points[bad[0]].tolist()}",
+            field=f"vertices[{bad[0]}]",
+        )
+    bad = np.flatnonzero(((corners < 0) | (corners >= len(points))).any(axis=1))
+    if len(bad):
+        raise InvalidInputError(
+            f"must name vertices 0 to {len(points) - 1}, got {corners[bad[0]].tolist()}",
+            field=f"faces[{bad[0]}]",
+        )
+    size = float(np.ptp(points, axis=0).max())
+    if size > largest:
+        raise InvalidInputError(
+            f"{size:.4g} m across; at most {largest:g} m is possible (vertices are in metres: "
+            "divide millimetres by 1000)",
+            field="vertices",
+        )
+    return Triangles(points, corners.astype(np.intp))

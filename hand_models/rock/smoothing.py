@@ -1,0 +1,231 @@
+"""A cut through scanned or drawn rock, smoothed to what a finger's tile can feel.
+
+A tile of length w bridges whatever is smaller than itself: it rests on the highest points under it.
+So a raw polyline is
+
+1. sampled at equal steps of its length,
+2. fitted with a parabola over every stretch of length w, and once more over w/2, so that no kink
+   of the first fit is left (Savitzky–Golay). That leaves circles as they are: their radius R
+   changes by 0.0038 (w/2)⁴/R³, 3 µm at R = 30 mm,
+3. raised along its normal, by what the raw points stand out of it at most within w/2, itself
+   smoothed over w/2 on both sides, so that no raw point stands out any more.
+
+What is sharper than a tile, such as the corner of an edge, becomes a rounding of about its length,
+at most a few millimetres off the rock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import savgol_filter
+from scipy.spatial import cKDTree
+
+from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.parameters import ParameterTable, hand_table, scan_table
+from hand_models.sections import PolylineSection
+
+__all__ = ["Scale", "raw_within", "smooth", "within"]
+
+STANDS_OUT: Final = 1e-5
+"""How far raw points may stand out of a raised curve [m]."""
+
+RAISES: Final = 4
+"""How often a curve is raised at most; each time far less is left."""
+
+FEWEST: Final = 5
+"""Points that a smoothed piece has at least."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Lengths of smoothing [m].
+
+    Attributes
+    ----------
+    tile : float
+        w, a tile's length.
+    spacing : float
+        Of the points of a smoothed curve.
+    bridged_gap : float
+        Open ends so near each other are joined; shorter pieces are left out.
+    reach : float
+        How far from a finger's base rock is of interest.
+    longest : float
+        Length of the rock that may be there.
+    """
+
+    tile: float
+    spacing: float
+    bridged_gap: float
+    reach: float
+    longest: float
+
+    @classmethod
+    def of(cls, hand: ParameterTable | None = None) -> Scale:
+        """Return the scale of a hand that grips, of the bundled one by default.
+
+        A hand whose finger, nail and half a palm reach farther than ``scan.toml`` says has rock
+        that is as much larger.
+        """
+        hand, table = hand or hand_table(), scan_table()
+        usual = table.scalar("cut", "reach")
+        reach = max(
+            usual,
+            len(hand.vector("finger", "pulley_radii")) * hand.scalar("finger", "joint_spacing")
+            + hand.scalar("finger", "tile_height")
+            + hand.scalar("nail", "length")
+            + 0.5 * hand.scalar("palm", "length"),
+        )
+        return cls(
+            tile=hand.scalar("finger", "tile_length"),
+            spacing=table.scalar("cut", "spacing"),
+            bridged_gap=table.scalar("cut", "bridged_gap"),
+            reach=reach,
+            longest=table.scalar("cut", "longest") * (reach / usual),
+        )
+
+
+def smooth(points: Array, scale: Scale) -> Array | None:
+    """Return a polyline, smoothed to a tile's scale and raised over its raw points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        With the rock on the left; closed if it ends where it begins [m].
+    scale : Scale
+
+    Returns
+    -------
+    ndarray, shape (m, 2), or None
+        None if the polyline is debris.
+    """
+    points = _distinct(points)
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    total = float(lengths.sum())
+    if total < scale.bridged_gap:
+        return None
+    closed = np.array_equal(points[0], points[-1])
+    count = max(round(total / scale.spacing) + 1, FEWEST)
+    at = np.linspace(0.0, total, count)
+    place = np.concatenate([[0.0], np.cumsum(lengths)])
+    raw = np.column_stack([np.interp(at, place, points[:, i]) for i in range(2)])
+    if closed:
+        raw = raw[:-1]
+    half = min(round(0.5 * scale.tile / (total / (count - 1))), (len(raw) - 1) // 2)
+    curve = raw
+    for part in (half, half // 2):
+        mode: Literal["wrap", "interp"] = "wrap" if closed else "interp"
+        curve = savgol_filter(curve, 2 * part + 1, min(2, 2 * part), axis=0, mode=mode)
+    curve = _raised(curve, np.vstack([raw, points]), half, closed)
+    return np.vstack([curve, curve[:1]]) if closed else curve
+
+
+def _raised(curve: Array, raw: Array, half: int, closed: bool) -> Array:
+    """Move a curve outward, smoothly, until no raw point stands out of it."""
+    mode: Literal["wrap", "nearest"] = "wrap" if closed else "nearest"
+    for _ in range(RAISES):
+        outward = _outward(curve, closed)
+        nearest: Indices = np.asarray(cKDTree(curve).query(raw)[1], dtype=np.intp)
+        excess = np.zeros(len(curve))
+        out = np.einsum("ij,ij->i", raw - curve[nearest], outward[nearest])
+        np.maximum.at(excess, nearest, out)
+        if excess.max() <= STANDS_OUT:
+            break
+        rise = maximum_filter1d(excess, 2 * half + 1, mode=mode)
+        # two moving means whose widths add up to that of the maximum leave no point below it
+        for size in (2 * (half // 2) + 1, 2 * (half - half // 2) + 1):
+            rise = uniform_filter1d(rise, size, mode=mode)
+        curve = curve + rise[:, None] * outward
+    return curve
+
+
+def _outward(curve: Array, closed: bool) -> Array:
+    """Return unit normals on the right of a curve, shape (n, 2)."""
+    if closed:
+        step = np.roll(curve, -1, axis=0) - np.roll(curve, 1, axis=0)
+    else:
+        step = np.gradient(curve, axis=0)
+    length = np.maximum(np.hypot(step[:, 0], step[:, 1]), np.finfo(float).tiny)
+    return np.column_stack([step[:, 1], -step[:, 0]]) / length[:, None]
+
+
+def within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
+    """Return what of raw polylines a finger can reach from the origin, smoothed.
+
+    Parameters
+    ----------
+    pieces : sequence of ndarray, shape (n, 2)
+        With the rock on their left [m].
+    scale : Scale
+
+    Returns
+    -------
+    PolylineSection or None
+        None if no rock is in reach.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is too long to be a surface of rock; the field is ``hold``.
+    """
+    curves = [smooth(run, scale) for run in _reached(pieces, scale)]
+    reached = [curve for curve in curves if curve is not None]
+    return PolylineSection(reached) if reached else None
+
+
+def raw_within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
+    """Return the same as `within`, debris left out but not smoothed: what a nail can feel."""
+    runs = [_distinct(run) for run in _reached(pieces, scale)]
+    reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= scale.bridged_gap]
+    return PolylineSection(reached, faceted=True) if reached else None
+
+
+def _distinct(points: Array) -> Array:
+    """Return a polyline without points that are as the one before."""
+    return np.asarray(points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))])
+
+
+def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
+    """Return the parts of polylines within the square |s|, |t| ≤ reach."""
+    runs = [run for piece in pieces for run in _runs(piece, scale.reach)]
+    length = sum(float(np.hypot(*np.diff(run, axis=0).T).sum()) for run in runs)
+    if length > scale.longest:
+        raise InvalidInputError(
+            f"its outline is {length:.3g} m long within {scale.reach:g} m of a finger's base; "
+            f"at most {scale.longest:g} m is possible: take noise and spikes out",
+            field="hold",
+        )
+    return runs
+
+
+def _runs(piece: Array, reach: float) -> list[Array]:
+    """Cut a polyline into the parts within the square |s|, |t| ≤ reach."""
+    outside = np.flatnonzero((np.abs(piece) > reach).any(axis=1))
+    if not len(outside):
+        return [piece]
+    if np.array_equal(piece[0], piece[-1]):
+        # begin where nothing is cut apart that belongs together
+        piece = np.roll(piece[:-1], -outside[0], axis=0)
+        piece = np.vstack([piece, piece[:1]])
+    start, step = piece[:-1], np.diff(piece, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_low, to_high = (-reach - start) / step, (reach - start) / step
+    still, between = step == 0.0, np.abs(start) <= reach
+    first = np.where(still, np.where(between, -np.inf, np.inf), np.minimum(to_low, to_high))
+    last = np.where(still, np.where(between, np.inf, -np.inf), np.maximum(to_low, to_high))
+    begin = np.maximum(first.max(axis=1), 0.0)
+    end = np.minimum(last.min(axis=1), 1.0)
+    breaks = np.flatnonzero((begin[1:] > 0.0) | (end[:-1] < 1.0)) + 1
+    runs: list[Array] = []
+    for run in np.split(np.arange(len(step)), breaks):
+        kept = run[begin[run] < end[run]]
+        if len(kept):
+            i, j = kept[0], kept[-1]
+            ends = start[i] + begin[i] * step[i], start[j] + end[j] * step[j]
+            runs.append(np.vstack([ends[0], piece[kept[1:]], ends[1]]))
+    return runs

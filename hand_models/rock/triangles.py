@@ -1,0 +1,227 @@
+"""Triangles of rock: made whole, and cut by planes.
+
+Scans come open, with holes, spikes and double vertices, and now and then with some triangles turned
+over. Here they are welded, freed of what is no surface, and wound alike; then every edge that a
+plane crosses is a point of the cut, and every triangle that it crosses leads from one such edge to
+another, so that the chains of a cut follow from the edges' names, without comparing coordinates.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hand_models.base import Array, Indices, InvalidInputError
+
+__all__ = ["Triangles", "bridge", "cut", "weld", "without_spikes", "wound_alike"]
+
+
+class Triangles(NamedTuple):
+    """Vertices, shape (n, 3) [m], and faces, shape (m, 3), counterclockwise from outside."""
+
+    vertices: Array
+    faces: Indices
+
+
+def weld(triangles: Triangles) -> Triangles:
+    """Return triangles that share vertices where these coincide, without those of no area."""
+    mesh = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
+    mesh.merge_vertices()
+    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    mesh.remove_unreferenced_vertices()
+    # columns of faces one after the other: cuts go through them one by one
+    return Triangles(
+        np.array(mesh.vertices, dtype=float), np.asfortranarray(mesh.faces, dtype=np.intp)
+    )
+
+
+def wound_alike(triangles: Triangles) -> Triangles:
+    """Return triangles of which no two neighbours run along their edge in the same direction.
+
+    In every connected part the fewer triangles are turned over. Edges of more than two triangles
+    part the surface.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part has only one side, as a Möbius strip does; the field is ``faces``.
+    """
+    faces = triangles.faces
+    count = len(faces)
+    first, second, alike = _neighbours(faces)
+    if alike.all():
+        return triangles
+    # a graph of triangles as they are (i) and turned over (count + i)
+    turned = np.where(alike, 0, count)
+    rows = np.concatenate([first, first + count])
+    columns = np.concatenate([second + turned, second + count - turned])
+    graph = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
+    _, part = connected_components(graph, directed=False)
+    as_is, over = part[:count], part[count:]
+    if (as_is == over).any():
+        raise InvalidInputError("the surface has only one side", field="faces")
+    # of the two ways to wind a part, one keeps more triangles than the other
+    kept = np.bincount(as_is, minlength=2 * count)
+    flip = kept[over] > kept[as_is]
+    ties = kept[over] == kept[as_is]
+    flip |= ties & (over < as_is)
+    return Triangles(
+        triangles.vertices, np.asfortranarray(np.where(flip[:, None], faces[:, ::-1], faces))
+    )
+
+
+def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
+    """Return pairs of triangles that alone share an edge, and whether they are wound alike."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    owner = np.tile(np.arange(len(faces)), 3)
+    names = _edge_names(edges[:, 0], edges[:, 1], int(faces.max()) + 1)
+    order = np.argsort(names, kind="stable")
+    names, owner, ascending = names[order], owner[order], (edges[:, 0] < edges[:, 1])[order]
+    # where three or more meet, as where boulders touch, none is the other's neighbour
+    alike = np.concatenate([[False], names[:-1] == names[1:], [False]])
+    pairs = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
+    return owner[pairs], owner[pairs + 1], ascending[pairs] != ascending[pairs + 1]
+
+
+def _edge_names(a: Indices, b: Indices, count: int) -> Indices:
+    """Return a number for each edge, the same in both directions."""
+    return np.asarray(np.minimum(a, b) * count + np.maximum(a, b))
+
+
+def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
+    """Return triangles whose spikes have been taken back.
+
+    A spike is a vertex, not on the border of a hole, that stands off the mean of its neighbours by
+    more than ``ratio`` times their root mean square distance from that mean: a needle too steep to
+    be rock at the scan's resolution. It is put back at the mean. What more than one vertex holds
+    up is rock.
+    """
+    vertices, faces = triangles
+    count = len(vertices)
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    used = sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
+    used = used + used.T
+    border = np.zeros(count, dtype=bool)
+    border[used.tocoo().row[used.tocoo().data == 1.0]] = True
+    used.data[:] = 1.0
+    number = np.maximum(np.asarray(used.sum(axis=1)).ravel(), 1.0)
+    mean = used @ vertices / number[:, None]
+    square = used @ (vertices**2).sum(axis=1) / number
+    spread = np.sqrt(np.maximum(square - (mean**2).sum(axis=1), 0.0))
+    spike = ~border & (np.linalg.norm(vertices - mean, axis=1) > ratio * spread)
+    return Triangles(np.where(spike[:, None], mean, vertices), faces)
+
+
+def cut(
+    triangles: Triangles, origin: Array, s_axis: Array, t_axis: Array, reach: float
+) -> list[Array]:
+    """Return the polylines in which a plane cuts triangles, with the rock on their left.
+
+    A vertex on the plane counts as beyond it, so that no triangle is met in a point.
+
+    Parameters
+    ----------
+    triangles : Triangles
+    origin, s_axis, t_axis : ndarray, shape (3,)
+        Of the plane's coordinates.
+    reach : float
+        Triangles outside the square |s|, |t| ≤ reach are left out [m].
+
+    Returns
+    -------
+    list of ndarray, shape (n, 2)
+        In the plane's coordinates; closed ones end where they begin [m].
+    """
+    vertices, faces = triangles
+    normal = np.cross(s_axis, t_axis)
+    heights = vertices @ normal - origin @ normal
+    beyond = heights >= 0.0
+    a, b, c = (beyond[faces[:, i]] for i in range(3))
+    faces = faces[(a != b) | (a != c)]
+    flat = (vertices[faces] - origin) @ np.column_stack([s_axis, t_axis])
+    near = ((flat.min(axis=1) <= reach) & (flat.max(axis=1) >= -reach)).all(axis=1)
+    faces, flat = faces[near], flat[near]
+    if not len(faces):
+        return []
+    # turn each triangle so that its first vertex is alone on its side of the plane
+    sides = beyond[faces]
+    alone = np.where(sides.sum(axis=1) == 1, sides.argmax(axis=1), sides.argmin(axis=1))
+    turn = (alone[:, None] + np.arange(3)) % 3
+    row = np.arange(len(faces))[:, None]
+    faces, flat, height = faces[row, turn], flat[row, turn], heights[faces[row, turn]]
+    part = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
+    points = flat[:, :1] + part * (flat[:, 1:] - flat[:, :1])
+    names = _edge_names(faces[:, :1], faces[:, 1:], len(vertices))
+    # with the rock on the left, from edge ab to ca if a is beyond the plane, else the other way
+    enter = np.where(sides[row[:, 0], alone], 0, 1)
+    ways = [(names[row[:, 0], i], points[row[:, 0], i]) for i in (enter, 1 - enter)]
+    (begins, begin), (leaves, end) = ways
+    return [_points(chain, begin, end) for chain in _chains(begins, leaves)]
+
+
+def _chains(enter: Indices, leave: Indices) -> list[list[int]]:
+    """Return the order of steps, each of which leads from one name to another."""
+    order = np.argsort(enter, kind="stable")
+    place = np.minimum(np.searchsorted(enter[order], leave), len(enter) - 1)
+    return _followed(np.where(enter[order][place] == leave, order[place], -1))
+
+
+def _followed(after: Indices) -> list[list[int]]:
+    """Return chains of indices of which each leads to another, or to none (−1).
+
+    A closed chain ends with its first index again.
+    """
+    led = np.zeros(len(after), dtype=bool)
+    led[after[after >= 0]] = True
+    following = after.tolist()
+    done = [False] * len(following)
+    chains: list[list[int]] = []
+    # open chains begin where none leads; what is left then is closed
+    for first in [*np.flatnonzero(~led).tolist(), *range(len(following))]:
+        chain: list[int] = []
+        step = first
+        while step >= 0 and not done[step]:
+            done[step] = True
+            chain.append(step)
+            step = following[step]
+        if chain:
+            chains.append([*chain, step] if step == first else chain)
+    return chains
+
+
+def _points(chain: list[int], begin: Array, end: Array) -> Array:
+    if len(chain) > 1 and chain[0] == chain[-1]:
+        return begin[chain]
+    return np.vstack([begin[chain], end[chain[-1:]]])
+
+
+def bridge(pieces: list[Array], gap: float) -> list[Array]:
+    """Return polylines joined where an end is within ``gap`` of a beginning, the nearest first.
+
+    A piece may be closed so, if it is longer than twice the gap.
+    """
+    closed = [p for p in pieces if np.array_equal(p[0], p[-1])]
+    pieces = [p for p in pieces if not np.array_equal(p[0], p[-1])]
+    if not pieces:
+        return closed
+    begins, ends = np.array([p[0] for p in pieces]), np.array([p[-1] for p in pieces])
+    near = cKDTree(ends).sparse_distance_matrix(cKDTree(begins), gap, output_type="ndarray")
+    after = np.full(len(pieces), -1)
+    led = np.zeros(len(pieces), dtype=bool)
+    for pair in near[np.argsort(near["v"], kind="stable")]:
+        i, j = int(pair["i"]), int(pair["j"])
+        short = i == j and np.hypot(*np.diff(pieces[i], axis=0).T).sum() <= 2.0 * gap
+        if after[i] < 0 and not led[j] and not short:
+            after[i], led[j] = j, True
+    joined = []
+    for chain in _followed(after):
+        ring = len(chain) > 1 and chain[0] == chain[-1]
+        parts = [pieces[i] for i in (chain[:-1] if ring else chain)]
+        joined.append(np.vstack([*parts, parts[0][:1]] if ring else parts))
+    return [*closed, *joined]

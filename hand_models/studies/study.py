@@ -1,0 +1,170 @@
+"""The paper's experiments, run again: figures, data, and every claim of the text held against them.
+
+A study is a module of this package with ``run(progress, hand) -> StudyResult`` and
+``plot(result, folder) -> list[Path]``; ``hand`` is the whole table of the hand, the bundled one or
+one with entries of the caller's. What the model misses stays among the claims as missed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, cast
+
+import msgspec
+
+from hand_models.base import InvalidInputError
+from hand_models.parameters import ParameterTable, hand_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "STUDIES",
+    "Claim",
+    "Progress",
+    "Study",
+    "StudyResult",
+    "as_json",
+    "load_study",
+    "run_study",
+    "save_picture",
+]
+
+STUDIES: Final[Mapping[str, str]] = {
+    **{
+        name: f"hand_models.studies.{name}"
+        for name in (
+            *("fig06", "fig07", "fig10", "fig12", "fig13", "fig14", "fig15", "fig16"),
+            "calibrate",
+        )
+    },
+    "sweep": "hand_models.experiments.sweep",
+}
+"""Modules of the studies by the name of their figure; loaded when asked for."""
+
+Progress = Callable[[int, int], None]
+"""Told how many steps are done, of how many."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper, and what the model gives.
+
+    Attributes
+    ----------
+    claim : str
+        In the paper's words, or close to them, with the place.
+    claimed, got : str or float
+        The paper's figure and ours.
+    holds : bool
+    role : {'test', 'calibration'}
+        Whether a parameter was fitted to the claim, so that it proves nothing.
+    """
+
+    claim: str
+    claimed: str | float
+    got: str | float
+    holds: bool
+    role: Literal["test", "calibration"] = "test"
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """What a study found.
+
+    Attributes
+    ----------
+    name, title : str
+        Its name, such as ``fig06``, and what it is about.
+    data : dict
+        The figure's data, as JSON can write it, SI units. ``not_tested``, if there, lists in words
+        what the paper says and nothing published can decide; ``summary`` what else a person
+        should read.
+    claims : tuple of Claim
+    hand : dict
+        By section and name, the entries in which the hand is not the bundled one; filled in by
+        `run_study`.
+    """
+
+    name: str
+    title: str
+    data: dict[str, Any]
+    claims: tuple[Claim, ...]
+    hand: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+class Study(Protocol):
+    """The functions of a study's module."""
+
+    def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
+        """Compute everything, for a hand."""
+
+    def plot(self, result: StudyResult, folder: Path) -> list[Path]:
+        """Write the pictures, and return where they are."""
+
+
+def load_study(name: str) -> Study:
+    """Return a study by the name of its figure.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is none of that name.
+    """
+    if name not in STUDIES:
+        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDIES)}", field="NAME")
+    return cast("Study", import_module(STUDIES[name]))
+
+
+def as_json(result: StudyResult) -> dict[str, Any]:
+    """Return the content of ``result.json``."""
+    return {"v": 1, **asdict(result)}
+
+
+def run_study(
+    name: str | Study, folder: Path, progress: Progress, hand: ParameterTable | None = None
+) -> tuple[StudyResult, list[Path]]:
+    """Run a study, and write ``result.json`` and its pictures into a folder.
+
+    Parameters
+    ----------
+    name : str or Study
+        One of `STUDIES`, or a study of the caller's own.
+    folder : Path
+        Made if it does not exist.
+    progress : Progress
+    hand : ParameterTable, optional
+        All numbers of the hand; the bundled ones by default.
+
+    Returns
+    -------
+    result : StudyResult
+    files : list of Path
+        ``result.json`` first.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no study of that name, or the hand cannot be what the study needs.
+    OSError
+        If the folder cannot be made or written to.
+    """
+    study = load_study(name) if isinstance(name, str) else name
+    folder.mkdir(parents=True, exist_ok=True)
+    hand = hand or hand_table()
+    changed = hand.difference(hand_table()).sections
+    result = replace(study.run(progress, hand), hand=msgspec.to_builtins(changed))
+    file = folder / "result.json"
+    text = json.dumps(as_json(result), indent=2, ensure_ascii=False, allow_nan=False)
+    file.write_text(text + "\n", encoding="utf-8")
+    return result, [file, *study.plot(result, folder)]
+
+
+def save_picture(figure: Figure, path: Path) -> Path:
+    """Write a figure of a study as PNG."""
+    figure.savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
+    return path

@@ -1,0 +1,327 @@
+"""Stick and slip of the tendon in one finger (Section 5.2, Appendix 9.3).
+
+The tendon runs from the motor, tension f = t_0, through phalanges i = 1 … n; its tension t_i is
+constant within a phalanx. It passes the boundary before phalanx i by v_i, positive toward the
+motor, and v_{n+1} = 0 at its end. On closing it runs toward the motor, and friction leaves
+t_i = M_i f with M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
+
+When the load changes, phalanx i moves by δx_i along the rock, positive toward the finger's base,
+its joint turns by δq_i, and its tile by δd_i toward the base relative to the phalanx:
+
+    c_p δd_i + r_i δq_i = v_i − v_{i+1}            (length of the tendon in phalanx i)
+    δT_i = k_i (δx_i + δd_i)                       (shear on the rock, Eq. 20)
+    c_p δt_i = δT_i + K_p δd_i                     (balance of the tile, Eq. 5)
+    v_i > 0 ⇒ t_i = (1 − μ_i) t_{i−1},   v_i < 0 ⇒ t_i = (1 + μ_i) t_{i−1},
+    v_i = 0 ⇒ between the two                      (the bounds 1 ± μ of Section 5.2).
+
+Where nothing slips, δd_i = −r_i δq_i / c_p is the δl of Eq. 20. Either the motor's tension f is
+given, or the motor is held: v_1 = 0, or the tendon goes slack (f = 0, v_1 > 0) and must be taut
+again before it pulls.
+
+There is one solution. Take two, and their differences Δ: where Δv_i > 0, Δt_i is at most
+(1 − μ_i) Δt_{i−1} or (1 + μ_i) Δt_{i−1}, so Δt_{i−1} ≤ 0 brings Δt_i ≤ 0; and
+Δv_{i+1} = Δv_i − c_p² Δt_i / (k_i + K_p). From Δt_0 = 0, Δv_1 > 0 would make every further Δv at
+least as large, but Δv_{n+1} = 0. So Δv_1 = 0; then Δt_1 = 0 in the same way, and so on down the
+finger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.parameters import ParameterTable
+from hand_models.tendon.complementarity import stick_slip
+
+__all__ = ["FingerTendon", "TendonState"]
+
+FRICTIONLESS: Final = 1e-8
+"""A coefficient of friction that is as good as none: such a boundary never sticks."""
+
+
+@dataclass(frozen=True, eq=False)
+class TendonState:
+    """A finger's tendon and tiles after a change of load.
+
+    Attributes
+    ----------
+    motor_tension : float
+        f [N].
+    tensions, shears : ndarray, shape (n,)
+        t_i and T_i [N].
+    tile_travel : ndarray, shape (n,)
+        d_i since closing, toward the base [m].
+    tendon_travel : ndarray, shape (n,)
+        Σ v_i since closing, toward the motor [m].
+    slack : float
+        Length that a held motor would have to wind before the tendon pulls again [m].
+    """
+
+    motor_tension: float
+    tensions: Array
+    shears: Array
+    tile_travel: Array
+    tendon_travel: Array
+    slack: float = 0.0
+
+
+@dataclass(frozen=True)
+class FingerTendon:
+    """What the tendon of a finger runs over, phalanx by phalanx from the base.
+
+    Attributes
+    ----------
+    pulley_ratio : float
+        c_p, strands of tendon at each tile's pulley.
+    contact_stiffness : tuple of float, length n
+        k_i of each tile on the rock, 0 where it touches nothing [N/m].
+    spring_stiffness : float
+        K_p of each tile's springs [N/m].
+    pulley_radii : tuple of float, length n
+        r_i of each joint, 0 for a tile on the finger's base [m].
+    friction : float
+        μ between adjacent phalanges, in [0, 1).
+    entry_friction : float
+        μ_1 between the motor and the first phalanx. Eq. 8 has no loss there, Section 5.2 bounds
+        the first element of M by 1 ± μ like the others. It matters only where f is given: a held
+        motor keeps v_1 = 0 with any friction.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is out of range, or their numbers differ.
+    """
+
+    pulley_ratio: float
+    contact_stiffness: tuple[float, ...]
+    spring_stiffness: float
+    pulley_radii: tuple[float, ...]
+    friction: float
+    entry_friction: float = 0.0
+
+    @classmethod
+    def from_table(cls, table: ParameterTable, base_tile: bool = False) -> FingerTendon:
+        """Build the tendon from ``hand.toml``, all its tiles on the rock.
+
+        Parameters
+        ----------
+        table : ParameterTable
+        base_tile : bool, optional
+            Whether a tile on the finger's base comes first.
+        """
+        radii = table.vector("finger", "pulley_radii")
+        if base_tile:
+            radii = (0.0, *radii)
+        return cls(
+            pulley_ratio=table.scalar("tile", "pulley_ratio"),
+            contact_stiffness=(table.scalar("tile", "contact_stiffness"),) * len(radii),
+            spring_stiffness=table.scalar("tile", "spring_stiffness"),
+            pulley_radii=radii,
+            friction=table.scalar("tendon", "friction"),
+            entry_friction=table.scalar("tendon", "entry_friction"),
+        )
+
+    def __post_init__(self) -> None:
+        _check("pulley_ratio", self.pulley_ratio, 0.0 < self.pulley_ratio < np.inf, "above 0")
+        stiffness, springs = self.contact_stiffness, self.spring_stiffness
+        _check("spring_stiffness", springs, 0.0 <= springs < np.inf, "not negative [N/m]")
+        held = all(0.0 <= k < np.inf and k + springs > 0.0 for k in stiffness)
+        _check("contact_stiffness", stiffness, held, "not negative, and above 0 without springs")
+        same = 0 < len(stiffness) == len(self.pulley_radii)
+        _check("pulley_radii", self.pulley_radii, same, "one for each contact stiffness")
+        for name in ("friction", "entry_friction"):
+            mu = getattr(self, name)
+            _check(name, mu, 0.0 <= mu < 1.0, "in [0, 1)")
+
+    def closed(self, tension: float, shears: Sequence[float] | Array) -> TendonState:
+        """Return the finger as it has closed, its tensions by Eq. 8.
+
+        Parameters
+        ----------
+        tension : float
+            f at which it closed [N].
+        shears : sequence of float, length n
+            What each tile then drags the rock with [N].
+        """
+        _check("tension", tension, 0.0 <= tension < np.inf, "finite and not negative [N]")
+        n = len(self.pulley_radii)
+        losses = (1.0 - self.friction) ** np.arange(n, dtype=float)
+        return TendonState(
+            motor_tension=float(tension),
+            tensions=np.asarray(tension * losses),
+            shears=self._of_phalanges("shears", shears),
+            tile_travel=np.zeros(n),
+            tendon_travel=np.zeros(n),
+        )
+
+    def at_tension(
+        self,
+        state: TendonState,
+        tension: float,
+        shift: Sequence[float] | Array | None = None,
+        turn: Sequence[float] | Array | None = None,
+    ) -> TendonState:
+        """Change the load with the motor's tension given; the motor takes up any slack.
+
+        Exact for a step at whose end every boundary that slipped on the way still slips.
+
+        Parameters
+        ----------
+        state : TendonState
+            From `closed` or an earlier change of load of this tendon.
+        tension : float
+            f after the change [N].
+        shift, turn : sequence of float, length n, optional
+            δx_i, of each phalanx along the rock toward the finger's base [m]; δq_i, of each joint,
+            closing [rad].
+
+        Raises
+        ------
+        InvalidInputError
+            If the tension is negative, or a number is not finite or missing.
+        SolverError
+            If rounding errors keep the solution from being found.
+        """
+        _check("tension", tension, 0.0 <= tension < np.inf, "finite and not negative [N]")
+        run, change = self._entered, self._change(state, shift, turn)
+        alone = run.tensions[:, 0] * tension
+        a = stick_slip(
+            (self._travel(run.tensions[:, 1:])[run.rubs], self._travel(alone, change)[run.rubs]),
+            (run.before[run.rubs, 1:], run.before[run.rubs, 0] * tension),
+        )
+        return self._after(state, tension, alone + run.tensions[:, 1:] @ a, change)
+
+    def held(
+        self,
+        state: TendonState,
+        shift: Sequence[float] | Array | None = None,
+        turn: Sequence[float] | Array | None = None,
+    ) -> TendonState:
+        """Change the load with the motor held.
+
+        The tendon gives no length past the first boundary, whatever its friction; the motor's own
+        strand keeps its tension as far as that friction can hold the difference.
+
+        Parameters, exceptions and exactness as of `at_tension`.
+        """
+        run, change = self._held, self._change(state, shift, turn)
+        rows = np.concatenate([[0], np.flatnonzero(run.rubs)])
+        free = self._travel(np.zeros(len(run.rubs)), change)
+        free[0] += state.slack / self._unit
+        found = stick_slip(
+            (self._travel(run.tensions)[rows], free[rows]),
+            (run.before[run.rubs], np.zeros(len(rows) - 1)),
+        )
+        first, mu = float(found[0]), self.entry_friction
+        tension = min(max(state.motor_tension, first / (1.0 + mu)), first / (1.0 - mu))
+        slack = 0.0 if first > 0.0 else float(free[0]) * self._unit
+        return self._after(state, tension, run.tensions @ found, change, slack)
+
+    @cached_property
+    def _give(self) -> Array:
+        """Return how far a tile travels per newton, 1 / (k + K_p), shape (n,) [m/N]."""
+        return np.asarray(1.0 / (np.array(self.contact_stiffness) + self.spring_stiffness))
+
+    @cached_property
+    def _unit(self) -> float:
+        """Return a phalanx's share of tendon per newton, in which travels are scaled [m/N]."""
+        return float(self.pulley_ratio**2 * self._give.mean())
+
+    @cached_property
+    def _entered(self) -> _Run:
+        return _Run((self.entry_friction, *(self.friction,) * (len(self.pulley_radii) - 1)))
+
+    @cached_property
+    def _held(self) -> _Run:
+        return _Run((0.0, *(self.friction,) * (len(self.pulley_radii) - 1)))
+
+    def _change(
+        self,
+        state: TendonState,
+        shift: Sequence[float] | Array | None,
+        turn: Sequence[float] | Array | None,
+    ) -> _Change:
+        pushed = np.array(self.contact_stiffness) * self._of_phalanges("shift", shift)
+        wound = np.array(self.pulley_radii) * self._of_phalanges("turn", turn)
+        return _Change(state.tensions, pushed, wound)
+
+    def _tile_travel(self, tensions: Array, change: _Change) -> Array:
+        """Return δd (Eqs. 5 and 20) [m]."""
+        rise = self.pulley_ratio * (tensions - change.tensions)
+        return np.asarray(self._give * (rise - change.pushed))
+
+    def _travel(self, tensions: Array, change: _Change | None = None) -> Array:
+        """Return v, what the phalanges from each boundary on give, in units [N].
+
+        The part of it that is linear in the tensions, by column, or all of a change.
+        """
+        if change is None:
+            given = self.pulley_ratio**2 * self._give[:, None] * tensions
+        else:
+            given = self.pulley_ratio * self._tile_travel(tensions, change) + change.wound
+        return np.asarray(np.cumsum(given[::-1], axis=0)[::-1] / self._unit)
+
+    def _after(
+        self,
+        state: TendonState,
+        tension: float,
+        tensions: Array,
+        change: _Change,
+        slack: float = 0.0,
+    ) -> TendonState:
+        travel = self._tile_travel(tensions, change)
+        pressed = np.array(self.contact_stiffness) * travel
+        return TendonState(
+            motor_tension=float(tension),
+            tensions=tensions,
+            shears=state.shears + change.pushed + pressed,
+            tile_travel=state.tile_travel + travel,
+            tendon_travel=state.tendon_travel + self._unit * self._travel(tensions, change),
+            slack=slack,
+        )
+
+    def _of_phalanges(self, field: str, values: Sequence[float] | Array | None) -> Array:
+        n = len(self.pulley_radii)
+        if values is None:
+            return np.zeros(n)
+        given = np.array(values, dtype=float)
+        valid = given.shape == (n,) and bool(np.isfinite(given).all())
+        _check(field, values, valid, f"{n} finite numbers")
+        return given
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """Tensions before a change of load, k_i δx_i [N] and r_i δq_i [m] of it."""
+
+    tensions: Array
+    pushed: Array
+    wound: Array
+
+
+class _Run:
+    """Tensions along the tendon as `complementarity` has them: t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i.
+
+    ``tensions`` gives t_1 … t_n and ``before`` t_0 … t_{n−1}; their first columns are per newton of
+    t_0, the others per newton of a at each boundary that has friction (``rubs``).
+    """
+
+    def __init__(self, friction: Sequence[float]) -> None:
+        mu = np.array(friction)
+        self.rubs = mu > FRICTIONLESS
+        before, columns = np.eye(1, len(mu) + 1)[0], np.eye(len(mu) + 1)[1:]
+        rows = [before]
+        for i, mu_i in enumerate(mu):
+            rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * columns[i])
+        chosen = np.array(rows)[:, np.concatenate([[True], self.rubs])]
+        self.tensions, self.before = chosen[1:], chosen[:-1]
+
+
+def _check(field: str, value: object, valid: bool, needed: str) -> None:
+    if not valid:
+        raise InvalidInputError(f"must be {needed}, got {value}", field=field)

@@ -1,0 +1,276 @@
+"""Half-planes inside and outside a tile's limit surface, and the gap between them.
+
+The surface r = F(d), d a direction of the load, is boat-shaped and not convex: the region
+{ r d : r ≤ F(d) } has dents, at φ_max in the finger plane and, deeper, where the load turns
+sideways while it pulls off. A planner needs a convex region inside it. In the finger plane that is
+bounded by chords a T + b P ≤ c of the curve of Eq. 21 (P = −N is the pull). Each chord answers for
+the loads that lie, seen from the side, between its two ends: there it takes as much lateral load Y
+as keeps them all inside,
+
+    a_Y = c max_d ((1 / F(d) − (a t + b p) / c) / y),    d = (t, p, y).
+
+A convex region runs straight from its farthest lateral load to its farthest pull, so what a tile
+loses sideways under pull-off is lost in pure lateral load too; pressing gives it back. The outer
+region has the same normals, moved out until they touch: c = max_d F(d) (a t + b p + a_Y y).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+
+if TYPE_CHECKING:
+    from hand_models.tile.surface import Surface
+
+__all__ = ["BoundsGap", "HalfPlane", "bounds_gap", "inner_pieces", "outer_pieces", "reach"]
+
+GRID: Final = (129, 33)
+"""Samples of φ and of θ in a search for a largest value."""
+
+FINE_GRID: Final = (17, 17)
+"""Samples each time that such a search begins anew around the best."""
+
+NEAR: Final = 2.0
+"""How many samples to either side it then looks."""
+
+ZOOMS: Final = 8
+"""Grids of a search in all."""
+
+MARGIN: Final = 1e-4
+"""Relative allowance for what a search may have missed: near pure pull-off, where all θ are one,
+half the square of its first step in φ."""
+
+LEAST_LATERAL: Final = 1e-3
+"""Share of a load out of the finger plane from which on the search looks."""
+
+
+@dataclass(frozen=True)
+class HalfPlane:
+    """A limit ``a_shear T + a_normal N + a_lateral |Y| ≤ capacity`` of one tile.
+
+    Attributes
+    ----------
+    limit : str
+        ``shear`` for the side that pressing governs, ``pull_off`` for the others.
+    a_shear, a_normal, a_lateral : float
+        Coefficients of the tile's shear T, normal N (> 0 pressing) and lateral load Y.
+    capacity : float
+        Right-hand side [N].
+    """
+
+    limit: str
+    a_shear: float
+    a_normal: float
+    a_lateral: float
+    capacity: float
+
+
+class BoundsGap(NamedTuple):
+    """How far half-planes are from the limit surface, for loads that pull off (T ≥ 0, N ≤ 0).
+
+    Attributes
+    ----------
+    inner_volume, outer_volume : float
+        Volumes within the inner and the outer half-planes, over that within the surface.
+    inner_worst, outer_worst : float
+        The least and the largest ratio of a reach to the surface's, over all directions.
+    """
+
+    inner_volume: float
+    outer_volume: float
+    inner_worst: float
+    outer_worst: float
+
+
+@lru_cache(maxsize=256)
+def inner_pieces(surface: Surface) -> tuple[HalfPlane, ...]:
+    """Return half-planes whose intersection lies inside the limit surface, for shear T ≥ 0.
+
+    Returns
+    -------
+    tuple of HalfPlane
+        The one that bounds shear, then the chords from pure shear to φ_max. The last chord runs on
+        beyond φ_max; where it would leave the curve there (which stays at f_min), one more chord,
+        down to pure pull-off, closes the region.
+    """
+    nodes = _nodes(surface)
+    # a gain steeper than the first chord would cut into the side of pull-off
+    shear, pull, _ = _chord(*nodes[:2])
+    gain = min(surface.compression_gain, pull / shear if shear > 0.0 else math.inf)
+    sideways = surface.shear_limit / surface.lateral_limit
+    if gain > 0.0:
+        # pressed sideways, it may gain no more than γ N either
+        sideways = max(sideways, gain / surface.compression_gain)
+    pieces = [HalfPlane("shear", 1.0, -gain, sideways, surface.shear_limit)]
+    sectors = [math.atan2(pull, shear) for shear, pull in nodes[:-1]] + [math.pi / 2]
+    for (start, end), sector in zip(
+        itertools.pairwise(nodes), itertools.pairwise(sectors), strict=True
+    ):
+        shear, pull, capacity = _chord(start, end)
+        sideways = _lateral_coefficient(surface, (shear, pull, capacity), sector)
+        pieces.append(HalfPlane("pull_off", shear, -pull, sideways, capacity))
+    return tuple(pieces)
+
+
+@lru_cache(maxsize=256)
+def outer_pieces(surface: Surface) -> tuple[HalfPlane, ...]:
+    """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
+
+    Where pressing raises the strength faster than a normal allows, it is tilted as far as needed.
+    """
+    pieces = []
+    for piece in inner_pieces(surface):
+        a, y = piece.a_shear, piece.a_lateral
+        pull = max(-piece.a_normal, surface.compression_gain * math.hypot(a, y))
+        capacity = _support(surface, (a, pull, y))
+        pieces.append(HalfPlane(piece.limit, a, -pull, y, capacity))
+    return tuple(pieces)
+
+
+def reach(pieces: Sequence[HalfPlane], directions: Array) -> Array:
+    """Return how far half-planes let a load go.
+
+    Parameters
+    ----------
+    pieces : sequence of HalfPlane
+    directions : ndarray, shape (n, 3)
+        Unit vectors of shear T, normal N and lateral load Y.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [N]; infinite where nothing bounds the load.
+    """
+    found = np.full(len(directions), np.inf)
+    for piece in pieces:
+        slope = directions[:, 0] * piece.a_shear + directions[:, 1] * piece.a_normal
+        slope += np.abs(directions[:, 2]) * piece.a_lateral
+        with np.errstate(divide="ignore"):
+            found = np.minimum(
+                found, np.where(slope > 0.0, piece.capacity / np.maximum(slope, 0.0), np.inf)
+            )
+    return found
+
+
+def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
+    """Return the gap between inner half-planes, limit surface and outer half-planes.
+
+    Parameters
+    ----------
+    surface : Surface
+    directions : ndarray, shape (n, 3)
+        Unit vectors of T ≥ 0, N ≤ 0 and Y, evenly spread, for the volumes are sums over them.
+    """
+    angle = np.arctan2(-directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
+    azimuth = np.arctan2(np.abs(directions[:, 2]), directions[:, 0])
+    exact = surface.strength(angle, azimuth)
+    inner, outer = (reach(p(surface), directions) for p in (inner_pieces, outer_pieces))
+    volume = float(np.sum(exact**3))
+    return BoundsGap(
+        inner_volume=float(np.sum(inner**3)) / volume,
+        outer_volume=float(np.sum(outer**3)) / volume,
+        inner_worst=float((inner / exact).min()),
+        outer_worst=float((outer / exact).max()),
+    )
+
+
+def _nodes(surface: Surface) -> list[tuple[float, float]]:
+    """Return the ends of the chords, (shear T, pull P) on the curve of Eq. 21 [N]."""
+    angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
+    radii = surface.strength(angles)
+    nodes = [
+        (float(r * np.cos(a)), float(r * np.sin(a))) for a, r in zip(angles, radii, strict=True)
+    ]
+    last = _chord(nodes[-2], nodes[-1])
+    if surface.pull_off_angle < math.pi / 2 and last[2] > last[1] * surface.pull_off_limit:
+        nodes.append((0.0, surface.pull_off_limit))
+    return nodes
+
+
+def _chord(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float, float]:
+    """Return (a, b, c) of the line ``a T + b P = c`` through two points, with a² + b² = 1."""
+    a = end[1] - start[1]
+    b = start[0] - end[0]
+    scale = math.hypot(a, b)
+    a, b = a / scale, b / scale
+    return a, b, a * start[0] + b * start[1]
+
+
+def _lateral_coefficient(
+    surface: Surface, chord: tuple[float, float, float], sector: tuple[float, float]
+) -> float:
+    """Return the least a_Y that keeps a chord inside the surface over its sector."""
+    a, b, c = chord
+
+    def needed(angle: Array, azimuth: Array) -> Array:
+        t, p, y = _direction(angle, azimuth)
+        need = c / surface.strength(angle, azimuth) - (a * t + b * p)
+        # close to the finger plane the chord is inside anyway
+        return np.where(y > LEAST_LATERAL, need / np.maximum(y, LEAST_LATERAL), -np.inf)
+
+    return _largest(needed, surface.pull_off_angle, sector) * (1.0 + MARGIN)
+
+
+def _support(surface: Surface, normal: tuple[float, float, float]) -> float:
+    """Return the largest load along (a, b, a_Y) on the surface [N]."""
+
+    def along(angle: Array, azimuth: Array) -> Array:
+        t, p, y = _direction(angle, azimuth)
+        a, b, sideways = normal
+        return np.asarray(surface.strength(angle, azimuth) * (a * t + b * p + sideways * y))
+
+    return _largest(along, surface.pull_off_angle, (0.0, math.pi / 2)) * (1.0 + MARGIN)
+
+
+def _direction(angle: Array, azimuth: Array) -> tuple[Array, Array, Array]:
+    """Return (t, p, y) of φ and θ."""
+    return np.cos(angle) * np.cos(azimuth), np.sin(angle), np.cos(angle) * np.sin(azimuth)
+
+
+def _largest(
+    function: Callable[[Array, Array], Array], kink: float, sector: tuple[float, float]
+) -> float:
+    """Return the largest value of a function of φ and θ over a sector, on ever finer grids.
+
+    The sector is in the angle ω of a direction seen from the side, tan φ = tan ω cos θ. Between the
+    angles where the function or the sector's edge has a kink it is smooth.
+    """
+    kinks = sorted({0.0, min(kink, sector[1]), *sector})
+    return max(_largest_between(function, pair, sector) for pair in itertools.pairwise(kinks))
+
+
+def _largest_between(
+    function: Callable[[Array, Array], Array],
+    angles: tuple[float, float],
+    sector: tuple[float, float],
+) -> float:
+    bounds = (angles, (0.0, 1.0))
+    ranges = list(bounds)
+    best, counts = -math.inf, GRID
+    for _ in range(ZOOMS):
+        axes = [np.linspace(*ends, n) for ends, n in zip(ranges, counts, strict=True)]
+        angle = axes[0][:, None]
+        first, last = (_azimuth(angle, side) for side in sector)
+        values = function(angle, first + (last - first) * axes[1][None, :])
+        place = np.unravel_index(int(values.argmax()), values.shape)
+        best, counts = max(best, float(values[place])), FINE_GRID
+        for k, axis in enumerate(axes):
+            step = NEAR * (axis[1] - axis[0])
+            low, high = bounds[k]
+            ranges[k] = (max(low, axis[place[k]] - step), min(high, axis[place[k]] + step))
+    return best
+
+
+def _azimuth(angle: Array, side: float) -> Array:
+    """Return the θ at which a direction at φ is seen from the side at ω; 0 where φ ≥ ω."""
+    if side <= 0.0:
+        return np.zeros_like(angle)
+    return np.asarray(np.arccos(np.minimum(np.tan(angle) / math.tan(side), 1.0)))

@@ -1,0 +1,269 @@
+"""Fits of the spine array to what is published, and of the planner's limit laws to the spine array.
+
+What asperities hold is not printed; it is fitted to the tile strengths of Wang, Jiang, Cutkosky
+(IJRR 2017), Fig. 7, for 20 spines or more. All random numbers are common to all evaluations of a
+fit, so that least squares see a smooth function and anyone gets the same numbers again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, least_squares
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.parameters import spine_table
+from hand_models.tile.spine_array import SpineArray
+
+__all__ = [
+    "LateralFit",
+    "LineFit",
+    "TileShear",
+    "fit_asperity_friction",
+    "fit_lateral",
+    "fit_line",
+    "fit_strength",
+    "measured_tile_shear",
+    "scale_strength",
+    "within_law",
+]
+
+TRIALS: Final = 2000
+"""Simulated tiles for each evaluation of a fit; means are then known to about 1 %."""
+
+SEED: Final = 2017
+"""Of the random numbers common to all evaluations."""
+
+STEP: Final = (1e-3, 1e-3)
+"""Of the logarithms of the strengths, for their derivatives."""
+
+ANGLE_ROUNDING: Final = 1e-9
+"""How far an angle may be beyond φ_max and count as φ_max [rad]."""
+
+LEAST_SPINES: Final = 20
+"""Smaller tiles are not fitted: their bars are as long as their means."""
+
+
+class TileShear(NamedTuple):
+    """A tile's measured strength in shear.
+
+    Attributes
+    ----------
+    spines : int
+    backlash : float
+        [m]
+    mean, error : float
+        Mean and half the length of its bar [N].
+    """
+
+    spines: int
+    backlash: float
+    mean: float
+    error: float
+
+
+class LineFit(NamedTuple):
+    """Eq. 21 fitted to strengths.
+
+    Attributes
+    ----------
+    shear_limit, pull_off_limit : float
+        f_max and f_min [N].
+    rms, worst : float
+        Root mean square and largest residual [N].
+    r_squared : float
+        Part of the variance that the line explains.
+    """
+
+    shear_limit: float
+    pull_off_limit: float
+    rms: float
+    worst: float
+    r_squared: float
+
+
+class LateralFit(NamedTuple):
+    """The lateral law of `Surface` fitted to the spine array.
+
+    Attributes
+    ----------
+    lateral_ratio : float
+        Strength sideways over strength in drag.
+    lateral_pull_off_ratio : float
+        What pulling at φ_max leaves of that share.
+    rms, worst : float
+        Root mean square and largest error of F(φ, θ) / F(φ, 0), over 0 ≤ φ ≤ φ_max, 0 ≤ θ ≤ π/2.
+    """
+
+    lateral_ratio: float
+    lateral_pull_off_ratio: float
+    rms: float
+    worst: float
+
+
+def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
+    """Return the cells of Fig. 7 for a concrete.
+
+    Parameters
+    ----------
+    concrete : {'fine', 'coarse'}
+    """
+    table, section = spine_table(), f"fig07-{concrete}"
+    if section not in table.sections:
+        raise InvalidInputError(f"fine or coarse, got {concrete!r}", field="concrete")
+    backlashes = dict(zip(("tight", "loose"), table.vector(section, "backlash"), strict=True))
+    return tuple(
+        TileShear(int(spines), backlash, mean, error)
+        for name, backlash in backlashes.items()
+        for spines, mean, error in zip(
+            table.vector(section, "spines"),
+            table.vector(section, f"{name}_mean"),
+            table.vector(section, f"{name}_error"),
+            strict=True,
+        )
+    )
+
+
+def fit_strength(array: SpineArray, cells: tuple[TileShear, ...]) -> SpineArray:
+    """Return the array with the asperity strengths that measured tiles ask for.
+
+    Least squares of the simulated means, each weighted by the length of its bar.
+
+    Parameters
+    ----------
+    array : SpineArray
+        Its strengths are where the search begins.
+    cells : tuple of TileShear
+        Those with fewer than `LEAST_SPINES` spines are left out.
+    """
+    cells = tuple(cell for cell in cells if cell.spines >= LEAST_SPINES)
+
+    def with_strength(logarithms: Array) -> SpineArray:
+        mean, deviation = np.exp(logarithms).tolist()
+        return replace(array, strength_mean=mean, strength_deviation=deviation)
+
+    def residuals(logarithms: Array) -> Array:
+        trial = with_strength(logarithms)
+        return np.array([(_mean(trial, cell) - cell.mean) / cell.error for cell in cells])
+
+    start = np.log([array.strength_mean, array.strength_deviation])
+    return with_strength(least_squares(residuals, start, diff_step=STEP).x)
+
+
+def scale_strength(array: SpineArray, shear_limit: float) -> SpineArray:
+    """Return the array with asperity strengths scaled to a tile's mean strength in shear [N].
+
+    Mean and deviation grow by one factor, so that the asperities differ as much as before.
+    """
+
+    def scaled(factor: float) -> SpineArray:
+        return replace(
+            array,
+            strength_mean=factor * array.strength_mean,
+            strength_deviation=factor * array.strength_deviation,
+        )
+
+    cell = TileShear(array.spines, array.backlash, shear_limit, 1.0)
+    factor = brentq(lambda x: _mean(scaled(x), cell) - shear_limit, 0.1, 10.0, xtol=1e-6)
+    return scaled(float(factor))
+
+
+def fit_asperity_friction(array: SpineArray, ratio: float, angle: float) -> float:
+    """Return the μ with which F(angle) / F(0) in the finger plane is a given ratio.
+
+    Parameters
+    ----------
+    array : SpineArray
+    ratio : float
+        Such as ``pull_off_ratio`` of ``parameters/surfaces.toml``.
+    angle : float
+        The loading angle φ of the ratio [rad].
+
+    Raises
+    ------
+    InvalidInputError
+        If no friction gives it.
+    """
+
+    def excess(friction: float) -> float:
+        return float(replace(array, asperity_friction=friction).share(angle)) - ratio
+
+    # from where shear just holds on the mean slope to where any slope holds at that angle
+    low, high = 1.0 / math.tan(0.5 * (array.slope_min + math.pi / 2)), math.tan(1.5)
+    if excess(low) * excess(high) > 0.0:
+        raise InvalidInputError(f"no friction gives {ratio:g} at {angle:g} rad", field="ratio")
+    return float(brentq(excess, low, high, xtol=1e-9))
+
+
+def within_law(angles: Array, pull_off_angle: float) -> Array:
+    """Return which loading angles are in [0, φ_max], where Eq. 21 is published."""
+    return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + ANGLE_ROUNDING))
+
+
+def fit_line(angles: Array, strengths: Array, pull_off_angle: float) -> LineFit:
+    """Fit Eq. 21 to strengths in the finger plane, by least squares.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (n,)
+        φ; those outside [0, φ_max] are left out [rad].
+    strengths : ndarray, shape (n,)
+        [N]
+    pull_off_angle : float
+        φ_max [rad].
+    """
+    within = within_law(angles, pull_off_angle)
+    share, strengths = angles[within] / pull_off_angle, strengths[within]
+    design = np.column_stack([1.0 - share, share])
+    limits = np.linalg.lstsq(design, strengths, rcond=None)[0]
+    residuals = strengths - design @ limits
+    spread = strengths - strengths.mean()
+    return LineFit(
+        shear_limit=float(limits[0]),
+        pull_off_limit=float(limits[1]),
+        rms=float(np.sqrt(np.mean(residuals**2))),
+        worst=float(np.abs(residuals).max()),
+        r_squared=1.0 - float(residuals @ residuals) / float(spread @ spread),
+    )
+
+
+def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> LateralFit:
+    """Fit the lateral law of `Surface` to the array.
+
+    The law is F(φ, θ) / F(φ, 0) = 1 − (1 − λ(φ)) cos φ (1 − cos θ), with λ falling linearly from
+    ``lateral_ratio`` at φ = 0 to that times ``lateral_pull_off_ratio`` at φ_max. The former is the
+    array's own F(0, π/2) / F(0, 0); the latter is found by least squares over a grid of directions.
+
+    Parameters
+    ----------
+    array : SpineArray
+    pull_off_angle : float
+        φ_max [rad].
+    count : int
+        Angles φ, and azimuths θ, of the grid.
+    """
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    angle, azimuth = share * pull_off_angle, np.linspace(0.0, math.pi / 2, count)[None, :]
+    loss = np.cos(angle) * (1.0 - np.cos(azimuth))
+    target = array.share(angle, azimuth) / array.share(angle)
+    lateral = float(array.share(0.0, math.pi / 2))
+    # linear in what λ has lost at φ_max
+    rest = target - 1.0 + (1.0 - lateral) * loss
+    slope = -lateral * share * loss
+    lost = float(np.sum(slope * rest) / np.sum(slope**2))
+    error = slope * lost - rest
+    return LateralFit(
+        lateral_ratio=lateral,
+        lateral_pull_off_ratio=1.0 - lost,
+        rms=float(np.sqrt(np.mean(error**2))),
+        worst=float(np.abs(error).max()),
+    )
+
+
+def _mean(array: SpineArray, cell: TileShear) -> float:
+    """Return the mean strength in drag of tiles like a measured one, with common numbers [N]."""
+    tile = replace(array, spines=cell.spines, backlash=cell.backlash)
+    return float(tile.simulate_drag(np.random.default_rng(SEED), TRIALS).mean())

@@ -1,0 +1,239 @@
+"""What one spine tile can hold: a limit surface over the direction of its load.
+
+A tile loaded in the finger plane at the angle φ from pure shear toward pull-off lets go at (Eq. 21)
+
+    f_s(φ) = f_max − (f_max − f_min) φ / φ_max,        0 ≤ φ ≤ φ_max,
+
+and at f_min beyond φ_max (``assumed``: nothing is published there). Out of the finger plane, at the
+azimuth θ in the tile's plane from the drag, it holds
+
+    F(φ, θ) = f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)],
+
+a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines hold
+less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
+times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
+pull-off, where it has no meaning. Pressed into the rock, a tile holds F(0, θ) + γ N in its plane,
+with γ the compression gain. Half-planes inside and outside the surface are in ``limit_pieces.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache, cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.parameters import surface_table
+from hand_models.tile.half_planes import HalfPlane, inner_pieces, outer_pieces
+
+__all__ = ["HalfPlane", "Surface", "pull_strength", "surface_names"]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """How much a tile holds on a kind of rock.
+
+    Attributes
+    ----------
+    shear_limit : float
+        f_max, the tile's strength in pure shear [N].
+    pull_off_limit : float
+        f_min, its strength at ``pull_off_angle`` [N].
+    pull_off_angle : float
+        φ_max, at most π/2 [rad].
+    lateral_limit : float
+        Its strength in its own plane straight sideways [N].
+    compression_gain : float
+        γ, shear strength gained per newton of pressing.
+    half_planes : int
+        How many straight pieces stand for the curve from pure shear to φ_max; one is the paper's
+        straight line, more come closer to the curve from inside.
+    lateral_pull_off_ratio : float
+        What is left at ``pull_off_angle`` of the share λ that holds sideways; above 0, at most 1.
+    shear_scatter : float
+        Standard deviation of ``shear_limit`` from place to place [N].
+    """
+
+    shear_limit: float
+    pull_off_limit: float
+    pull_off_angle: float
+    lateral_limit: float
+    compression_gain: float
+    half_planes: int = 1
+    lateral_pull_off_ratio: float = 1.0
+    shear_scatter: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value):
+                raise InvalidInputError(f"must be finite, got {value}", field=field.name)
+        for name in ("shear_limit", "pull_off_limit", "lateral_limit"):
+            if getattr(self, name) <= 0.0:
+                raise InvalidInputError(
+                    f"must be a force above 0 N, got {getattr(self, name):g}", field=name
+                )
+        if self.pull_off_limit > self.shear_limit:
+            raise InvalidInputError(
+                f"must not exceed shear_limit = {self.shear_limit:g} N, "
+                f"got {self.pull_off_limit:g}",
+                field="pull_off_limit",
+            )
+        if not 0.0 < self.pull_off_angle <= math.pi / 2:
+            raise InvalidInputError(
+                f"must be in (0, pi/2] rad, got {self.pull_off_angle:g}", field="pull_off_angle"
+            )
+        for name in ("compression_gain", "shear_scatter"):
+            if getattr(self, name) < 0.0:
+                raise InvalidInputError(
+                    f"must not be negative, got {getattr(self, name):g}", field=name
+                )
+        if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
+            raise InvalidInputError(
+                f"must be in (0, 1], got {self.lateral_pull_off_ratio:g}",
+                field="lateral_pull_off_ratio",
+            )
+        if not (1 <= self.half_planes <= 64 and self.half_planes == int(self.half_planes)):
+            raise InvalidInputError(
+                f"must be a whole number from 1 to 64, got {self.half_planes}", field="half_planes"
+            )
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # worked out once: surfaces are keys wherever hands are
+        return hash(tuple([getattr(self, field.name) for field in fields(self)]))
+
+    @classmethod
+    def named(cls, name: str) -> Surface:
+        """Return a preset of ``parameters/surfaces.toml``.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such preset; the message lists them.
+        """
+        if name not in surface_names():
+            raise InvalidInputError(
+                f"unknown surface {name!r}; known are {', '.join(surface_names())}"
+            )
+        return _preset(name)
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, float]) -> Surface:
+        """Return a surface of a caller's own numbers.
+
+        Parameters
+        ----------
+        values : mapping
+            ``shear_limit`` [N], and any other attribute; those left out follow from it by the
+            default ratios of ``parameters/surfaces.toml``.
+        """
+        known = [field.name for field in fields(cls)]
+        for key in values:
+            if key not in known:
+                raise InvalidInputError(f"unknown; known are {', '.join(known)}", field=key)
+        if "shear_limit" not in values:
+            raise InvalidInputError("missing; the tile's strength in N", field="shear_limit")
+        if not (math.isfinite(values["shear_limit"]) and values["shear_limit"] > 0.0):
+            raise InvalidInputError(
+                f"must be a force above 0 N, got {values['shear_limit']:g}", field="shear_limit"
+            )
+        base = _from_ratios(values["shear_limit"], "defaults")
+        return replace(base, **values)  # type: ignore[arg-type]
+
+    def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
+        """Return the force at which a tile lets go, F(φ, θ); f_s(φ) of Eq. 21 in the finger plane.
+
+        Parameters
+        ----------
+        angle : array_like
+            φ from the tile's plane toward pull-off, in (−π/2, π/2]; negative is pressing [rad].
+        azimuth : array_like
+            θ in the tile's plane from the drag to either side; broadcast with ``angle``. Beyond
+            π/2 a tile is dragged backwards, and the strength straight sideways is returned [rad].
+
+        Returns
+        -------
+        ndarray
+            Force magnitude [N]; infinite where pressing alone grows faster than the strength used.
+        """
+        phi = np.asarray(angle, dtype=float)
+        ratio = np.clip(phi / self.pull_off_angle, 0.0, 1.0)
+        pulling = pull_strength(self.shear_limit, self.pull_off_limit, self.pull_off_angle, phi)
+        kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
+        share = self.lateral_limit / self.shear_limit * kept
+        sideways = 1.0 - np.maximum(np.cos(azimuth), 0.0)
+        pulling = pulling * (1.0 - (1.0 - share) * np.cos(np.maximum(phi, 0.0)) * sideways)
+        # in the tile's plane ≤ F(0, θ) + γ N along the direction φ < 0
+        slope = np.cos(phi) + self.compression_gain * np.sin(phi)
+        with np.errstate(divide="ignore"):
+            pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
+        return np.where(phi >= 0.0, pulling, pressing)
+
+    def pulled(self, angle: float) -> float:
+        """Return f_s(φ) of Eq. 21 under pull-off, φ ≥ 0 [N]."""
+        ratio = min(angle / self.pull_off_angle, 1.0)
+        return self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
+
+    def pieces(self) -> tuple[HalfPlane, ...]:
+        """Return half-planes inside the limit surface, for shear T ≥ 0."""
+        return inner_pieces(self)
+
+    def outer_pieces(self) -> tuple[HalfPlane, ...]:
+        """Return half-planes around the limit surface, for shear T ≥ 0."""
+        return outer_pieces(self)
+
+
+def pull_strength(
+    shear_limit: ArrayLike, pull_off_limit: ArrayLike, pull_off_angle: ArrayLike, angle: ArrayLike
+) -> Array:
+    """Return f_s(φ) of Eq. 21 for tiles of many surfaces [N]; f_max under pressing.
+
+    Parameters
+    ----------
+    shear_limit, pull_off_limit : array_like
+        f_max and f_min [N].
+    pull_off_angle : array_like
+        φ_max [rad].
+    angle : array_like
+        φ [rad]; broadcast with the others.
+    """
+    most = np.asarray(shear_limit)
+    ratio = np.clip(np.asarray(angle) / np.asarray(pull_off_angle), 0.0, 1.0)
+    return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio)
+
+
+def _from_ratios(shear_limit: float, section: str) -> Surface:
+    table = surface_table()
+
+    def ratio(name: str) -> float:
+        own = name in table.sections.get(section, {})
+        return table.scalar(section if own else "defaults", name)
+
+    return Surface(
+        shear_limit=shear_limit,
+        pull_off_limit=shear_limit * ratio("pull_off_ratio"),
+        pull_off_angle=ratio("pull_off_angle"),
+        lateral_limit=shear_limit * ratio("lateral_ratio"),
+        compression_gain=ratio("compression_gain"),
+        lateral_pull_off_ratio=ratio("lateral_pull_off_ratio"),
+        shear_scatter=shear_limit * ratio("scatter_ratio"),
+    )
+
+
+@cache
+def surface_names() -> tuple[str, ...]:
+    """Return the names of the surface presets."""
+    return tuple(name for name in surface_table().sections if name != "defaults")
+
+
+@lru_cache(maxsize=64)
+def _preset(name: str) -> Surface:
+    return _from_ratios(surface_table().scalar(name, "shear_limit"), name)

@@ -1,0 +1,5 @@
+"""WrenchSpace: sets of wrenches with named rows, their vertices, half-spaces and supports."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,495 @@
+"""WrenchSpace: everything that one hand on one hold can exert, as one object with named rows.
+
+    { o + V y : L y + l0 ≤ u s,  H y ≤ h }      at utilisation u;   A y ≤ b at u = 1
+
+Its views (vertices, half-spaces, support function, …) are of the set at u = 1. The inequalities of
+a fixed-wrist hand couple no finger to another, so the set is a Minkowski sum of small polytopes,
+one for each block of coupled columns; the views use that, and need no double description. Only
+*wrench rows*, D w ≤ u s, couple all: they are half-spaces of the wrench itself, with which the
+views clip that sum where it reaches beyond them.
+
+Directions and distances that mix forces and moments are taken in *scaled* wrenches, whose moments
+are divided by `MOMENT_ARM`, so that all six components are newtons.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from hand_models.base import (
+    Array,
+    EmptySetError,
+    Indices,
+    InvalidInputError,
+    SolverError,
+    UnsupportedError,
+    finite_vector,
+)
+from hand_models.wrench_spaces import zonotope
+from hand_models.wrench_spaces.half_spaces import FLATNESS, Faces, HalfSpaces, affine_hull, lifted
+from hand_models.wrench_spaces.polytopes import (
+    TOLERANCE,
+    Summand,
+    clipped,
+    extreme_points,
+    hull,
+    hull_facets,
+    polytope_vertices,
+    sum_normals,
+    sum_vertices,
+    sums,
+)
+
+__all__ = ["MOMENT_ARM", "SCALE", "HalfSpaces", "Row", "WrenchSpace"]
+
+MOMENT_ARM: Final = 0.1
+"""Makes newton-metres commensurate with newtons: about the size of a hand [m]."""
+
+SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
+"""From a wrench to a scaled wrench [N]."""
+
+MOST_CANDIDATES: Final = 500_000
+"""How many sums of the blocks' vertices are looked through; that many take some 20 s."""
+
+
+EXACT: Final = 1e-9
+"""Tolerance of the linear program of a support function [N]."""
+
+
+class Row(NamedTuple):
+    """The name of an inequality.
+
+    Attributes
+    ----------
+    finger, phalanx : str or None
+        Whose it is; None where it is the palm's, or a whole finger's.
+    limit : str
+        What it limits.
+    kind : {'limit', 'hard'}
+    label : str
+        Unique in its set.
+    joint : str or None
+        Of the limb that carries the hand, where the limit is that joint's.
+    """
+
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    kind: Literal["limit", "hard"]
+    label: str
+    joint: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchSpace:
+    """Wrenches on the rock, in H, that a hand can carry.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (6,)
+        o [N, N·m].
+    generators : ndarray, shape (6, m)
+        V, a column for each of `columns`.
+    columns : tuple of str, length m
+        Names of the entries of y.
+    rows : tuple of Row
+        Limit rows, then hard rows.
+    L, l0, s : ndarray, shapes (nl, m), (nl,), (nl,)
+        Limit rows: the load ``L y + l0`` against the capacity ``s`` > 0.
+    H, h : ndarray, shapes (nh, m), (nh,)
+        Hard rows ``H y ≤ h``, whatever the utilisation.
+    D : ndarray, shape (nd, 6), optional
+        Wrench rows: the last nd limit rows have the load D w, so that their L is D V and their l0
+        is D o. None by default.
+    """
+
+    origin: Array
+    generators: Array
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    L: Array
+    l0: Array
+    s: Array
+    H: Array
+    h: Array
+    D: Array = field(default_factory=lambda: np.zeros((0, 6)))
+
+    def __post_init__(self) -> None:
+        m = len(self.columns)
+        shapes = {
+            "origin": (6,),
+            "generators": (6, m),
+            "L": (len(self.s), m),
+            "l0": (len(self.s),),
+            "H": (len(self.h), m),
+            "D": (len(self.D), 6),
+        }
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise InvalidInputError(
+                    f"shape {shape} is needed, got {getattr(self, name).shape}", field=name
+                )
+        if len(self.D) > len(self.s):
+            raise InvalidInputError("a limit row for each wrench row is needed", field="D")
+        if len(self.rows) != len(self.s) + len(self.h):
+            raise InvalidInputError("one name for each row is needed", field="rows")
+        if not (self.s > 0.0).all():
+            raise InvalidInputError("every capacity must be above zero", field="s")
+
+    @classmethod
+    def assembled(
+        cls,
+        *,
+        origin: Array,
+        generators: Array,
+        columns: tuple[str, ...],
+        rows: tuple[Row, ...],
+        L: Array,
+        l0: Array,
+        s: Array,
+        H: Array,
+        h: Array,
+        D: Array,
+    ) -> Self:
+        """Return a set of arrays that are known to fit each other: nothing is checked."""
+        space = cls.__new__(cls)
+        space.__dict__.update(
+            origin=origin,
+            generators=generators,
+            columns=columns,
+            rows=rows,
+            L=L,
+            l0=l0,
+            s=s,
+            H=H,
+            h=h,
+            D=D,
+        )
+        return space
+
+    @property
+    def A(self) -> Array:
+        """All rows at u = 1, shape (nl + nh, m)."""
+        return np.vstack([self.L, self.H])
+
+    @property
+    def b(self) -> Array:
+        """Right-hand sides at u = 1, shape (nl + nh,)."""
+        return np.concatenate([self.s - self.l0, self.h])
+
+    def wrench(self, y: ArrayLike) -> Array:
+        """Return o + V y, shape (6,)."""
+        return np.asarray(self.origin + self.generators @ np.asarray(y, dtype=float))
+
+    def utilisations(self, y: ArrayLike) -> Array:
+        """Return load over capacity of each limit row, shape (nl,)."""
+        return np.asarray((self.L @ np.asarray(y, dtype=float) + self.l0) / self.s)
+
+    # Views at u = 1 -----------------------------------------------------------------------------
+
+    @cached_property
+    def _blocks(self) -> tuple[tuple[Indices, Array], ...]:
+        """Columns of each block and the vertices of its polytope, (indices, (n, d))."""
+        apart = len(self.s) - len(self.D)
+        A = np.vstack([self.L[:apart], self.H])
+        b = np.concatenate([(self.s - self.l0)[:apart], self.h])
+        used = np.abs(A) > 0.0
+        idle = ~used.any(axis=1)
+        if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
+            raise self._empty()
+        m = len(self.columns)
+        if not m:
+            return ()
+        incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
+        count, labels = connected_components(incidence, directed=False)
+        if count == 1:
+            # rows of the whole wrench couple nothing that is not coupled already
+            A, b, used = self.A, self.b, np.abs(self.A) > 0.0
+        blocks: list[tuple[Indices, Array]] = []
+        for label in range(count):
+            columns: Indices = np.flatnonzero(labels == label)
+            mine = used[:, columns].any(axis=1)
+            vertices = polytope_vertices(A[np.ix_(mine, columns)], b[mine])
+            if not len(vertices):
+                raise self._empty(columns)
+            blocks.append((columns, vertices))
+        return tuple(blocks)
+
+    def _empty(self, columns: Indices | None = None) -> EmptySetError:
+        names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
+        return EmptySetError(
+            f"no wrench is left at utilisation 1: the limits{names} contradict the hard rows"
+        )
+
+    @cached_property
+    def _summands(self) -> tuple[Summand, ...]:
+        """The blocks' images that are more than a point, about `_base`."""
+        summands = []
+        for columns, vertices in self._blocks:
+            image = (vertices @ self.generators[:, columns].T) * SCALE
+            summands.append(extreme_points(image))
+        return tuple(summands)
+
+    @cached_property
+    def _base(self) -> Array:
+        """A scaled wrench of the set."""
+        start = self.origin * SCALE
+        return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
+
+    @cached_property
+    def _axes(self) -> tuple[Array, Array]:
+        """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
+
+        Facets and vertices are found in coordinates along these, divided by the reach.
+        """
+        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
+        return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
+
+    @cached_property
+    def _parts(self) -> list[Summand]:
+        """The summands that are more than a point, about `_base`, in the coordinates of `_axes`."""
+        directions, reach = self._axes
+        summands = [s for s in self._summands if s.dimension]
+        candidates = math.prod(len(s.points) for s in summands)
+        if candidates > MOST_CANDIDATES:
+            raise UnsupportedError(
+                f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
+                "use fewer half_planes, or leave lateral out"
+            )
+        return [
+            Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
+        ]
+
+    @property
+    def _rounding(self) -> float:
+        """How far rounding may move points in the coordinates of `_axes`: more in a thin set."""
+        reach = self._axes[1]
+        return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
+
+    @property
+    def dimension(self) -> int:
+        """Of the set's affine hull, from 0 to 6."""
+        _ = self._cuts  # an empty set has none
+        return len(self._axes[1])
+
+    @cached_property
+    def _cuts(self) -> Indices:
+        """Wrench rows beyond which the sum of the blocks reaches."""
+        slopes = self.D @ self.generators
+        reach = self.D @ self.origin
+        for columns, vertices in self._blocks:
+            reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
+        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
+        # where the sum reaches least far along the cuts is most often a wrench of the set
+        within = not len(cuts) or self._obeys(self._extreme(-slopes[cuts].sum(axis=0)))
+        if not within and self._farthest(np.zeros(6)) is None:
+            row = self.rows[len(self.s) - len(self.D) + cuts[0]]
+            raise EmptySetError(f"no wrench is left at utilisation 1: all exceed {row.limit}")
+        return cuts
+
+    def _extreme(self, slopes: Array) -> Array:
+        """Return the loads y, shape (m,), with the largest slopes · y in the sum of the blocks."""
+        y = np.zeros(len(self.columns))
+        for columns, vertices in self._blocks:
+            y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
+        return y
+
+    def _obeys(self, y: Array) -> bool:
+        """Whether loads of the sum of the blocks also keep to the wrench rows."""
+        return bool((self.D @ self.wrench(y) <= self._held * (1.0 + TOLERANCE)).all())
+
+    @property
+    def _held(self) -> Array:
+        """Capacities of the wrench rows, shape (nd,)."""
+        return self.s[len(self.s) - len(self.D) :]
+
+    def _farthest(self, direction: Array) -> float | None:
+        """Return max { d · w } over all rows at u = 1, by linear programming; None if empty."""
+        result = linprog(
+            -(self.generators.T @ direction),
+            A_ub=self.A,
+            b_ub=self.b,
+            bounds=[(None, None)] * len(self.columns),
+            method="highs",
+            options={"primal_feasibility_tolerance": EXACT, "dual_feasibility_tolerance": EXACT},
+        )
+        if result.status == 2:
+            return None
+        if result.status != 0 or result.x is None:
+            raise SolverError(f"support: {result.message}")
+        return float(direction @ self.wrench(result.x))
+
+    @cached_property
+    def _clipped(self) -> tuple[Array, Faces]:
+        """Vertices (n, r) and facets where wrench rows cut the sum of the blocks."""
+        directions, reach = self._axes
+        rows, held = self.D[self._cuts] / SCALE, self._held[self._cuts]
+        normals = rows @ directions.T * reach
+        lengths = np.linalg.norm(normals, axis=1)
+        # what is constant on the set, and yet beyond its capacity, is so by rounding
+        turns = lengths > FLATNESS * held
+        room = held - np.asarray(rows @ self._base)
+        cuts = Faces(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
+        found = clipped(self._sum_vertices, self._sum_facets, cuts, self._rounding)
+        if found is None:
+            raise self._empty()
+        return found
+
+    @property
+    def _facets(self) -> Faces:
+        """In the coordinates of `_axes`, about `_base`."""
+        return self._clipped[1] if len(self._cuts) else self._sum_facets
+
+    @cached_property
+    def _sum_facets(self) -> Faces:
+        """Facets of the sum of the blocks, without wrench rows."""
+        parts, r = self._parts, len(self._axes[1])
+        if r == 0:
+            return Faces(np.zeros((0, 0)), np.zeros(0))
+        if all(part.dimension == 1 for part in parts):
+            return zonotope.facets(np.array([part.points[1] for part in parts]))
+        if all(part.dimension <= 2 for part in parts):
+            normals = sum_normals(parts, r, self._rounding)
+            offsets = sum(
+                ((part.points @ normals.T).max(axis=0) for part in parts),
+                start=np.zeros(len(normals)),
+            )
+            return Faces(normals, np.asarray(offsets))
+        return Faces(*hull_facets(sums(parts)))
+
+    def half_spaces(self) -> HalfSpaces:
+        """Return the set at u = 1 as inequalities and, where it is flat, equations.
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        """
+        scaled = lifted(self._facets, *self._axes, self._base)
+        return scaled._replace(
+            normals=scaled.normals * SCALE, equation_normals=scaled.equation_normals * SCALE
+        )
+
+    def vertices(self) -> Array:
+        """Return the extreme wrenches of the set at u = 1, shape (n, 6).
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        """
+        directions, reach = self._axes
+        return np.asarray(((self._vertices * reach) @ directions + self._base) / SCALE)
+
+    @property
+    def _vertices(self) -> Array:
+        """Vertices (n, r) in the coordinates of `_axes`, about `_base`."""
+        return self._clipped[0] if len(self._cuts) else self._sum_vertices
+
+    @cached_property
+    def _sum_vertices(self) -> Array:
+        """Vertices of the sum of the blocks, without wrench rows."""
+        if not self._parts:
+            return np.zeros((1, 0))
+        return sum_vertices(self._parts, *self._sum_facets, self._rounding)
+
+    def support(self, direction: ArrayLike) -> float:
+        """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        SolverError
+            If a linear program fails.
+        """
+        d = finite_vector(direction, 6, "direction")
+        y = self._extreme(self.generators.T @ d)
+        if not len(self._cuts) or self._obeys(y):
+            return float(d @ self.wrench(y))
+        farthest = self._farthest(d)
+        if farthest is None:
+            raise self._empty()
+        return farthest
+
+    def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
+        """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.
+
+        Parameters
+        ----------
+        wrench : array_like, shape (6,)
+            [N, N·m]
+        tolerance : float, optional
+            Distance in scaled wrenches [N].
+        """
+        w = finite_vector(wrench, 6, "wrench")
+        faces = self.half_spaces()
+        beyond = np.max(faces.normals @ w - faces.offsets, initial=-math.inf)
+        off = np.max(np.abs(faces.equation_normals @ w - faces.equation_offsets), initial=0.0)
+        return bool(max(beyond, off) <= tolerance)
+
+    def capability(self, direction: ArrayLike) -> tuple[float, float] | None:
+        """Return the least and the largest t for which t·d is in the set at u = 1.
+
+        None where the line through zero along d, of shape (6,), misses the set.
+
+        Raises
+        ------
+        SolverError
+            If the linear program fails.
+        """
+        d = finite_vector(direction, 6, "direction")
+        m = len(self.columns)
+        equations = np.hstack([self.generators, -d[:, None]]) * SCALE[:, None]
+        bounds = [(None, None)] * (m + 1)
+        rows = np.hstack([self.A, np.zeros((len(self.b), 1))])
+        ends = []
+        for sign in (1.0, -1.0):
+            cost = np.zeros(m + 1)
+            cost[-1] = sign
+            result = linprog(
+                cost,
+                A_ub=rows,
+                b_ub=self.b,
+                A_eq=equations,
+                b_eq=-self.origin * SCALE,
+                bounds=bounds,
+                method="highs",
+            )
+            if result.status == 2:
+                return None
+            if result.status != 0 or result.x is None:
+                raise SolverError(f"capability: {result.message}")
+            ends.append(float(result.x[-1]))
+        return ends[0], ends[1]
+
+    def volume(self) -> tuple[float, int]:
+        """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.
+
+        Measured in scaled wrenches, so its unit is N^r, to about 1e-4 of it. Thousands of vertices
+        take seconds.
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        SolverError
+            If the hull of the vertices cannot be found.
+        """
+        r = self.dimension
+        stretch = float(np.prod(self._axes[1]))
+        if r == 0:
+            return 0.0, 0
+        if r == 1:
+            return float(np.ptp(self._vertices)) * stretch, 1
+        # joggled: merged facets may be so wide in a set of fine facets that volume is lost
+        return float(hull(self._vertices, "QJ").volume) * stretch, r

@@ -1,0 +1,10 @@
+from .prepare import hand_space as hand_space
+from .question import HandOnHold as HandOnHold
+from .question import Limits as Limits
+from .question import Load as Load
+from .question import Question as Question
+from .question import Stance as Stance
+from .result import Plan as Plan
+from .solving import KnownStance as KnownStance
+from .solving import plan as plan
+from .streaming import WrenchStream as WrenchStream

@@ -1,0 +1,200 @@
+"""Convex sets in a plane, known by how far they reach, between an inner and an outer polygon.
+
+Each direction that is asked for gives a point of the set, and a half-plane that the set is in. The
+hull of the points is within the set, the intersection of the half-planes around it. Where they are
+farthest apart, the normal of the inner edge is asked for next (Bretl and Lall, Testing static
+equilibrium for legged robots, IEEE Transactions on Robotics 24, 2008). A polygon is found exactly,
+its every edge once asked for; so are segments and points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, SolverError
+from planner.result import LimitName
+
+__all__ = ["MOST", "Polygon", "Touch", "enclose"]
+
+FIRST: Final = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+"""Directions that are asked for first."""
+
+TOLERANCE: Final = 3e-4
+"""Gap at which polygons count as one, where the set's sides along both axes are the units."""
+
+MOST: Final = 160
+"""Directions that are asked for at most."""
+
+ROUNDING: Final = 1e-6
+"""How far rounding may move points, relative to the longer side or to one unit if that is more."""
+
+TURN: Final = 1e-7
+"""Least turn between two directions [rad]; nearer, where their half-planes meet is all rounding."""
+
+
+class Touch(NamedTuple):
+    """How far a set reaches in a direction.
+
+    Attributes
+    ----------
+    point : ndarray, shape (2,)
+        Of the set, and as far as any.
+    reach : float
+        Its distance from the origin along the direction.
+    limiting : LimitName or None
+        What ends the way there.
+    """
+
+    point: Array
+    reach: float
+    limiting: LimitName | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A convex set between two polygons, both counterclockwise.
+
+    Attributes
+    ----------
+    inner : ndarray, shape (n, 2)
+        Corners of a polygon within the set: two for a segment, one for a point.
+    outer : ndarray, shape (m, 2)
+        Corners of one around it.
+    gap : float
+        Largest distance of a point of the outer polygon from the inner one.
+    limiting : tuple of (LimitName or None), length n
+        What ends the way at each inner corner.
+    """
+
+    inner: Array
+    outer: Array
+    gap: float
+    limiting: tuple[LimitName | None, ...] = ()
+
+    def scaled(self, units: Array) -> Polygon:
+        """Return the polygons with axes in other units; the gap stays in the old ones."""
+        return Polygon(self.inner * units, self.outer * units, self.gap, self.limiting)
+
+
+class _Side(NamedTuple):
+    """A direction that was asked for, and what it gave."""
+
+    normal: Array
+    touch: Touch
+
+
+def enclose(touching: Callable[[Array], Touch | None], most: int = MOST) -> Polygon | None:
+    """Return the polygons of a set; None if it is empty.
+
+    Parameters
+    ----------
+    touching : callable
+        From a unit direction, shape (2,), to how far the set reaches there; None if it is empty.
+    most : int
+        Directions to ask for at most.
+
+    Raises
+    ------
+    SolverError
+        If the set is empty in one direction and not in another.
+    """
+    first = touching(FIRST[0])
+    if first is None:
+        return None
+    sides = [_Side(FIRST[0], first), *(_asked(touching, normal) for normal in FIRST[1:])]
+    lengths = np.array([sides[i].touch.reach + sides[i + 2].touch.reach for i in (0, 1)])
+    slack = ROUNDING * max(1.0, float(lengths.max()))
+    units = np.maximum(lengths, slack / TOLERANCE)
+    gaps = [_open_gap(a, b, units) for a, b in pairwise([*sides, sides[0]])]
+    while len(sides) < most:
+        i = int(np.argmax(gaps))
+        before, after = sides[i], sides[(i + 1) % len(sides)]
+        normal = _between(before, after)
+        if normal is None or gaps[i] <= TOLERANCE:
+            break
+        side = _asked(touching, normal)
+        sides.insert(i + 1, side)
+        gaps[i : i + 1] = [_open_gap(before, side, units), _open_gap(side, after, units)]
+    pairs = list(pairwise([*sides, sides[0]]))
+    corners = np.array([_corner(a, b) for a, b in pairs])
+    points = np.array([side.touch.point for side in sides])
+    kept = _corners_of(points, slack)
+    return Polygon(
+        inner=points[kept],
+        outer=corners[_corners_of(corners, 0.1 * slack)],
+        gap=max(_gap(a, b) for a, b in pairs),
+        limiting=tuple(sides[k].touch.limiting for k in kept),
+    )
+
+
+def _asked(touching: Callable[[Array], Touch | None], normal: Array) -> _Side:
+    touch = touching(normal)
+    if touch is None:
+        raise SolverError(f"a set that is not empty has no end toward {normal.tolist()}")
+    return _Side(normal, touch)
+
+
+def _corner(a: _Side, b: _Side) -> Array:
+    """Return where the borders of two half-planes meet, shape (2,)."""
+    turn = _cross(a.normal, b.normal)
+    if turn < TURN:
+        return a.touch.point
+    # along a's border from its point, to b's
+    along = np.array([-a.normal[1], a.normal[0]])
+    far = (b.touch.reach - float(b.normal @ a.touch.point)) / turn
+    start = a.touch.point + (a.touch.reach - float(a.normal @ a.touch.point)) * a.normal
+    return np.asarray(start + far * along)
+
+
+def _between(a: _Side, b: _Side) -> Array | None:
+    """Return the direction to ask for between two: of the edge's normal, if it is between them."""
+    edge = b.touch.point - a.touch.point
+    for way in (np.array([edge[1], -edge[0]]), a.normal + b.normal):
+        length = float(np.linalg.norm(way))
+        if length > 0.0:
+            normal = way / length
+            if min(_cross(a.normal, normal), _cross(normal, b.normal)) > TURN:
+                return normal
+    return None
+
+
+def _gap(a: _Side, b: _Side, units: Array | float = 1.0) -> float:
+    """Return how far the outer corner between two directions is from the inner edge."""
+    return _distance(a.touch.point / units, b.touch.point / units, _corner(a, b) / units)
+
+
+def _open_gap(a: _Side, b: _Side, units: Array) -> float:
+    """Return the gap between two directions, zero where there is none to ask for between them."""
+    return 0.0 if _between(a, b) is None else _gap(a, b, units)
+
+
+def _distance(start: Array, end: Array, point: Array) -> float:
+    """Return the distance of a point from a segment."""
+    edge = end - start
+    square = float(edge @ edge)
+    part = min(max(float((point - start) @ edge) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return math.dist(point, start + part * edge)
+
+
+def _cross(a: Array, b: Array) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+def _corners_of(points: Array, slack: float) -> list[int]:
+    """Return which points of a closed convex chain stand out by more than a slack."""
+    kept = list(range(len(points)))
+    k = 0
+    while k < len(kept) and len(kept) > 1:
+        before, here, after = (points[kept[(k + j) % len(kept)]] for j in (-1, 0, 1))
+        if _distance(before, after, here) <= slack:
+            del kept[k]
+            k = max(k - 1, 0)
+        else:
+            k += 1
+    return kept

@@ -1,0 +1,95 @@
+"""What a floating hand really holds: the search over poses of its wrist, and its limits by axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, EmptySetError
+from hand_models.compliance import (
+    PALM_MODES,
+    Farthest,
+    FloatingWrist,
+    WristSearch,
+    farthest,
+    search,
+)
+
+__all__ = ["Survey", "survey"]
+
+PROMISING: Final = 0.5
+"""Share of the farthest wrench of a search from which another way of carrying is tried, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """A floating hand's wrenches, found by search.
+
+    Attributes
+    ----------
+    found : WristSearch
+    ends : tuple of (Farthest or None), length 12
+        Where the hand lets go along + and − each axis of H in turn: the farthest of local maxima,
+        begun at the search's farthest wrenches; None where no way from there holds.
+    """
+
+    found: WristSearch
+    ends: tuple[Farthest | None, ...]
+
+
+def survey(
+    wrist: FloatingWrist, per_axis: int, progress: Callable[[int, int], None] | None = None
+) -> Survey:
+    """Search the poses of a hand's wrist (Fig. 9), and follow its limits along the axes.
+
+    Parameters
+    ----------
+    wrist : FloatingWrist
+    per_axis : int
+        Poses along each of the six axes of the search.
+    progress : callable, optional
+        Told how much is done, of how much.
+
+    Raises
+    ------
+    EmptySetError
+        If no pose near rest holds.
+    """
+    directions = [sign * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
+    poses = per_axis**6
+    each = max(1, poses // (2 * len(directions)))
+    total = poses + each * len(directions)
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(done, total)
+
+    found = search(wrist, per_axis, lambda done, _: tell(done))
+    ends = []
+    for i, direction in enumerate(directions):
+        tell(poses + i * each)
+        ends.append(_end(wrist, found, direction))
+    tell(total)
+    return Survey(found, tuple(ends))
+
+
+def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest | None:
+    """Return the farthest limit that is reached, begun in each of the palm's ways of carrying."""
+    reach = found.wrenches @ direction
+    carries = wrist.hand.palm_loads(found.poses) > 0.0
+    best: Farthest | None = None
+    for (drags, presses), mode in PALM_MODES.items():
+        those = np.flatnonzero((carries == (drags, presses)).all(axis=1))
+        if not len(those) or reach[those].max() < PROMISING * reach.max():
+            continue
+        start = found.poses[those[int(reach[those].argmax())]]
+        try:
+            there = farthest(replace(wrist, palm=mode), direction, start)
+        except EmptySetError:
+            continue
+        if best is None or there.reach > best.reach:
+            best = there
+    return best

@@ -1,0 +1,5 @@
+"""Why, and why not: active limits, certificates, irreducible infeasible sets, sentences."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

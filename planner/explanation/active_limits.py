@@ -1,0 +1,211 @@
+"""What binds a plan: its limits, how much of each is used, and what more of it would be worth."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import accumulate, chain
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.wrench_spaces import Row, WrenchSpace
+from planner.prepare import KEPT_NAMES, Same, joined
+from planner.programs import JOINT_TORQUE, SLACK
+from planner.result import LimitName, Price
+
+__all__ = ["Binding", "Used", "close_to", "joint_name", "limit_name", "unit_of", "used_limits"]
+
+BINDING: Final = 1e-6
+"""Multipliers below this do not count as binding."""
+
+ALIKE: Final = 5
+"""Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
+
+NO_WORTH: Final = (-math.inf, 0)
+"""Of limits that do not bind: less than any that does, and its place."""
+
+UNITS: Final = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
+"""Of limits that are not in newtons."""
+
+
+def unit_of(limit: str) -> str:
+    """Return the unit of a limit's capacity."""
+    return UNITS.get(limit, "N")
+
+
+def limit_name(limb: str, row: Row) -> LimitName:
+    """Return the name of a row of a limb's hand."""
+    return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
+
+
+def joint_name(limb: str, joint: str) -> LimitName:
+    """Return the name of what a limb's joint bears."""
+    return LimitName(limb, None, None, JOINT_TORQUE, joint)
+
+
+class Used(NamedTuple):
+    """How much of a limit is used: load over capacity of one of its rows."""
+
+    name: LimitName
+    load: float
+    capacity: float
+
+    @property
+    def utilisation(self) -> float:
+        """Load over capacity."""
+        return self.load / self.capacity
+
+
+def used_limits(
+    limbs: Sequence[str], spaces: Sequence[WrenchSpace], used: Array, least: float
+) -> Iterator[Used]:
+    """Yield how much is used of every limit row of which that is at least so much.
+
+    Parameters
+    ----------
+    limbs : sequence of str
+    spaces : sequence of WrenchSpace
+    used : ndarray, shape (sum of nl,)
+        Utilisation of every limit row, hand by hand.
+    least : float
+    """
+    first = 0
+    for limb, space in zip(limbs, spaces, strict=True):
+        mine = used[first : first + len(space.s)]
+        first += len(space.s)
+        for i in np.flatnonzero(mine >= least).tolist():
+            capacity = float(space.s[i])
+            yield Used(limit_name(limb, space.rows[i]), float(mine[i]) * capacity, capacity)
+
+
+def close_to(utilisation: float) -> float:
+    """Return from which utilisation on a limit ties with those of which most is used."""
+    return utilisation - 2.0 * SLACK * max(1.0, utilisation)
+
+
+class Binding:
+    """What binds a plan, by the multipliers of its program; rows of one name are one limit.
+
+    The dearest come first: of which one per cent more would take most off, so that newtons compare
+    with amperes.
+
+    Parameters
+    ----------
+    limbs : sequence of str
+    spaces : sequence of WrenchSpace
+    multipliers : sequence of ndarray
+        Of each hand's limit rows.
+    """
+
+    def __init__(
+        self,
+        limbs: Sequence[str],
+        spaces: Sequence[WrenchSpace],
+        multipliers: Sequence[Array],
+    ) -> None:
+        self._spaces = spaces
+        self._named = named = _named(Same(*[space.rows for space in spaces]), tuple(limbs))
+        duals = joined(multipliers)
+        self._weights = duals * (duals > BINDING)
+        self._worth = np.bincount(named.of_row, self._weights, len(named.names))
+
+    def _rank(self, limit: int) -> tuple[float, int]:
+        """Return what a limit is worth, and for those alike how early its first row that binds."""
+        worth = float(self._worth[limit])
+        if worth == 0.0:
+            return NO_WORTH
+        first = ((self._named.of_row == limit) & (self._weights > 0.0)).argmax()
+        return round(worth, ALIKE), -int(first)
+
+    def prices(self, utilisation: float) -> tuple[Price, ...]:
+        """Return the price of each limit that binds.
+
+        A limit ``L y + l0 ≤ u s`` with multiplier λ, in units of its capacity, takes λ u / s off
+        the objective for each unit more of s.
+
+        Parameters
+        ----------
+        utilisation : float
+            At which the rows stand.
+        """
+        names, capacities = self._named.names, joined([space.s for space in self._spaces])
+        dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
+        each = self._weights * utilisation / capacities
+        price = np.bincount(self._named.of_row, each, len(names)).tolist()
+        return tuple(Price(names[i], price[i], unit_of(names[i].limit)) for i in dear)
+
+    def limiting(self, used: Array, utilisation: float, idle: Sequence[Used]) -> Used | None:
+        """Return the limit with the largest utilisation; of those that tie, the dearest.
+
+        The others only follow it.
+
+        Parameters
+        ----------
+        used : ndarray, shape (sum of nl,)
+            Utilisation of every limit row, hand by hand.
+        utilisation : float
+            The largest of these and the idle ones.
+        idle : sequence of Used
+            Limits of limbs without a hand, which have no price.
+        """
+        named = self._named
+        rows = (used >= close_to(utilisation)).nonzero()[0]
+        most = max(idle, key=lambda each: each.utilisation, default=None)
+        if not len(rows):
+            return most
+        limits, shares = named.of_row.take(rows), used.take(rows)
+        worth = self._worth.take(limits)
+        dear = (worth >= np.maximum.reduce(worth) - 10.0**-ALIKE).nonzero()[0].tolist()
+        tied = set(limits.take(dear).tolist())
+        if len(tied) > 1:
+            first = max(map(self._rank, tied))
+            dear = [i for i in dear if self._rank(int(limits[i])) == first]
+        best = max(dear, key=shares.tolist().__getitem__)
+        if most is not None and worth[best] == 0.0 and most.utilisation > shares[best]:
+            return most
+        found = int(rows[best])
+        h = bisect_right(named.first_row, found) - 1
+        capacity = float(self._spaces[h].s[found - named.first_row[h]])
+        return Used(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
+
+
+class _Named(NamedTuple):
+    """The limits of some hands, each name once.
+
+    Attributes
+    ----------
+    names : tuple of LimitName
+    of_row : ndarray of int, shape (sum of nl,)
+        Which of them each limit row is.
+    first_row : tuple of int
+        Each hand's first row.
+    """
+
+    names: tuple[LimitName, ...]
+    of_row: Indices
+    first_row: tuple[int, ...]
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _named(key: Same, limbs: tuple[str, ...]) -> _Named:
+    """Return the limits of hands of limbs; ``key``: the rows of the set of each."""
+    hands = [_named_alone(Same(rows), limb) for rows, limb in zip(key.each, limbs, strict=True)]
+    offsets = accumulate((len(hand.names) for hand in hands), initial=0)
+    return _Named(
+        tuple(chain.from_iterable(hand.names for hand in hands)),
+        joined([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
+        tuple(accumulate((len(hand.of_row) for hand in hands[:-1]), initial=0)),
+    )
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _named_alone(key: Same, limb: str) -> _Named:
+    rows: tuple[Row, ...] = key.each[0]  # type: ignore[assignment]
+    names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
+    index = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    of_row = np.array([index[name] for name in names], dtype=np.intp)
+    return _Named(tuple(index), of_row, (0,))

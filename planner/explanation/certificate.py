@@ -1,0 +1,256 @@
+"""The proof that a body wrench cannot be had: at any utilisation, or within a cap on it.
+
+The limits at a cap are hard rows like any other, so both are one proof. Where a hand's own rows
+already contradict each other, or the wrench that it is given, the direction has no part for the
+body: whatever the body needs, there are no loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.fixed_wrist import TENDON_TENSION
+from hand_models.wrench_spaces import WrenchSpace
+from planner import deadline, programs
+from planner.explanation.active_limits import Used
+from planner.explanation.infeasibility import HELD_WRENCH, System, ranked, vertex
+from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
+from planner.prepare import FORCE_CAP, TENSION_CHANGE
+from planner.programs import JOINT_TORQUE, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.question import Limits
+from planner.result import Certificate, LimitName
+
+__all__ = ["Hindered", "certify", "certify_idle"]
+
+BLOCKING: Final = 1e-6
+"""A direction shorter than this, in the body's six components, is none."""
+
+CLOSE: Final = 0.1
+"""What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
+
+CONTRADICTS: Final = 1e-7
+"""Rows of a hand that must be broken by more than this contradict each other."""
+
+DISTANT: Final = 1e-9
+"""Distance to the nearest body wrench below which there is nothing to prove."""
+
+
+class Hindered(NamedTuple):
+    """A stance whose loads do not balance.
+
+    Attributes
+    ----------
+    data : StanceData
+    limbs : sequence of str
+        Of the hands.
+    spaces : sequence of WrenchSpace
+        Their sets, for the rows' names.
+    held : sequence of ndarray, shape (nb − 6, 6)
+        What the further rows of the balance take of each hand's wrench.
+    utilisation : float or None
+        The cap within which they do not; None: at any utilisation.
+    limits : Limits
+        The caller's.
+    """
+
+    data: StanceData
+    limbs: Sequence[str]
+    spaces: Sequence[WrenchSpace]
+    held: Sequence[Array]
+    utilisation: float | None = None
+    limits: Limits = Limits()
+
+
+def certify(
+    stance: Hindered, nearest: Outcome | None = None, known: Outcome | None = None
+) -> Certificate | None:
+    """Return a checked proof that no loads give the body wrench.
+
+    With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
+    `System.bound`; it must be below d · W.
+
+    Parameters
+    ----------
+    stance : Hindered
+    nearest : Outcome, optional
+        The loads that come nearest to the body wrench, with given wrenches of hands as they are
+        given; found here by default.
+    known : Outcome, optional
+        Of the program without a plan. Where the time is over, its multipliers are the proof.
+
+    Returns
+    -------
+    Certificate or None
+        None if the bound proves nothing.
+    """
+    data, limbs, spaces, held, cap, limits = stance
+    system = System.of(data, limbs, spaces, held, cap)
+    if nearest is None:
+        nearest = programs.nearest_body(data if cap is None else data.capped(cap))
+    missing: Array | None = None
+    if nearest.solved:
+        missing = data.wrench - programs.body_wrench(data, nearest.loads)
+        missing[6:] = 0.0
+        found: tuple[Array, Array] | None = _polished(system, missing)
+    else:
+        found = _contradiction(system, limbs)
+    proven = found is not None and system.proves(*found)
+    if not proven and known is not None and deadline.expired():
+        found = _multipliers(system, known, capped=cap is not None)
+        proven = found is not None and system.proves(*found)
+    if found is None or not proven:
+        return None
+    direction, multipliers = found
+    weights = system.weights(direction, multipliers)
+    irreducible = irreducible_set(system, weights)
+    if irreducible is not None:
+        irreducible = _in_order(irreducible, limits, spaces)
+    return Certificate(
+        utilisation=cap,
+        direction=direction[:6] / WRENCH_UNIT,
+        held={
+            limb: mine.T @ direction[6:] / WRENCH_UNIT
+            for limb, mine in zip(limbs, held, strict=True)
+            if mine.any()
+        },
+        supremum=system.bound(direction, multipliers),
+        needed=float(direction @ data.wrench),
+        shortfall=None if missing is None else missing[:6] * WRENCH_UNIT,
+        nearest=None if missing is None else (data.wrench - missing)[:6] * WRENCH_UNIT,
+        blocking=_in_order(
+            (name for name in ranked(weights) if name.limit != HELD_WRENCH), limits, spaces
+        ),
+        irreducible=irreducible,
+        sufficient=sufficient_alone(system, irreducible),
+        spaces=dict(zip(limbs, spaces, strict=True)),
+    )
+
+
+def certify_idle(used: Used, cap: float, alone: bool | None) -> Certificate:
+    """Return the proof that a joint of a limb without a hand bears more than a cap allows.
+
+    Parameters
+    ----------
+    used : Used
+        How much.
+    cap : float
+        On the utilisation.
+    alone : bool or None
+        Whether everything else is within the cap; None where that is not known.
+    """
+    return Certificate(
+        utilisation=cap,
+        direction=np.zeros(6),
+        held={},
+        supremum=cap - used.utilisation,
+        needed=0.0,
+        shortfall=None,
+        nearest=None,
+        blocking=(used.name,),
+        irreducible=(used.name,),
+        sufficient=None if alone is None else (used.name,) * alone,
+        spaces={},
+    )
+
+
+def _in_order(
+    names: Iterable[LimitName], limits: Limits, spaces: Sequence[WrenchSpace]
+) -> tuple[LimitName, ...]:
+    """Return what a caller can change first: own caps, then other limits, then hard rows.
+
+    Within each of these the order stays.
+    """
+    capacities = {row.limit for space in spaces for row in space.rows if row.kind == "limit"}
+
+    def rank(name: LimitName) -> int:
+        if _is_own(name, limits):
+            return 0
+        return 1 if name.limit in capacities else 2
+
+    return tuple(sorted(names, key=rank))
+
+
+def _is_own(name: LimitName, limits: Limits) -> bool:
+    """Whether the caller has set a limit."""
+    if name.limit == TENDON_TENSION:
+        return limits.tendon_tension is not None
+    if name.limit == JOINT_TORQUE:
+        own = limits.joint_torque
+        return name.limb in own if isinstance(own, Mapping) else own is not None
+    return name.limit in (FORCE_CAP, HELD_WRENCH, TENSION_CHANGE)
+
+
+def _contradiction(system: System, limbs: Sequence[str]) -> tuple[Array, Array] | None:
+    """Return d and λ that show that one hand's rows and given wrench have no loads, if so."""
+    for limb in limbs:
+        mine = [name for name in system.barriers if name.limb == limb]
+        found = system.least_violation(mine, balance=False)
+        if found is not None and found.size > CONTRADICTS:
+            return found.direction, found.multipliers
+    return None
+
+
+def _multipliers(system: System, outcome: Outcome, *, capped: bool) -> tuple[Array, Array] | None:
+    """Return a unit d and λ as the multipliers of a program without a plan tell them.
+
+    Where d is next to none, rows contradict each other whatever the body needs.
+    """
+    if outcome.balance_dual is None:
+        return None
+    parts = [
+        part
+        for limit, hard in zip(outcome.limit_duals, outcome.hard_duals, strict=True)
+        for part in ((limit, hard) if capped else (hard,))
+    ]
+    direction, multipliers = -outcome.balance_dual, np.maximum(np.concatenate(parts), 0.0)
+    length, weight = float(np.linalg.norm(direction[:6])), float(multipliers.sum())
+    if length > BLOCKING * weight:
+        return direction / length, multipliers / length
+    direction[:6] = 0.0
+    return (direction / weight, multipliers / weight) if weight > 0.0 else None
+
+
+def _polished(system: System, missing: Array) -> tuple[Array, Array]:
+    """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
+
+    A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error
+    of an interior-point solution would be magnified by a box as large as X. The parts of d for
+    given wrenches are free.
+    """
+    rows, size = system.H.shape
+    length = float(np.linalg.norm(missing))
+    nothing = np.zeros(len(missing)), np.zeros(rows)
+    if not length > DISTANT:
+        return nothing
+    near = missing[:6] / length
+    count, given = 6, len(missing) - 6
+    # variables: d (nb), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
+    one, leak = np.eye(count), np.eye(size)
+    none = np.zeros((count, rows + 2 * size))
+    free = np.zeros((count, given))
+    turn = np.full(count, CLOSE * length)
+    costs = [-system.goal, turn, system.h, np.full(2 * size, UNLIMITED)]
+    others = count + rows + 2 * size
+    low = np.concatenate([np.full(count, -1.0), np.full(given, -np.inf), np.zeros(others)])
+    high = np.concatenate([np.full(count, 1.0), np.full(given + others, np.inf)])
+    result = vertex(
+        np.concatenate(costs) / length,
+        (low, high),
+        np.vstack([np.hstack([one, free, -one, none]), np.hstack([-one, free, -one, none])]),
+        np.concatenate([near, -near]),
+        np.hstack([system.G.T, np.zeros((size, count)), -system.H.T, -leak, leak]),
+        np.zeros(size),
+    )
+    if result is None:
+        return nothing
+    direction = result.x[: count + given]
+    length = float(np.linalg.norm(direction[:count]))
+    if length < BLOCKING:
+        return nothing
+    start = 2 * count + given
+    multipliers = np.maximum(result.x[start : start + rows], 0.0)
+    return direction / length, multipliers / length

@@ -1,0 +1,248 @@
+"""The barriers of a stance: all hands' hard rows, by name, and the wrenches that hands are given.
+
+Limit rows at a cap on the utilisation are barriers like any other. All rows of one name are one
+barrier. Whether some of them leave loads that balance the body is a linear program,
+
+    min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X,
+
+whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `UNLIMITED`, far
+beyond any strength, always counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import OptimizeResult, linprog
+
+from hand_models.base import Array
+from hand_models.wrench_spaces import WrenchSpace
+from planner import deadline
+from planner.explanation.active_limits import limit_name
+from planner.programs import UNLIMITED, StanceData
+from planner.result import LimitName
+
+__all__ = ["BODY", "HELD_WRENCH", "WEIGHS", "System", "Violation", "among", "ranked", "vertex"]
+
+HELD_WRENCH: Final = "held_wrench"
+"""Name of the barrier that a given wrench of a hand is."""
+
+BODY: Final = 6
+"""Rows of the balance that are the body's."""
+
+WEIGHS: Final = 1e-6
+"""Multipliers below this, of which all add up to about one, do not count."""
+
+ALIKE: Final = 5
+"""Decimals by which multipliers are ranked; where these are alike, rows' order counts."""
+
+EXACT: Final = 1e-10
+"""Tolerance of the linear programs."""
+
+
+class Violation(NamedTuple):
+    """By how much barriers and balance must be broken at least, and why.
+
+    Attributes
+    ----------
+    size : float
+        t, in the program's units.
+    loads : ndarray, shape (M,)
+        z of all hands that break them by so much.
+    direction, multipliers : ndarray, shapes (nb,), (n,)
+        d of the balance and λ ≥ 0 of the rows, Σ|d| + Σλ = 1 where t is above zero.
+    """
+
+    size: float
+    loads: Array
+    direction: Array
+    multipliers: Array
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The hard rows of all hands, with their names, and the balance; nondimensional.
+
+    Attributes
+    ----------
+    G, g : ndarray, shapes (nb, M), (nb,)
+        What all loads z give the balance, G z + g.
+    wrench : ndarray, shape (nb,)
+        What they are to give.
+    H, h : ndarray, shapes (n, M), (n,)
+        H z ≤ h
+    names : tuple of LimitName, length n
+    given : tuple of LimitName, length nb − 6
+        Whose given wrench each further row of the balance is.
+    """
+
+    G: Array
+    g: Array
+    wrench: Array
+    H: Array
+    h: Array
+    names: tuple[LimitName, ...]
+    given: tuple[LimitName, ...]
+
+    @classmethod
+    def of(
+        cls,
+        data: StanceData,
+        limbs: Sequence[str],
+        spaces: Sequence[WrenchSpace],
+        held: Sequence[Array],
+        utilisation: float | None = None,
+    ) -> System:
+        """Stack the hands' rows.
+
+        Parameters
+        ----------
+        data : StanceData
+        limbs : sequence of str
+            Of the hands.
+        spaces : sequence of WrenchSpace
+            Their sets, for the rows' names.
+        held : sequence of ndarray, shape (nb − 6, 6)
+            What the further rows of the balance take of each hand's wrench.
+        utilisation : float, optional
+            At which limit rows count as hard rows; by default they do not count.
+        """
+        hands = (data if utilisation is None else data.capped(utilisation)).hands
+        owners = {
+            int(row): limb
+            for limb, mine in zip(limbs, held, strict=True)
+            for row in np.flatnonzero(np.abs(mine).any(axis=1))
+        }
+        return cls(
+            G=np.hstack([hand.G for hand in hands]),
+            g=np.asarray(sum(hand.g for hand in hands)),
+            wrench=data.wrench,
+            H=block_diag(*(hand.H for hand in hands)),
+            h=np.concatenate([hand.h for hand in hands]),
+            names=tuple(
+                limit_name(limb, row)
+                for limb, space in zip(limbs, spaces, strict=True)
+                for row in space.rows[len(space.s) if utilisation is None else 0 :]
+            ),
+            given=tuple(
+                LimitName(owners[row], None, None, HELD_WRENCH) for row in range(len(owners))
+            ),
+        )
+
+    @property
+    def goal(self) -> Array:
+        """What G z is to be, shape (nb,)."""
+        return np.asarray(self.wrench - self.g)
+
+    @property
+    def barriers(self) -> tuple[LimitName, ...]:
+        """Every name once."""
+        return tuple(dict.fromkeys((*self.names, *self.given)))
+
+    def bound(self, direction: Array, multipliers: Array) -> float:
+        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
+
+        By hand: with H z ≤ h and λ ≥ 0
+
+            d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h.
+        """
+        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * UNLIMITED
+        return float(direction @ self.g + multipliers @ self.h + leak)
+
+    def proves(self, direction: Array, multipliers: Array) -> bool:
+        """Whether the multipliers show that no loads balance."""
+        return self.bound(direction, multipliers) < float(direction @ self.wrench)
+
+    def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
+        """Return what multipliers weigh each barrier with, those that count alone."""
+        found: dict[LimitName, float] = {}
+        shares = (*multipliers.tolist(), *np.abs(direction[BODY:]).tolist())
+        for name, share in zip((*self.names, *self.given), shares, strict=True):
+            found[name] = found.get(name, 0.0) + share
+        return {name: weight for name, weight in found.items() if weight > WEIGHS}
+
+    def least_violation(
+        self, barriers: Collection[LimitName], *, balance: bool = True
+    ) -> Violation | None:
+        """Return by how much barriers must be broken at least, by loads in the box.
+
+        Parameters
+        ----------
+        barriers : collection of LimitName
+        balance : bool
+            Whether the body's balance counts, too.
+
+        Returns
+        -------
+        Violation or None
+            None if the solver does not say, or the time is over.
+        """
+        chosen = frozenset(barriers)
+        rows = np.flatnonzero(among(self.names, chosen))
+        tied = np.flatnonzero(among(self.given, chosen)) + BODY
+        if balance:
+            tied = np.concatenate([np.arange(BODY), tied])
+        G, goal, H, h = self.G[tied], self.goal[tied], self.H[rows], self.h[rows]
+        size, count = self.G.shape[1], len(tied)
+        ends = np.append(np.full(size, UNLIMITED), np.inf)
+        result = vertex(
+            np.append(np.zeros(size), 1.0),
+            (np.append(-ends[:-1], 0.0), ends),
+            np.column_stack([np.vstack([G, -G, H]), -np.ones(2 * count + len(h))]),
+            np.concatenate([goal, -goal, h]),
+        )
+        if result is None:
+            return None
+        shares = np.maximum(-result.ineqlin.marginals, 0.0)
+        direction, multipliers = np.zeros(len(self.wrench)), np.zeros(len(self.h))
+        direction[tied] = shares[count : 2 * count] - shares[:count]
+        multipliers[rows] = shares[2 * count :]
+        return Violation(float(result.x[-1]), result.x[:-1], direction, multipliers)
+
+
+def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
+    """Return barriers, the weightiest first."""
+    return sorted(weights, key=lambda name: -round(weights[name], ALIKE))
+
+
+def vertex(
+    cost: Array,
+    bounds: tuple[Array, Array],
+    A: Array,
+    b: Array,
+    E: Array | None = None,
+    e: Array | None = None,
+) -> OptimizeResult | None:
+    """Return a vertex of least cost · x with A x ≤ b, E x = e within bounds.
+
+    None if it is not found, or not in time.
+    """
+    left = deadline.left()
+    if left == 0.0:
+        return None
+    result = linprog(
+        cost,
+        A_ub=A,
+        b_ub=b,
+        A_eq=E,
+        b_eq=e,
+        bounds=list(zip(*(ends.tolist() for ends in bounds), strict=True)),
+        method="highs-ds",
+        options={
+            "primal_feasibility_tolerance": EXACT,
+            "dual_feasibility_tolerance": EXACT,
+            "time_limit": math.inf if left is None else left,
+        },
+    )
+    return result if result.status == 0 and result.x is not None else None
+
+
+def among(names: Sequence[LimitName], chosen: Collection[LimitName]) -> NDArray[np.bool_]:
+    """Return which of the names are among the chosen, shape (n,)."""
+    return np.array([name in chosen for name in names], dtype=bool)

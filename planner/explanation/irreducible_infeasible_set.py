@@ -1,0 +1,170 @@
+"""Which barriers together leave no loads: an irreducible set of them, by name.
+
+A set of barriers is irreducible if they and the balance of the body have no loads, and have some as
+soon as any one of them is left out. It is found by a deletion filter over the barriers that a proof
+weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
+
+Other barriers may leave no loads, too: there may be many such sets. A barrier without which all the
+others have loads is in every one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Final
+
+import numpy as np
+
+from planner.explanation.infeasibility import BODY, WEIGHS, System, Violation, among, ranked
+from planner.programs import UNLIMITED
+from planner.result import LimitName
+
+__all__ = ["irreducible_set", "sufficient_alone"]
+
+BROKEN: Final = 1e-7
+"""Rows that must be broken by more than this have no loads, in the program's units."""
+
+KEPT: Final = 2e-9
+"""Rows that need not be broken by more than this have loads: what the solver's rounding leaves."""
+
+MOST: Final = 24
+"""Barriers of a set that are left out one by one; larger sets are not tried."""
+
+RANK: Final = 1e-9
+"""Relative size below which singular values of rows are none."""
+
+
+def irreducible_set(
+    system: System, suspects: Collection[LimitName]
+) -> tuple[LimitName, ...] | None:
+    """Return barriers that with the balance have no loads, and all of which it takes for that.
+
+    Parameters
+    ----------
+    system : System
+    suspects : collection of LimitName
+        Among which such a set is sought; among all barriers if these have loads.
+
+    Returns
+    -------
+    tuple of LimitName or None
+        The weightiest first; empty if the balance alone has no loads. None if rounding leaves
+        undecided whether some barriers have loads.
+    """
+    for start in (suspects, system.barriers):
+        first = system.least_violation(start)
+        if first is None:
+            return None
+        if first.size > BROKEN:
+            return _filtered(system, first)
+    return None
+
+
+def _filtered(system: System, proof: Violation) -> tuple[LimitName, ...] | None:
+    """Leave out one barrier after the other, for good where the rest still has no loads."""
+    kept = system.weights(proof.direction, proof.multipliers)
+    needed = _needed(system, proof, list(kept))
+    for name in reversed(ranked(kept)):
+        if name not in kept or name in needed:
+            continue
+        others = [other for other in kept if other != name]
+        trial = system.least_violation(others)
+        if trial is None:
+            return None
+        if trial.size > BROKEN:
+            proof = trial
+            kept = system.weights(proof.direction, proof.multipliers)
+            needed |= _needed(system, proof, list(kept))
+        elif trial.size > KEPT:
+            return None
+    return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
+
+
+def sufficient_alone(
+    system: System, irreducible: tuple[LimitName, ...] | None
+) -> tuple[LimitName, ...] | None:
+    """Return the barriers without any one of which all the others have loads.
+
+    Parameters
+    ----------
+    system : System
+        All barriers together have none.
+    irreducible : tuple of LimitName or None
+        Some irreducible set: only its members can do. So it is with those of every other set that
+        a trial shows, which soon leaves few to try.
+
+    Returns
+    -------
+    tuple of LimitName or None
+        In the order of the set. None without a set, or if rounding leaves undecided whether some
+        barriers have loads, or if a set of more than `MOST` would have to be tried one by one.
+    """
+    if not irreducible:
+        return irreducible
+    others = system.least_violation([n for n in system.barriers if n not in irreducible])
+    if others is not None and others.size > BROKEN:
+        # what is left is in the way even without all of them
+        return ()
+    if len(irreducible) > MOST:
+        return None
+    found, left = [], list(irreducible)
+    while left:
+        name = left.pop(0)
+        trial = system.least_violation([other for other in system.barriers if other != name])
+        if trial is None or KEPT < trial.size <= BROKEN:
+            return None
+        if trial.size <= KEPT:
+            found.append(name)
+            continue
+        weighed = system.weights(trial.direction, trial.multipliers)
+        if _prove_alone(system, trial, weighed):
+            left = [other for other in left if other in weighed]
+    return tuple(found)
+
+
+def _prove_alone(system: System, proof: Violation, kept: Collection[LimitName]) -> bool:
+    """Whether a proof stands on these barriers alone."""
+    multipliers = np.where(among(system.names, kept), proof.multipliers, 0.0)
+    direction = proof.direction.copy()
+    direction[BODY:] *= among(system.given, kept)
+    return system.proves(direction, multipliers)
+
+
+def _needed(system: System, proof: Violation, kept: Sequence[LimitName]) -> set[LimitName]:
+    """Return barriers without which the others have loads, as far as a guess shows that.
+
+    The rows that a proof weighs, n = (−d, λ) on M z against r, contradict each other by n · r < 0
+    alone. With the row of one barrier moved by −n · r / n_k they agree; those loads z are solved
+    for, and count if they also keep to what the others' other rows say.
+    """
+    chosen = frozenset(kept)
+    mine = among(system.names, chosen)
+    rows = np.flatnonzero(mine & (proof.multipliers > WEIGHS))
+    tied = np.concatenate([np.arange(BODY), np.flatnonzero(among(system.given, chosen)) + BODY])
+    M = np.vstack([system.G[tied], system.H[rows]])
+    right = np.concatenate([system.goal[tied], system.h[rows]])
+    pull = np.concatenate([-proof.direction[tied], proof.multipliers[rows]])
+    owners = [None] * BODY + [system.given[i - BODY] for i in tied[BODY:]]
+    owners += [system.names[i] for i in rows]
+    tried = [name for name in kept if name in owners]
+    moved = [
+        max((k for k, owner in enumerate(owners) if owner == name), key=lambda k: abs(pull[k]))
+        for name in tried
+    ]
+    rights = np.repeat(right[:, None], len(tried), axis=1)
+    rights[moved, np.arange(len(tried))] -= (pull @ right) / pull[moved]
+    loads = np.linalg.pinv(M, rcond=RANK) @ rights
+    over = np.vstack(
+        [
+            np.abs(system.G[tied] @ loads - system.goal[tied, None]),
+            system.H[mine] @ loads - system.h[mine, None],
+        ]
+    )
+    whose = [*owners[: len(tied)], *(name for name in system.names if name in chosen)]
+    found = set()
+    for i, name in enumerate(tried):
+        others = np.array([owner != name for owner in whose], dtype=bool)
+        small = np.abs(loads[:, i]).max(initial=0.0) <= UNLIMITED
+        if small and over[others, i].max(initial=0.0) <= KEPT:
+            found.add(name)
+    return found

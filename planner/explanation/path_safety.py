@@ -1,0 +1,211 @@
+"""Whether the straight way from the present tensions to the planned ones is safe.
+
+Along it every tendon that has a present tension goes linearly from that to the planned one, while
+palms, lateral reactions and the tendons without a present tension take whatever balances the body.
+A point of the way is safe if some such loads keep to all hard rows, and to the limits at the cap
+on the utilisation. Safe points are convex: where the plan is safe they are an interval that ends
+there, and its length is one linear program,
+
+    max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`),
+
+whose multipliers tell what ends it.
+
+Hands with floating wrists stay as planned: their sets hold about that only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.hand import FINGERS
+from hand_models.wrench_spaces import WrenchSpace
+from planner import programs
+from planner.explanation.active_limits import Used, close_to, limit_name, used_limits
+from planner.explanation.infeasibility import ranked
+from planner.explanation.sentences import barriers_sentence
+from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
+from planner.result import LimitName, TensionPath
+
+__all__ = ["UNKNOWN", "tension_path", "unsafe_sentence"]
+
+TENSIONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
+"""Columns of a hand with a fixed wrist."""
+
+UNKNOWN: Final = "whether the straight way from the present tensions is safe was not found out"
+"""Of a way about which the solver gave no answer that passes the check."""
+
+ENDS: Final = 1e-3
+"""Multipliers below this part of the largest do not count as an end of the way."""
+
+GIVE: Final = 1e-3
+"""How much hard rows give on the way, and how small a change of tension is none [N]: no present
+tension is known better, and a tendon at rest where it would stick is not slack by a rounding."""
+
+
+def tension_path(
+    data: StanceData,
+    limbs: Sequence[str],
+    spaces: Sequence[WrenchSpace],
+    loads: Sequence[Array],
+    present: Mapping[str, Array],
+    cap: float,
+    idle: Sequence[Used] = (),
+) -> TensionPath | None:
+    """Return how safe the way to a plan is.
+
+    Parameters
+    ----------
+    data : StanceData
+        The hands' rows, and the balance.
+    limbs : sequence of str
+        Of the hands.
+    spaces : sequence of WrenchSpace
+        Their sets.
+    loads : sequence of ndarray
+        The plan's y of each hand.
+    present : mapping of str to ndarray, shape (4,)
+        Tensions now, by limb [N]; of hands with fixed wrists.
+    cap : float
+        On the utilisation.
+    idle : sequence of Used, optional
+        What limbs without a hand use of their joints.
+
+    Returns
+    -------
+    TensionPath or None
+        None if the solver's answer does not pass the check.
+    """
+    z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
+    rows = [hand.L @ part + hand.l0 for hand, part in zip(data.hands, z, strict=True)]
+    used = [float(row.max(initial=0.0)) for row in rows]
+    fixed = [i for i, space in enumerate(spaces) if TENSIONS[0] in space.columns]
+    changes = {
+        i: present[limbs[i]] / LOAD_UNIT - z[i][_columns(spaces[i])]
+        for i in fixed
+        if limbs[i] in present
+    }
+    start, way = _pinned(data, spaces, z, fixed, changes)
+    still = max(
+        [
+            0.0,
+            *(each.utilisation for each in idle),
+            *(used[i] for i in range(len(z)) if i not in fixed),
+        ]
+    )
+    size = float(np.abs(way).max(initial=0.0))
+    change = LOAD_UNIT * size
+    here = max(still, *used)
+    at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
+    if here > cap + SLACK:
+        uses = [*used_limits(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
+        return TensionPath(False, 0.0, at_present, change, _most_used(uses))
+    if change <= GIVE:
+        return TensionPath(True, 1.0, at_present, change, ())
+    # rounding must not leave the plan itself outside
+    most = max(cap, *used)
+    reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
+    if not reached.outcome.solved:
+        return None
+    part = float(reached.t[0]) / size
+    if not _holds(start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK):
+        return None
+    part = min(max(part, 0.0), 1.0)
+    if part >= 1.0 - SLACK:
+        return TensionPath(True, part, at_present, change, ())
+    ends = _ends([limbs[i] for i in fixed], [spaces[i] for i in fixed], reached.outcome)
+    return TensionPath(False, part, at_present, change, ends)
+
+
+def unsafe_sentence(path: TensionPath) -> str:
+    """Say how much of a way that is not safe is, in full per cent, and what ends that part."""
+    part = math.floor(100.0 * path.safe_part)
+    much = f"only the last {part} %" if part > 0 else "no part"
+    sentence = f"{much} of the straight way from the present tensions is safe"
+    return f"{sentence}: {barriers_sentence(path.limiting)}" if path.limiting else sentence
+
+
+def _most_used(used: Sequence[Used]) -> tuple[LimitName, ...]:
+    """Return the limit of which a plan uses most, and those that tie with it."""
+    close = close_to(max(each.utilisation for each in used))
+    return tuple(dict.fromkeys(each.name for each in used if each.utilisation >= close))
+
+
+def _ends(
+    limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome
+) -> tuple[LimitName, ...]:
+    """Return the limits and hard rows that end the safe part, those that weigh most first."""
+    weights: dict[LimitName, float] = {}
+    for limb, space, limit, hard in zip(
+        limbs, spaces, outcome.limit_duals, outcome.hard_duals, strict=True
+    ):
+        for row, weight in zip(space.rows, (*limit, *hard), strict=True):
+            name = limit_name(limb, row)
+            weights[name] = weights.get(name, 0.0) + float(weight)
+    least = ENDS * max(weights.values(), default=0.0)
+    return tuple(name for name in ranked(weights) if weights[name] > least)
+
+
+def _columns(space: WrenchSpace) -> list[int]:
+    return [space.columns.index(name) for name in TENSIONS]
+
+
+def _pinned(
+    data: StanceData,
+    spaces: Sequence[WrenchSpace],
+    z: Sequence[Array],
+    fixed: Sequence[int],
+    changes: Mapping[int, Array],
+) -> tuple[StanceData, Array]:
+    """Return the fixed hands, tensions further rows of their balance, at the plan; and the way.
+
+    Parameters
+    ----------
+    data, spaces
+        Of all hands.
+    z : sequence of ndarray
+        The plan's loads, scaled.
+    fixed : sequence of int
+        Hands whose wrists are.
+    changes : mapping of int to ndarray, shape (4,)
+        From planned tensions to present ones, scaled, by hand.
+    """
+    goal = np.array(sum(data.hands[i].G @ z[i] + data.hands[i].g for i in fixed))
+    count = len(FINGERS) * len(changes)
+    hands, planned = [], [goal]
+    for i in fixed:
+        hand = data.hands[i]
+        picked = np.zeros((count, len(z[i])))
+        if i in changes:
+            columns = _columns(spaces[i])
+            first = len(FINGERS) * list(changes).index(i)
+            picked[range(first, first + len(FINGERS)), columns] = 1.0
+            planned.append(z[i][columns])
+        hands.append(
+            hand._replace(
+                G=np.vstack([hand.G, picked]),
+                g=np.concatenate([hand.g, np.zeros(count)]),
+                h=hand.h + GIVE / LOAD_UNIT,
+            )
+        )
+    way = np.concatenate([np.zeros(len(goal)), *changes.values()])
+    return StanceData(tuple(hands), np.concatenate(planned)), way
+
+
+def _least(data: StanceData, still: float) -> float | None:
+    """Return the least utilisation; ``still`` is what hands use that are left out."""
+    outcome = programs.margin(data)
+    if not (outcome.solved and _holds(data, outcome.loads, outcome.value + SLACK)):
+        return None
+    return max(outcome.value, still)
+
+
+def _holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+    """Whether loads balance, and keep to hard rows and to limits at the cap."""
+    error = np.abs(programs.body_wrench(data, loads) - data.wrench).max()
+    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
+    return balances and programs.beyond(data, loads, cap) <= SLACK

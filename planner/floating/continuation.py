@@ -1,0 +1,252 @@
+"""The plan of floating hands, and the largest load that they can carry: along the body wrench.
+
+What floating hands use is not convex in the body wrench, and a search from rest may end at a poor
+point, or at none. Where it does, smaller body wrenches are planned first and each plan is where the
+next search begins, up to the largest factor of the body wrench that can be held, and on to the
+whole (continuation; Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planner import deadline
+from planner.deadline import Budget
+from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
+from planner.floating.wrist_iteration import Settled, settle_wrists
+from planner.prepare import Hands
+from planner.programs import SLACK
+
+__all__ = ["NO_WRENCH", "PROGRAMS", "LargestFactor", "least_use", "most_load"]
+
+PROGRAMS: Final = 320
+"""How many programs a question may cost, so that four floating hands cost some ten seconds at most.
+Then the best found so far is the answer."""
+
+FIRST: Final = 70
+"""How many of them a search for a first plan may cost."""
+
+ALONG: Final = 190
+"""How many searches along the factor may cost."""
+
+LAST: Final = 50
+"""How many a plan may cost to try its palms the other way."""
+
+NO_WRENCH: Final = 1e-9
+"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
+
+FACTORS: Final = 10
+"""Most factors of the body wrench that are tried on one way."""
+
+HALVINGS: Final = 8
+"""Most steps from a part of the body wrench to the whole."""
+
+FRACTIONS: Final = (0.5, 0.1)
+"""Factors from which the largest is sought where the whole body wrench has no plan."""
+
+BRACKET: Final = 2e-3
+"""How closely, relatively, the largest factor is bracketed where Newton's method does not end."""
+
+ALIKE: Final = 1e-3
+"""How near, relatively, the utilisations of two plans are that count as the same."""
+
+LEAST: Final = 0.02
+"""Least factor that is tried."""
+
+SLOPE: Final = 1e-3
+"""Utilisation per factor below which a plan does not get harder with the load."""
+
+
+class LargestFactor(NamedTuple):
+    """The largest factor of the body wrench that was found.
+
+    Attributes
+    ----------
+    factor : float
+    sure : bool
+        Whether utilisation 1 ends it; otherwise a search that found no plan beyond it, so that it
+        is a lower bound.
+    """
+
+    factor: float
+    sure: bool
+
+
+class _Way(NamedTuple):
+    """A search along the factor: its largest, the plan there, and one for the whole wrench."""
+
+    most: LargestFactor
+    at: Settled
+    whole: Settled | None
+
+
+def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | None]:
+    """Find the point of least utilisation over the modes of the hands' palms.
+
+    Where that is beyond 1, or there is none, the search is continued from smaller body wrenches, up
+    to the largest that can be held and on to the whole: a better point may lie there.
+
+    Returns
+    -------
+    Settled
+        If there is no plan, that of the search with the least missing.
+    LargestFactor or None
+        Of the body wrench, as far as it has been sought: None for a plan within its limits.
+    """
+    choices = starts(hands, 1.0, budget)
+    plan = first_plan(hands, 1.0, choices, budget.part(FIRST))
+    if deadline.expired():
+        return plan, None
+    most: LargestFactor | None = None
+    if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
+        along = budget.part(ALONG)
+        for way in _ways(hands, plan, along):
+            if most is None or way.most.factor > most.factor:
+                most = way.most
+            onward = way.whole or _carried_on(hands, way.at, along)
+            same = onward is not None and way.most.sure and _as_good(onward, plan)
+            plan = _better(plan, onward)
+            if same or _held(plan):
+                break
+    if not plan.exact and not budget.ended:
+        plan = _better(plan, first_plan(hands, 1.0, choices, budget.part(FIRST)))
+    if plan.exact:
+        plan = exchanged(hands, plan, budget.part(LAST))
+    if _held(plan) and most is not None and most.factor < 1.0:
+        most = None
+    return plan, most
+
+
+def most_load(
+    hands: Hands, plan: Settled, known: LargestFactor | None, budget: Budget
+) -> LargestFactor | None:
+    """Return the largest factor of the body wrench that has a plan of utilisation 1.
+
+    None if it is not found.
+
+    Parameters
+    ----------
+    hands : Hands
+    plan : Settled
+        For the whole body wrench, or what a search for it has come to.
+    known : LargestFactor or None
+        What that search has found of it.
+    """
+    if (known is not None and known.sure) or not _held(plan):
+        return known
+    way = _way(hands, plan, budget)
+    if way is None or (known is not None and known.factor > way.most.factor):
+        return known
+    return way.most
+
+
+def _held(found: Settled) -> bool:
+    """Whether it is a plan within its limits."""
+    return found.exact and found.measure.utilisation <= 1.0 + SLACK
+
+
+def _better(plan: Settled, other: Settled | None) -> Settled:
+    """Return the one that uses less; a plan rather than none."""
+    if other is None or not other.exact:
+        return plan
+    if not plan.exact or other.measure.utilisation < plan.measure.utilisation:
+        return other
+    return plan
+
+
+def _as_good(found: Settled, plan: Settled) -> bool:
+    """Whether a plan uses no more than another, as near as such searches end."""
+    return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
+
+
+def _ways(hands: Hands, plan: Settled, budget: Budget) -> Iterator[_Way]:
+    """Yield searches along the factor: up from a small one, and down from a plan."""
+    for fraction in FRACTIONS:
+        if deadline.expired():
+            return
+        part = budget.part(FIRST)
+        start = first_plan(hands, fraction, starts(hands, fraction, part), part)
+        if start.exact:
+            way = _way(hands, start, budget)
+            if way is not None:
+                yield way
+            break
+    if plan.exact:
+        way = _way(hands, plan, budget)
+        if way is not None:
+            yield way
+
+
+def _way(hands: Hands, start: Settled, budget: Budget) -> _Way | None:
+    """Search for the largest factor from a plan for some factor; None if none is held.
+
+    By Newton's method on the least utilisation as a function of the factor, whose slope the
+    multipliers of the balance give. Where hard rows end it first, or at kinks, it is bracketed
+    and the lower end returned. On its way up it passes the whole body wrench.
+    """
+    now, best, whole = start, None, None
+    high, sure, overloaded = math.inf, False, False
+    for _ in range(FACTORS):
+        used, factor = now.measure.utilisation, now.point.factor
+        whole = now if factor == 1.0 else whole
+        low = 0.0 if best is None else best.point.factor
+        if used <= 1.0 + SLACK:
+            if factor >= low:
+                best, low = now, factor
+        elif factor < high:
+            high, overloaded = factor, True
+        if budget.ended:
+            break
+        if abs(used - 1.0) <= SLACK:
+            better = exchanged(hands, now, budget)
+            if better is now:
+                sure = True
+                break
+            now = better
+            continue
+        if high < math.inf and high - low <= BRACKET * high:
+            sure = overloaded
+            break
+        assert now.outcome.balance_dual is not None
+        slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
+        aim = math.inf if used < 1.0 else 0.0
+        if slope > SLOPE:
+            aim = factor + (1.0 - used) / slope
+        if aim < LEAST and factor <= FRACTIONS[0]:
+            # what overloads the hands is not the body wrench
+            break
+        aim = min(max(aim, 0.3 * factor), 2.0 * factor)
+        if not low < aim < high:
+            aim = 0.5 * (low + high) if high < math.inf else 2.0 * low
+        if low < 1.0 < min(aim, high):
+            aim = 1.0
+        if aim < LEAST:
+            break
+        there = settle_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        if there.exact:
+            now = there
+        elif aim > factor or best is not None:
+            high, overloaded, now = aim, False, best or now
+        else:
+            break
+    if best is None:
+        return None
+    return _Way(LargestFactor(best.point.factor, sure), best, whole)
+
+
+def _carried_on(hands: Hands, at: Settled, budget: Budget) -> Settled | None:
+    """Return a plan for the whole body wrench that follows from one for a part of it."""
+    now, aim = at, 1.0
+    for _ in range(HALVINGS):
+        if budget.ended:
+            break
+        there = settle_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        if there.exact and aim == 1.0:
+            return there
+        now, aim = (there, 1.0) if there.exact else (now, 0.5 * (now.point.factor + aim))
+    return None

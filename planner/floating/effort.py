@@ -1,0 +1,151 @@
+"""The plan of least effort of floating hands, down from the one of least utilisation.
+
+Effort is Σ ‖E z + e₀‖² over relative tensions and joint torques. Both are curved in a floating
+wrist's twist, so the search is that of `planner.floating.wrist_iteration` with another goal: on the
+sets about a point `program.Effort` is solved, and steps near the end have the curvature of the
+Lagrangian,
+
+    Σ 2 (E z + e₀) ∂²E/∂z² + λ ∂²L/∂z² + μ ∂²H/∂z² + ν ∂²G/∂z²,
+
+as further rows of E (Gauss–Newton is the rest). It starts from a plan within the cap and ends at
+one with no more effort: exact, and by no more than `planner.floating.CLOSE` above the least effort
+of the sets about it, or else unproven.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from hand_models.base import Array
+from planner import programs
+from planner.deadline import Budget
+from planner.floating.goals import BINDING, Goal, bent_root
+from planner.floating.palm_modes import exchanged
+from planner.floating.wrist_iteration import Settled, settle_wrists
+from planner.prepare import Hands, Measure, Point, Sets
+from planner.programs import SLACK, TWIST_UNIT, Outcome, StanceData
+
+__all__ = ["LeastEffort", "least_effort", "with_room"]
+
+NEAR: Final = 2e-4
+"""Weight with which rounds stay near the point, for one unit of z: what an effort may be below
+which is not worth a way of several units."""
+
+PROGRAMS: Final = 110
+"""How many programs the search may cost."""
+
+FARTHEST: Final = 4.0
+"""How far from rest effort is sought, in `TWIST_UNIT`: farther, where loads of one step from rest
+are no longer sure, less of it would be no gain."""
+
+OVER: Final = 0.25 * SLACK
+"""How far the utilisation of a plan may be above the cap."""
+
+
+class LeastEffort(Goal):
+    """Least effort at a utilisation within a cap, with wrists so far from rest at most."""
+
+    least_penalty = 0.05
+    promised = 0.7
+
+    def __init__(self, cap: float, farthest: Sequence[Array]) -> None:
+        self.cap = cap
+        self.farthest = farthest
+
+    def value(self, measure: Measure) -> float:
+        return measure.effort
+
+    def excess(self, measure: Measure) -> float:
+        return max(measure.utilisation - self.cap, 0.0)
+
+    def exact(self, measure: Measure, hands: Hands) -> bool:
+        return measure.exact(hands) and self.excess(measure) <= OVER
+
+    def barriers(self, data: StanceData) -> StanceData:
+        return data.capped(self.cap)
+
+    def solve(self, data: StanceData) -> Outcome:
+        return programs.effort(data, self.cap)
+
+    def dearest(self, outcome: Outcome) -> float:
+        assert outcome.balance_dual is not None
+        parts = (*outcome.limit_duals, *outcome.hard_duals)
+        rows = sum(float(np.abs(part).sum()) for part in parts)
+        return max(rows, float(np.abs(outcome.balance_dual).max()))
+
+    def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
+        root = NEAR * np.eye(sum(len(y) for y in near))
+        return self.later_step(data, root, near)
+
+    def root(
+        self, hands: Hands, point: Point, sets: Sets, within: float, weights: Outcome
+    ) -> Array:
+        efforts = [
+            2.0 * (hand.E @ (y / hand.unit) + hand.e0)
+            for hand, y in zip(sets.data.hands, point.loads, strict=True)
+        ]
+        bent = hands.curvature(point, within, weights, efforts)
+        roots = []
+        for hand, part, limit, hard in zip(
+            sets.data.hands, bent, weights.limit_duals, weights.hard_duals, strict=True
+        ):
+            # each binds a hand by itself: the balance alone couples hands
+            rows = np.vstack([hand.L[limit > BINDING], hand.H[hard > BINDING]])
+            roots.append(bent_root(0.5 * part, rows, NEAR))
+        return block_diag(*roots)
+
+    def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
+        hands, at = [], 0
+        for hand, y in zip(data.hands, near, strict=True):
+            own = slice(at, at + len(hand.unit))
+            R, at = root[own, own], own.stop
+            hands.append(
+                hand._replace(
+                    E=np.vstack([hand.E, R]),
+                    e0=np.concatenate([hand.e0, -R @ (y / hand.unit)]),
+                )
+            )
+        return programs.effort(StanceData(tuple(hands), data.wrench), self.cap)
+
+    def restore(self, data: StanceData) -> Outcome:
+        outcome = programs.margin(data)
+        return outcome if outcome.solved else programs.nearest(data)
+
+
+def with_room(cap: float, used: float) -> float:
+    """Return a cap at which a plan that uses just as much leaves room for rounding."""
+    return max(cap, min(used + 0.5 * SLACK, cap + SLACK - OVER))
+
+
+def least_effort(hands: Hands, plan: Settled, cap: float, budget: Budget) -> Settled:
+    """Return the plan of least effort that is found down from a plan within a cap.
+
+    Wrists stay within `FARTHEST` of rest, or where the plan has them. If nothing is better, the
+    plan itself is returned, without proof.
+
+    Parameters
+    ----------
+    hands : Hands
+    plan : Settled
+        Within the cap.
+    cap : float
+        On the utilisation.
+    budget : Budget
+    """
+    away = [
+        np.maximum(FARTHEST * TWIST_UNIT, np.abs(y)) if wrist is not None else y
+        for wrist, y in zip(hands.wrists, plan.point.loads, strict=True)
+    ]
+    goal = LeastEffort(cap, away)
+    budget = budget.part(PROGRAMS)
+    found = settle_wrists(hands, plan.point, budget, goal=goal)
+    if not found.exact or found.measure.effort > plan.measure.effort:
+        sets = hands.sets(plan.point, 1.0, goal.farthest)
+        return replace(plan, found="unproven", sets=sets, outcome=goal.solve(sets.data))
+    found = exchanged(hands, found, budget, goal)
+    return replace(found, rounds=plan.rounds + found.rounds)

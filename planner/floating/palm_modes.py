@@ -1,0 +1,131 @@
+"""How the palms of floating hands carry.
+
+A palm drags the rock where it moves toward −x and presses where it moves into it, so that each of a
+hand's palm modes is a set of its own. They meet where the palm just does not move. A good choice
+of modes is sought at rest, hand by hand; where in the plan a palm is held back by nothing but its
+mode, it is tried the other way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+from hand_models.compliance import PALM_MODES, PalmMode
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
+from planner import deadline, programs
+from planner.deadline import Budget
+from planner.floating.goals import Goal, LeastUse
+from planner.floating.wrist_iteration import ROUNDS, Settled, settle_wrists
+from planner.prepare import Hands
+from planner.programs import SLACK
+
+__all__ = ["NEARBY", "exchanged", "first_plan", "starts"]
+
+STARTS: Final = 5
+"""Choices of modes from which a point is sought, if the first ones give none."""
+
+NEARBY: Final = 16
+"""Most rounds of a search that starts from a plan, or where another search has failed."""
+
+EXCHANGES: Final = 6
+"""Most trials of a palm the other way."""
+
+HELD_BACK: Final = 1e-6
+"""Multiplier above which a palm's mode holds it back, of the goal per `stance_data.LOAD_UNIT`."""
+
+UNBALANCED: Final = 1e6
+"""Rank of a choice without balance at rest, beside what is missing."""
+
+Palms = tuple[PalmMode | None, ...]
+
+
+def first_plan(hands: Hands, factor: float, choices: Iterator[Palms], budget: Budget) -> Settled:
+    """Return the first plan that a choice of modes gives, or what comes nearest to one."""
+    failed: list[Settled] = []
+    for palms in choices:
+        most = NEARBY if failed else ROUNDS
+        start = replace(hands.at_rest(palms), factor=factor)
+        found = settle_wrists(hands, start, budget, most)
+        if found.exact:
+            return found
+        failed.append(found)
+        if budget.ended:
+            break
+    if not failed:
+        return settle_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
+    return min(failed, key=lambda found: found.measure.missing)
+
+
+def starts(hands: Hands, factor: float, budget: Budget) -> Iterator[Palms]:
+    """Yield choices of modes, the best at rest first."""
+    choices = [None if wrist is None else wrist.palm_modes() for wrist in hands.wrists]
+    engaged = [i for i, modes in enumerate(choices) if modes is not None and len(modes) > 1]
+    common: list[Palms] = [
+        tuple(None if modes is None else (mode if mode in modes else "off") for modes in choices)
+        for mode in PALM_MODES.values()
+    ]
+    common = list(dict.fromkeys(common))
+    ranks = {palms: _rank(hands, palms, factor, budget) for palms in common}
+    best = min(common, key=lambda palms: ranks[palms])
+    for i in engaged:
+        others = [_with(best, i, mode) for mode in PALM_MODES.values()]
+        for palms in others:
+            if palms not in ranks:
+                ranks[palms] = _rank(hands, palms, factor, budget)
+        best = min([best, *others], key=lambda palms: ranks[palms])
+    yield from sorted(dict.fromkeys([best, *common]), key=lambda palms: ranks[palms])[:STARTS]
+
+
+def _rank(hands: Hands, palms: Palms, factor: float, budget: Budget) -> float:
+    """Return the least utilisation with the sets at rest; more where they have no balance."""
+    if deadline.expired():
+        return float("inf")
+    data = hands.sets(replace(hands.at_rest(palms), factor=factor)).data
+    outcome = programs.margin(data)
+    budget.spend()
+    if outcome.solved:
+        return outcome.value
+    budget.spend()
+    nearest = programs.nearest(data)
+    return UNBALANCED * (1.0 + nearest.value) if nearest.solved else float("inf")
+
+
+def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
+    return (*palms[:i], mode, *palms[i + 1 :])
+
+
+def exchanged(hands: Hands, found: Settled, budget: Budget, goal: Goal | None = None) -> Settled:
+    """Return a better point that is had by turning palms that their mode holds back.
+
+    The goal is the least utilisation if none is given.
+    """
+    goal = LeastUse() if goal is None else goal
+    tried: set[Palms] = {found.point.palms}
+    for _ in range(EXCHANGES):
+        new = next((p for p in _turned(found) if p not in tried), None)
+        if new is None or budget.ended:
+            break
+        tried.add(new)
+        there = settle_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
+        value = goal.value(found.measure)
+        lower = value - SLACK * max(1.0, value)
+        if there.exact and goal.value(there.measure) < lower:
+            found = there
+    return found
+
+
+def _turned(found: Settled) -> Iterator[Palms]:
+    """Yield choices in which one palm that its mode holds back goes the other way."""
+    palms = found.point.palms
+    for i, (space, mode) in enumerate(zip(found.sets.spaces, palms, strict=True)):
+        if mode is None:
+            continue
+        drags, presses = next(key for key, value in PALM_MODES.items() if value == mode)
+        rows = space.rows[len(space.s) :]
+        for row, multiplier in zip(rows, found.outcome.hard_duals[i], strict=True):
+            if multiplier > HELD_BACK and row.limit == f"{PALM_SHEAR}_reversed":
+                yield _with(palms, i, PALM_MODES[not drags, presses])
+            elif multiplier > HELD_BACK and row.limit == f"{PALM_PRESSING}_reversed":
+                yield _with(palms, i, PALM_MODES[drags, not presses])

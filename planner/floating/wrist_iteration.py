@@ -1,0 +1,277 @@
+"""Where the wrists of floating hands go: sets linearised again and again, until they are exact.
+
+What a floating hand holds is curved in its wrist's twist ξ, so a plan made on one linearised set is
+some per cent off. Here the hands' sets are linearised about a point (ξ of every floating hand, the
+loads of the others), the conic program is solved on them within a range about it, and the outcome
+is the next point:
+
+    ξ_k → sets at ξ_k → loads → ξ_{k+1} → … until the sets at ξ_k have nothing better than ξ_k.
+
+A set is exact where it is linearised, so balance, limits and hard rows *at the point* are those of
+the model itself, and so is the plan. What is better is a goal's to say: less utilisation u, or less
+effort under a cap on it. Steps must lower the merit
+
+    value + ρ (|missing body wrench| + what hard rows are broken by + excess over the cap),
+
+once repaired, or are tried again in a narrower range: sequential programming with a trust region,
+an exact penalty and second-order corrections (Fletcher, Practical Methods of Optimization, ch. 14).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from hand_models.base import Array
+from hand_models.wrench_spaces import SCALE
+from planner import deadline, programs
+from planner.deadline import Budget
+from planner.floating.goals import RANK, Goal, LeastUse
+from planner.prepare import Hands, Measure, Point, Sets
+from planner.programs import Outcome
+
+__all__ = ["Settled", "settle_wrists"]
+
+ROUNDS: Final = 40
+"""Most rounds for one choice of palm modes."""
+
+
+EARLY: Final = 5
+"""Rounds that go where the sets are best; later ones stay near the point and mind their curvature.
+"""
+
+
+START: Final = 4.0
+"""First range about a point, in `TWIST_UNIT`."""
+
+
+WIDEST: Final = 30.0
+"""Widest range, in `TWIST_UNIT`."""
+
+
+WIDEN: Final = 2.5
+"""By how much a range widens where a step reaches its end."""
+
+
+SHRINK: Final = 0.3
+"""By how much a range narrows where steps do not lower the merit."""
+
+
+KINK: Final = 1e-3
+"""Range in which only a kink spoils steps, in `TWIST_UNIT`."""
+
+
+REPAIRS: Final = 12
+"""Most steps to make a point exact."""
+
+
+BESIDE: Final = 1e-5
+"""Room of hard rows that just hold, in `stance_data.LOAD_UNIT`."""
+
+
+GIVEN: Final = 1e-3
+"""How much of the goal's value those may cost, relative."""
+
+
+CLOSE: Final = 4e-6
+"""How far, relatively, a point may be from the best of the sets about it."""
+
+
+UNSOLVED: Final = Outcome(False, "none", 0, math.nan)
+"""Before anything is solved."""
+
+
+STALLED: Final = 4
+"""Rounds that hardly lower what is missing, after which none of the sets has a balance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """How a search for a point ended.
+
+    Attributes
+    ----------
+    found : {'least', 'unproven', 'nothing'}
+        ``least``: the point balances, keeps to hard rows, and nothing in the sets about it is
+        better. ``unproven``: it balances and keeps to them, but lies at a kink, where a tendon
+        begins to slip or a contact comes to its tile's edge, or the rounds ended: nothing better
+        was found, and the sets about it do not prove that there is none. ``nothing``: none of it.
+    point : Point
+    sets : Sets
+        About it.
+    outcome : Outcome
+        Of the goal's program on these sets; not solved where nothing was found.
+    rounds : int
+    error : float
+        Largest disagreement of a hand's wrench with the sets of the last step: forces, and moments
+        over 0.1 m [N].
+    """
+
+    found: Literal["least", "unproven", "nothing"]
+    point: Point
+    sets: Sets
+    outcome: Outcome
+    rounds: int
+    error: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether the point is a plan."""
+        return self.found != "nothing"
+
+    @property
+    def measure(self) -> Measure:
+        """What the model says of the point."""
+        return self.sets.measure(self.point.loads)
+
+
+class _State(NamedTuple):
+    """A point, the sets about it, what the model says of it, and how far off its step was [N]."""
+
+    point: Point
+    sets: Sets
+    measure: Measure
+    error: float
+
+    @classmethod
+    def of(
+        cls, hands: Hands, goal: Goal, point: Point, within: float, before: Sets | None = None
+    ) -> _State:
+        sets = hands.sets(point, within, goal.farthest)
+        error = 0.0 if before is None else _disagreement(hands, before, sets, point.loads)
+        return cls(point, sets, sets.measure(point.loads), error)
+
+
+def settle_wrists(
+    hands: Hands, start: Point, budget: Budget, most: int = ROUNDS, goal: Goal | None = None
+) -> Settled:
+    """Find the best point for a goal, from a start and with the start's palm modes.
+
+    The goal is the least utilisation if none is given. Where the search ends without proof, or its
+    budget does, the point is made exact there. At a deadline the best exact point on the way is
+    what was found.
+    """
+    goal = LeastUse() if goal is None else goal
+    now = _State.of(hands, goal, start, START)
+    passed: Settled | None = None
+    within, penalty, stalled = START, goal.least_penalty, 0
+    weights, root, rounds = UNSOLVED, None, 0
+    for rounds in range(1, most + 1):
+        if budget.ended:
+            break
+        outcome = goal.solve(now.sets.data)
+        budget.spend(2)
+        if outcome.solved:
+            if goal.exact(now.measure, hands):
+                here = Settled("least", now.point, now.sets, outcome, rounds, now.error)
+                if _gap(goal, now, outcome) <= CLOSE:
+                    return here
+                passed = replace(here, found="unproven")
+            penalty = max(penalty, 2.0 * goal.dearest(outcome))
+            step, stalled = outcome, 0
+            if rounds <= EARLY:
+                chosen = goal.first_step(now.sets.data, outcome, now.point.loads)
+            else:
+                if root is None:
+                    duals = weights if weights.solved else outcome
+                    root = goal.root(hands, now.point, now.sets, within, duals)
+                chosen = weights = goal.later_step(now.sets.data, root, now.point.loads)
+            if chosen.solved:
+                step = chosen
+        else:
+            # no balance in this range: come as near as it lets
+            step = goal.restore(now.sets.data)
+            if not step.solved or stalled > STALLED:
+                break
+        size = hands.step(now.point, step.loads)
+        there = _State.of(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
+        before, after = (goal.merit(state.measure, penalty) for state in (now, there))
+        if not outcome.solved:
+            stalled += not after < before - 0.02 * abs(before)
+        direct = after < before
+        if outcome.solved and there.sets.finite and not direct:
+            there = _repaired(hands, goal, there, within)
+            after = goal.merit(there.measure, penalty)
+        if hands.near_rest(there.point) and there.sets.finite and after < before:
+            if not direct and outcome.solved and goal.promised is not None:
+                direct = before - after >= goal.promised * (before - outcome.value)
+            if direct and size > 0.8 * within:
+                within = min(WIDEN * within, WIDEST)
+                there = _State.of(hands, goal, there.point, within)._replace(error=there.error)
+            now, root = there, None
+        else:
+            within = SHRINK * min(within, size)
+            if within < KINK:
+                break
+            now = _State.of(hands, goal, now.point, within)._replace(error=now.error)
+    if passed is not None and deadline.expired():
+        return replace(passed, rounds=rounds)
+    return _made_exact(hands, goal, now, rounds, budget)
+
+
+def _repaired(hands: Hands, goal: Goal, state: _State, within: float) -> _State:
+    """Return a point with less missing and broken, hardly moving: a second-order correction.
+
+    The smallest step that balances, and puts hard rows that are broken on their limits; those that
+    just hold stay as they are.
+    """
+    data, loads = goal.barriers(state.sets.data), state.point.loads
+    if not state.sets.finite:
+        return state
+    z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
+    room = np.concatenate([hand.h - hand.H @ x for hand, x in zip(data.hands, z, strict=True)])
+    those = room < BESIDE
+    rows = np.vstack(
+        [
+            np.hstack([hand.G for hand in data.hands]),
+            block_diag(*(hand.H for hand in data.hands))[those],
+        ]
+    )
+    missing = data.wrench - programs.body_wrench(data, loads)
+    aims = np.concatenate([missing, np.minimum(room[those], 0.0)])
+    step = np.linalg.lstsq(rows, aims, rcond=RANK)[0]
+    parts = np.split(step, np.cumsum([len(x) for x in z])[:-1])
+    moved = tuple(
+        y + hand.unit * part for hand, y, part in zip(data.hands, loads, parts, strict=True)
+    )
+    return _State.of(hands, goal, replace(state.point, loads=moved), within, state.sets)
+
+
+def _made_exact(hands: Hands, goal: Goal, start: _State, rounds: int, budget: Budget) -> Settled:
+    """Make the point exact at which a search ended without proof."""
+    now = start = _State.of(hands, goal, start.point, START)._replace(error=start.error)
+    for _ in range(REPAIRS):
+        if deadline.expired():
+            break
+        outcome = goal.solve(now.sets.data)
+        budget.spend()
+        if goal.exact(now.measure, hands) and outcome.solved:
+            value = goal.value(start.measure)
+            if goal.value(now.measure) - value <= GIVEN * max(1.0, value):
+                return Settled("unproven", now.point, now.sets, outcome, rounds, now.error)
+            break
+        before, now, rounds = now, _repaired(hands, goal, now, START), rounds + 1
+        lost, left = (goal.wrong(state.measure) for state in (before, now))
+        if not now.sets.finite or not left < 0.5 * lost:
+            break
+    return Settled("nothing", start.point, start.sets, UNSOLVED, rounds, start.error)
+
+
+def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
+    """Return how far a point is above the best of its sets, relative."""
+    value = goal.value(state.measure)
+    return (value - outcome.value) / max(1.0, value)
+
+
+def _disagreement(hands: Hands, sets: Sets, there: Sets, loads: Sequence[Array]) -> float:
+    """Return how far the sets of a step were off at its end [N]."""
+    return max(
+        float(np.abs((a.wrench(y) - b.wrench(y)) * SCALE).max())
+        for wrist, a, b, y in zip(hands.wrists, sets.spaces, there.spaces, loads, strict=True)
+        if wrist is not None
+    )

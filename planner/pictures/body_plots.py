@@ -1,0 +1,173 @@
+"""Pictures of what a stance can hold: a plane of body wrenches, and accelerations in two planes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hand_models.base import Array
+from planner.capability import COMPONENTS, BodySpace, Polygon, Section
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_body_space"]
+
+OTHERS: Final = {
+    "needed": "the others as asked for",
+    "zero": "the others zero",
+    "free": "whatever the others",
+}
+"""What a plane's other components are."""
+
+HELD: Final = "tab:blue"
+GRAVITY: Final = "tab:red"
+ASKED: Final = "black"
+
+FLAT: Final = 1e-3
+"""A set narrower than this, relative to its longer side, is drawn as a line."""
+
+
+DRAWN: Final = 64
+"""Directions for an outline of accelerations, at most."""
+
+
+BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "ncols": 2}
+"""Where legends are: beside what is drawn."""
+
+
+class _View(NamedTuple):
+    """A plane of B: what is across and up in it, as axes of B, and how it is told."""
+
+    title: str
+    across: Array
+    up: Array
+    xlabel: str
+    ylabel: str
+
+
+AHEAD: Final = "ahead, along x of B [m/s²]"
+VIEWS: Final = (
+    _View(
+        "accelerations, seen from behind the robot",
+        np.array([0.0, -1.0, 0.0]),
+        np.array([1.0, 0.0, 0.0]),
+        "to the right, along −y of B [m/s²]",
+        AHEAD,
+    ),
+    _View(
+        "accelerations, seen from its right",
+        np.array([0.0, 0.0, -1.0]),
+        np.array([1.0, 0.0, 0.0]),
+        "toward its belly, along −z of B [m/s²]",
+        AHEAD,
+    ),
+)
+"""In which accelerations are drawn."""
+
+
+def plot_body_space(space: BodySpace, section: Section, path: Path, title: str) -> None:
+    """Draw a plane of the body wrenches that are held, and the accelerations from rest.
+
+    Parameters
+    ----------
+    space : BodySpace
+    section : Section
+        Of that space.
+    path : Path
+        PNG, PDF or SVG.
+    title : str
+    """
+    outlines = [_accelerations(space, view) for view in VIEWS] if space.accelerates else []
+    drawn = [(view, outline) for view, outline in zip(VIEWS, outlines, strict=False) if outline]
+    count = 1 + len(drawn)
+    figure = Figure(figsize=(1.0 + 5.6 * count, 6.4), layout="constrained")
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    _draw_section(panels[0], space, section)
+    for axes, (view, outline) in zip(panels[1:], drawn, strict=True):
+        _draw_accelerations(axes, space, view, outline)
+    used = space.plan.utilisation
+    asked = "" if used is None else f", utilisation {used:.2f}"
+    about = f"the body wrench asked for: {space.plan.status}{asked}"
+    if not space.exact:
+        about += "; floating hands' sets linearised where the plan puts their wrists"
+    figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=11)
+    figure.savefig(path, dpi=120, facecolor="white")
+
+
+def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
+    turn = space.question.stance.body.rotation
+    return space.acceleration_section(turn @ view.across, turn @ view.up, DRAWN)
+
+
+def _draw_section(axes: Axes, space: BodySpace, section: Section) -> None:
+    indices = [COMPONENTS.index(axis) for axis in section.axes]
+    names = [f"${axis[0].upper()}_{axis[1]}$" for axis in section.axes]
+    units = ["N" if index < 3 else "N·m" for index in indices]
+    if section.polygon is None:
+        axes.text(0.5, 0.5, "nothing is held", transform=axes.transAxes, ha="center", color=HELD)
+    else:
+        _draw_polygon(axes, section.polygon)
+    beside = ", beside this plane" if section.others == "zero" else ""
+    weight = space.weight
+    moves = weight is not None and not np.allclose(weight, space.needed, rtol=1e-9, atol=1e-6)
+    if weight is not None:
+        place = weight[indices]
+        if np.linalg.norm(place) > 0.0:
+            axes.plot(*np.vstack([np.zeros(2), place]).T, color=GRAVITY, linewidth=1.2)
+        label = ("" if moves else "asked for: ") + "holds the weight at rest" + beside
+        axes.plot(*place, "o", color=GRAVITY, markersize=9, fillstyle="none", label=label)
+    if weight is None or moves:
+        label = "asked for" + beside
+        axes.plot(*space.needed[indices], "x", color=ASKED, markersize=9, mew=2.0, label=label)
+    axes.axhline(0.0, color="0.5", linewidth=0.8)
+    axes.axvline(0.0, color="0.5", linewidth=0.8)
+    axes.set(
+        title=f"body wrenches, {OTHERS[section.others]}",
+        xlabel=f"{names[0]} of the rock on the robot, in B [{units[0]}]",
+        ylabel=f"{names[1]} of the rock on the robot, in B [{units[1]}]",
+    )
+    if units[0] == units[1]:
+        axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, **BELOW)
+
+
+def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Polygon) -> None:
+    _draw_polygon(axes, outline)
+    into_body = space.question.stance.body.rotation.T
+
+    def flat(vector: Array) -> Array:
+        inside = into_body @ vector
+        return np.array([view.across @ inside, view.up @ inside])
+
+    gravity = flat(space.question.stance.gravity)
+    axes.plot(0.0, 0.0, "o", color=ASKED, markersize=5, label="at rest")
+    if np.linalg.norm(gravity) > FLAT:
+        axes.annotate("", tuple(gravity), (0.0, 0.0), arrowprops={
+            "arrowstyle": "-|>", "color": GRAVITY, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0,
+        })  # fmt: skip
+        axes.plot([], [], color=GRAVITY, label="gravity")
+        axes.plot(*gravity, alpha=0.0)
+    asked = flat(np.array(space.question.load.acceleration))
+    if np.linalg.norm(asked) > 0.0:
+        axes.plot(*asked, "x", color=ASKED, markersize=9, mew=2.0, label="asked for")
+    axes.set(title=view.title, xlabel=view.xlabel, ylabel=view.ylabel)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, **BELOW)
+
+
+def _draw_polygon(axes: Axes, polygon: Polygon) -> None:
+    """Draw what is held, and the outline beyond which nothing is; a point as a point."""
+    inner = np.vstack([polygon.inner, polygon.inner[:1]])
+    outer = np.vstack([polygon.outer, polygon.outer[:1]])
+    if len(polygon.inner) > 2:
+        axes.fill(*inner.T, color=HELD, alpha=0.3, linewidth=0.0, label="held")
+    else:
+        marker = "s" if len(polygon.inner) == 1 else ""
+        axes.plot(*inner.T, color=HELD, linewidth=5.0, marker=marker, alpha=0.5, label="held")
+    axes.plot(*outer.T, color=HELD, linewidth=1.2, label="nothing is held beyond")

@@ -1,0 +1,366 @@
+"""The picture of one hand on its hold, and of what it can carry.
+
+Every finger is drawn in its own plane, with the rock that the plane cuts; the palm and the planes
+from above; the set of wrenches in three projections.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from scipy.spatial import ConvexHull, QhullError
+
+from hand_models.base import Array
+from hand_models.finger import PHALANGES, Contact, SettledFinger
+from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.sections import PolylineSection, Section
+from hand_models.wrench_spaces import WrenchSpace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_wrench_space"]
+
+COMPONENTS: Final = (
+    ("F_x", "N"),
+    ("F_y", "N"),
+    ("F_z", "N"),
+    ("M_x", "N·m"),
+    ("M_y", "N·m"),
+    ("M_z", "N·m"),
+)
+PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
+
+CONTACTS: Final = {
+    "face": ("tab:green", "tile's face"),
+    "edge": ("tab:orange", "tile's edge"),
+    "frame": ("tab:purple", "bare frame"),
+    "nail": ("tab:red", "fingernail"),
+    "none": ("0.55", "no contact"),
+}
+ROCK: Final = "0.88"
+PALM: Final = "tab:brown"
+MM: Final = 1e3
+ARROW: Final = 32.0
+"""Length of the largest tile force in a picture [mm]."""
+
+MARGINS: Final = np.array([[62.0, 34.0], [30.0, 40.0]])
+"""Beside the fingers, before and behind, along and across them [mm]."""
+
+LEAST: Final = 130.0
+"""That a finger's panel shows across it, at least [mm]."""
+
+CELLS: Final = (110, 80)
+"""Points of a finger's plane, along and across it, at which rock is looked for."""
+
+GROUND: Final = 41
+"""Points along each side of the view from above at which the rock's depth is taken."""
+
+SHADES: Final = 15
+"""Of the rock's depth, each of 1 mm at least."""
+
+FLAT: Final = 1e-6
+"""A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
+
+AROUND: Final = 0.19
+"""Half the side of the view from above [m]."""
+
+
+def plot_wrench_space(
+    settled: SettledHand,
+    space: WrenchSpace | None,
+    path: Path,
+    title: str,
+    preload: Array | None = None,
+) -> None:
+    """Draw a hand on its hold, and three projections of what it can carry.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    space : WrenchSpace, optional
+        Not empty at utilisation 1; without it only the hand is drawn.
+    path : Path
+        PNG, PDF or SVG.
+    title : str
+    preload : ndarray, shape (4,), optional
+        Of a floating hand, the tensions at which its motors stand still [N]; ``space`` is then its
+        set linearised at rest.
+    """
+    tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
+    figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
+    heights = [1.0] if space is None else [1.0, 0.6]
+    rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
+    upper = rows[0, 0]
+    grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.4))
+    fingers = [upper.add_subplot(grid[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1))]
+    _draw_fingers(fingers, settled, tensions)
+    _draw_from_above(upper.add_subplot(grid[:, 2]), settled)
+    seating = settled.seating.rule.replace("_", " ")
+    held = f"closing tension of {settled.closing_tension:g} N"
+    if preload is not None:
+        held = f"preload of {_listed(preload)} N, wrist floating, at rest"
+    upper.suptitle(
+        f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}"
+    )
+    if space is not None:
+        vertices = space.vertices()
+        if preload is not None:
+            rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
+        for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
+            _draw_projection(axes, vertices, i, j)
+    figure.savefig(path, dpi=110, facecolor="white")
+
+
+def _listed(tensions: Array) -> str:
+    """Return four tensions in words; one if they are alike."""
+    if np.ptp(tensions) == 0.0:
+        return f"{tensions[0]:g}"
+    return ", ".join(f"{tension:g}" for tension in tensions)
+
+
+# Fingers in their planes ------------------------------------------------------------------------
+
+
+def _draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> None:
+    """Draw every finger, its tiles loaded by the four tensions."""
+    loads = settled.tile_loads(tensions)
+    largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
+    chains = np.vstack([_chain(finger) for finger in settled.fingers])
+    limits = chains.min(axis=0) - MARGINS[0], chains.max(axis=0) + MARGINS[1]
+    limits[1][1] = max(limits[1][1], limits[0][1] + LEAST)
+    # left over right, the inner finger beside the outer one
+    for axes, name in zip(
+        panels, ("inner_left", "outer_left", "inner_right", "outer_right"), strict=True
+    ):
+        below = name.endswith("right")
+        _draw_finger(axes, settled, FINGERS.index(name), loads, largest, limits, below)
+    shown = [kind for kind in CONTACTS if any(tile.contact == kind for tile in settled.tiles)]
+    handles = [
+        Line2D([], [], color=CONTACTS[kind][0], linewidth=4, label=CONTACTS[kind][1])
+        for kind in shown
+    ]
+    handles.append(Line2D([], [], color=PALM, linewidth=3, label="palm"))
+    panels[0].legend(handles=handles, loc="lower left", fontsize=8)
+
+
+def _draw_finger(
+    axes: Axes,
+    settled: SettledHand,
+    index: int,
+    loads: Array,
+    largest: float,
+    limits: tuple[Array, Array],
+    below: bool,
+) -> None:
+    """Draw a finger and the rock in its plane, from its proximal joint."""
+    frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
+    finger = settled.fingers[index]
+    model = finger.model
+    low, high = limits
+    section = settled.hand.section(
+        FINGERS[index], settled.hold, settled.grasp, settled.seating.pose
+    )
+    if section is not None:
+        _draw_rock(axes, section, low, high)
+    axes.plot(*_chain(finger).T, "o-", color="0.25", markersize=5, linewidth=2.0)
+    _draw_base(axes, settled, index)
+    rows = np.flatnonzero(settled.finger_of == index)
+    tiles = dict(zip([settled.tiles[i].phalanx for i in rows], rows.tolist(), strict=True))
+    for phalanx, contact in zip(PHALANGES, finger.contacts, strict=True):
+        colour = CONTACTS[contact.kind][0]
+        ends = [_along(contact, a, model.tile_height) for a in model.tile_range]
+        axes.plot(*(MM * np.array(ends)).T, color=colour, linewidth=4, solid_capstyle="butt")
+        if contact.kind != "none":
+            place = MM * np.array(contact.point(model.tile_height))
+            axes.plot(*place, "o", color="black", markersize=4, zorder=5)
+            _draw_force(axes, place, contact.angle, loads[tiles[phalanx]], largest)
+    if NAIL in tiles:
+        _draw_nail(axes, settled, index, tiles[NAIL], loads[tiles[NAIL]], largest)
+    axes.annotate(
+        "",
+        (low[0] + 8.0 + ARROW, low[1] + 8.0),
+        (low[0] + 8.0, low[1] + 8.0),
+        arrowprops={"arrowstyle": "-|>", "color": "tab:red"},
+    )
+    axes.text(
+        low[0] + 8.0, low[1] + 11.0, f"{largest:.0f} N", va="top", color="tab:red", fontsize=8
+    )
+    axes.set(
+        title=f"{FINGERS[index].replace('_', ' ')}: plane {_direction(frame.along)}",
+        xlabel="along the finger, from its proximal joint [mm]" if below else "",
+        ylabel="into the rock, from the joint [mm]",
+        xlim=(low[0], high[0]),
+        ylim=(high[1], low[1]),
+    )
+    axes.title.set_fontsize(10)
+    axes.set_aspect("equal", adjustable="box")
+
+
+def _draw_nail(
+    axes: Axes, settled: SettledHand, index: int, row: int, load: Array, largest: float
+) -> None:
+    pin, angle = np.array(settled.fingers[index].pin), float(settled.nail_angles[index])
+    w = np.array([math.cos(angle), math.sin(angle)])
+    kind = settled.tiles[row].contact
+    tip = pin + settled.hand.nail.length * w
+    axes.plot(*(MM * np.array([pin, tip])).T, color=CONTACTS[kind][0], linewidth=3)
+    if kind == NAIL:
+        frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
+        away = settled.positions[row] - frame.joint
+        place = MM * np.array([away @ frame.along, away[2]])
+        axes.plot(*place, "o", color="black", markersize=4, zorder=5)
+        _draw_force(axes, place, angle, load, largest)
+
+
+def _chain(finger: SettledFinger) -> Array:
+    """Return a finger's joints and its tip in (x, z) of F, shape (4, 2) [mm]."""
+    return MM * finger.chain
+
+
+def _along(contact: Contact, along: float, height: float) -> tuple[float, float]:
+    """Return the point (x, z) of F that is so far along a phalanx and above it."""
+    return Contact(contact.angle, contact.joint, along, contact.kind).point(height)
+
+
+def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
+    s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, CELLS, strict=True))
+    points = np.stack(np.meshgrid(s, t), axis=-1).reshape(-1, 2) / MM
+    if isinstance(section, PolylineSection):
+        clearance = section.clearances(points)
+    else:
+        clearance = np.array([section.clearance((u, v)) for u, v in points.tolist()])
+    clearance = clearance.reshape(len(t), len(s))
+    if clearance.min() < 0.0:
+        axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=[ROCK])
+        if clearance.max() > 0.0:
+            axes.contour(s, t, clearance, levels=[0.0], colors=["0.4"], linewidths=1.0)
+
+
+def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
+    """Draw the tile on an outer finger's base, or the palm behind an inner finger."""
+    hand = settled.hand
+    if FINGERS[index].startswith("inner"):
+        place = -MM * hand.inner_joint[[0, 2]]
+        half = MM * 0.5 * hand.palm_length
+        axes.plot(place[0] + np.array([-half, half]), [place[1]] * 2, color=PALM, lw=3)
+        return
+    tile = next(t for t, row in zip(settled.tiles, settled.finger_of, strict=True) if row == index)
+    middle = MM * (hand.base_tile_reach - hand.outer_reach)
+    half = MM * 0.5 * hand.finger.tile_length
+    height = MM * (hand.base_tile_surface - hand.outer_axis[2])
+    axes.plot([middle - half, middle + half], [height] * 2, color=CONTACTS[tile.contact][0], lw=4,
+              solid_capstyle="butt")  # fmt: skip
+    axes.plot([-MM * hand.outer_reach, 0.0], [0.0, 0.0], color="0.25", lw=2.0)
+
+
+def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: float) -> None:
+    u = np.array([math.cos(angle), math.sin(angle)])
+    force = -load[0] * u + load[1] * np.array([-u[1], u[0]])
+    end = place + ARROW * force / largest
+    if np.hypot(*force) > 0.02 * largest:
+        axes.annotate(
+            "", tuple(end), tuple(place),
+            arrowprops={"arrowstyle": "-|>", "color": "tab:red", "shrinkA": 0.0, "shrinkB": 0.0},
+        )  # fmt: skip
+
+
+def _direction(along: Array) -> str:
+    """Return a horizontal direction of H in words."""
+    angle = math.degrees(math.atan2(float(along[1]), float(along[0])))
+    for name, where in (("x", 0.0), ("y", 90.0), ("−y", -90.0)):
+        if abs(angle - where) < 0.05:
+            return f"along {name} of H"
+    if abs(angle) > 179.95:
+        return "along −x of H"
+    return f"{abs(angle):.0f}° from x toward {'y' if angle > 0.0 else '−y'} of H"
+
+
+# From above ---------------------------------------------------------------------------------------
+
+
+def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
+    """Draw the rock's depth, the palm's tiles and the fingers in x and y of H."""
+    hand = settled.hand
+    centre = np.array([0.03, 0.0])
+    x, y = (c + np.linspace(-AROUND, AROUND, GROUND) for c in centre)
+    in_hold = settled.seating.pose.inverse()
+    into_rock = in_hold.rotation[:, 2]
+    depth = np.array(
+        [[settled.hold.entry(in_hold.apply((a, b, 0.0)), into_rock) for b in y] for a in x]
+    )
+    depth = MM * np.ma.masked_invalid(np.where(depth > 2.0 * AROUND, np.nan, depth))
+    if depth.count():
+        low = math.floor(float(depth.min()))
+        step = max(1, math.ceil((float(depth.max()) - low) / SHADES))
+        levels = low + step * np.arange(SHADES + 1)
+        shades = axes.contourf(MM * y, MM * x, depth, levels=levels, cmap="Greys", alpha=0.6)
+        axes.figure.colorbar(
+            shades, ax=axes, label="z of H of the rock [mm]", location="bottom", shrink=0.8
+        )
+    size = MM * hand.palm_tile_size
+    for i, tile in enumerate(hand.palm_tiles):
+        corner = MM * tile[[1, 0]] - 0.5 * size[::-1]
+        colour = CONTACTS["face" if i in settled.palm.engaged else "none"][0]
+        axes.add_patch(Rectangle(tuple(corner), *size[::-1], facecolor=colour, alpha=0.6, ec="0.3"))
+    frames = hand.frames(settled.grasp.outer_rotation)
+    for name, frame, finger in zip(FINGERS, frames, settled.fingers, strict=True):
+        ends = MM * (frame.joint + np.outer([-0.06, 0.16], frame.along))
+        axes.plot(ends[:, 1], ends[:, 0], "--", color="tab:blue", lw=1.0)
+        places = MM * frame.joint + np.outer(_chain(finger)[:, 0], frame.along)
+        axes.plot(places[:, 1], places[:, 0], "o-", color="0.25", markersize=4, lw=2.5)
+        outward = places[-1] - places[0]
+        axes.annotate(
+            name.replace("_", "\n"),
+            (places[-1, 1], places[-1, 0]),
+            xytext=tuple(18.0 * outward[[1, 0]] / max(float(np.hypot(*outward[:2])), 1.0)),
+            textcoords="offset points",
+            color="tab:blue",
+            fontsize=8,
+            ha="center",
+            va="center",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0},
+        )
+    for tile, place in zip(settled.tiles, settled.positions, strict=True):
+        axes.plot(MM * place[1], MM * place[0], "o", color=CONTACTS[tile.contact][0], ms=6, mec="k")
+    axes.set(
+        title="from the arm, into the rock; green palm tiles are engaged",
+        xlabel="y of H [mm]",
+        ylabel="x of H [mm]",
+        xlim=MM * (centre[1] + np.array([-AROUND, AROUND])),
+        ylim=MM * (centre[0] + np.array([-AROUND, AROUND])),
+    )
+    axes.title.set_fontsize(10)
+    axes.set_aspect("equal", adjustable="box")
+
+
+# The wrench space ---------------------------------------------------------------------------------
+
+
+def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
+    points = vertices[:, [i, j]]
+    try:
+        outline = points[ConvexHull(points).vertices]
+    except QhullError:
+        outline = points[np.lexsort(points.T)][[0, -1]]
+    axes.fill(*outline.T, alpha=0.35, color="tab:blue")
+    axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
+    axes.axhline(0.0, color="0.5", linewidth=0.8)
+    axes.axvline(0.0, color="0.5", linewidth=0.8)
+    (a, unit_a), (b, unit_b) = COMPONENTS[i], COMPONENTS[j]
+    axes.set(
+        title=f"all wrenches on the rock, in ${a}$ and ${b}$",
+        xlabel=f"${a}$ [{unit_a}]",
+        ylabel=f"${b}$ [{unit_b}]",
+    )
+    if np.ptp(points[:, 0]) < FLAT:
+        axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)
+    if np.ptp(points[:, 1]) < FLAT:
+        axes.set_ylim(points[0, 1] - 1.0, points[0, 1] + 1.0)
+    axes.grid(alpha=0.3)

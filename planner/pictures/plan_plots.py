@@ -1,0 +1,197 @@
+"""The picture of a plan: the robot on the rock, what its hands carry, and how near each limit is.
+
+The robot is drawn from behind in W, and from two sides. Limbs and torso are drawn where the joints
+are known; without them the hands and the rock alone.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from itertools import product
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from mpl_toolkits.mplot3d import proj3d
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from hand_models.base import Array
+from planner.pictures.plan_scene import Scene, Sights, scene_of, sights
+from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
+from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
+from planner.question import Question
+from planner.result import Plan
+
+__all__ = ["draw_plan", "plot_plan"]
+
+SIZE: Final = (14.0, 8.0)
+"""Of a picture [inch]."""
+
+ROW: Final = 0.105
+"""Height that a row of a table needs at least [inch]."""
+
+BOTTOM: Final = 0.075
+"""Of the panels, over the picture's height."""
+
+TOP: Final = 0.875
+"""Of the panels, over the picture's height."""
+
+WORDS: Final = (0.7, BOTTOM, 0.28, TOP - BOTTOM)
+"""Left, bottom, width and height of what is said where there are no loads, over the picture's."""
+
+REASON: Final = 0.45
+"""From the upper edge down to the reason [inch]."""
+
+SENTENCE: Final = 180
+"""Letters of a line of the title."""
+
+FILLED: Final = (0.77, 1.1)
+"""Width and height of the view from behind, over the side of the square that it has."""
+
+TICKS: Final = 5
+"""Along its longest axis, about."""
+
+ASIDE: Final = math.radians(32.0)
+"""How far to the side the view from behind is turned."""
+
+ASIDE_STEEP: Final = math.radians(12.0)
+"""The same under a ceiling and on a floor, so that the body is seen between the hands."""
+
+STOOPED: Final = 0.6
+"""How far it is raised over a slab, and lowered under an overhang, over their lean."""
+
+ABOVE: Final = math.radians(20.0)
+"""How far from above the view from behind looks at a vertical wall."""
+
+
+def plot_plan(plan: Plan, question: Question, path: Path) -> None:
+    """Write a picture of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status; without loads only hands, holds and limbs are drawn.
+    question : Question
+        That it answers.
+    path : Path
+        PNG, PDF or SVG.
+    """
+    draw_plan(plan, question).savefig(path, dpi=130, facecolor="white")
+
+
+def draw_plan(plan: Plan, question: Question) -> Figure:
+    """Draw a plan; arguments as of `plot_plan`."""
+    scene, seen = scene_of(plan, question), sights(question.stance)
+    rows = sum(len(hand.fingers) for hand in plan.hands or ())
+    joints = [limb for limb in scene.limbs if limb.utilisations is not None]
+    needed = ROW * (rows + len(joints)) / (TOP - BOTTOM)
+    figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
+    FigureCanvasAgg(figure)  # which tells how large texts are
+    places = {"bottom": BOTTOM, "top": TOP}
+    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=0.0, top=TOP)
+    _draw_space(figure, space[0], scene, seen)
+    sides = figure.add_gridspec(2, 1, left=0.435, right=0.665, hspace=0.3, **places)
+    _draw_sides(figure.add_subplot(sides[0]), figure.add_subplot(sides[1]), scene, seen)
+    parts = (max(rows, 4), len(joints) + 0.5) if joints else (1.0,)
+    tables = figure.add_gridspec(
+        len(parts), 1, left=0.785, right=0.94, height_ratios=parts, hspace=0.22, **places
+    )
+    if plan.hands:
+        draw_tiles(figure.add_subplot(tables[0]), plan)
+    else:
+        draw_shortfall(figure.add_axes(WORDS), plan)
+    if joints:
+        draw_joints(figure.add_subplot(tables[1]), joints)
+    if plan.hands:
+        figure.colorbar(
+            ScalarMappable(UTILISATION, COLOURS),
+            cax=figure.add_axes((0.95, 0.3, 0.01, 0.4)),
+            label="utilisation: load / capacity [1]",
+            extend="max",
+        )
+    _write_title(figure, plan)
+    return figure
+
+
+def _write_title(figure: Figure, plan: Plan) -> None:
+    title: str = plan.status
+    if plan.utilisation is not None:
+        title += f": utilisation {plan.utilisation:.2f}"
+    if plan.load_factor is not None:
+        title += f", load factor {plan.load_factor:.2f}"
+    elif plan.load_factor_unbounded:
+        title += ", load factor unbounded"
+    reason = textwrap.fill(plan.reason, SENTENCE, max_lines=2, placeholder=" …")
+    figure.suptitle(title, fontsize=12)
+    lower = 1.0 - REASON / figure.get_size_inches()[1]
+    figure.text(0.5, lower, reason, fontsize=9, ha="center", va="top")
+
+
+# Views ------------------------------------------------------------------------------------------
+
+
+def _draw_space(figure: Figure, place: Any, scene: Scene, seen: Sights) -> None:
+    """Draw the scene in the axes of W, from behind the robot."""
+    axes: Any = figure.add_subplot(place, projection="3d", computed_zorder=False)
+    axes.set_proj_type("ortho")
+    points = scene.points
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    step = MaxNLocator(TICKS).tick_values(0.0, float((high - low).max()))[1]
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MultipleLocator(step))
+    right = np.cross(seen.ahead, seen.up)
+    aside = ASIDE_STEEP if seen.steep else ASIDE
+    camera = -math.cos(aside) * seen.ahead + math.sin(aside) * right
+    lean = math.asin(np.clip(seen.into[2], -1.0, 1.0))
+    elevation = ABOVE - STOOPED * lean
+    axes.view_init(math.degrees(elevation), math.degrees(math.atan2(camera[1], camera[0])))
+    sides = np.maximum(high - low, 1e-3)
+    axes.set_box_aspect(sides)
+    axes.apply_aspect()
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    drawn = proj3d.proj_transform(*corners.T, axes.get_proj())[:2]
+    in_axes = axes.transData - axes.transAxes
+    across = np.ptp(in_axes.transform(np.column_stack(drawn)), axis=0)
+    axes.set_box_aspect(sides, zoom=float((np.array(FILLED) / across).min()))
+    projection = axes.get_proj()
+
+    def flat(points: Array) -> Array:
+        return np.column_stack(proj3d.proj_transform(*points.T, projection)[:2])
+
+    draw_scene(View(axes, lambda points: points, flat, Poly3DCollection), scene)
+    axes.set(xlabel="x of W [m]", ylabel="y of W [m]", zlabel="z of W [m]")
+
+
+def _draw_sides(facing: Any, side: Any, scene: Scene, seen: Sights) -> None:
+    """Draw the scene facing the rock, and from the side."""
+    ahead = "toward the rock" if seen.toward else "ahead"
+    if seen.steep:
+        below = seen.into[2] > 0.0
+        right = np.cross(seen.up if below else -seen.up, seen.ahead)
+        _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead))
+        facing.set_title("seen from below" if below else "seen from above", fontsize=10)
+    else:
+        right = np.cross(seen.ahead, seen.up)
+        _draw_side(facing, scene, right, seen.up, ("to the right", "up"))
+        facing.set_title("seen from behind", fontsize=10)
+    _draw_side(side, scene, seen.ahead, seen.up, (ahead, "up"))
+    side.set_title("seen from the side", fontsize=10)
+
+
+def _draw_side(axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str]) -> None:
+    def flat(points: Array) -> Array:
+        return (np.asarray(points) - scene.body.position) @ np.column_stack([right, up])
+
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.2, 0.15)
+    axes.update_datalim(flat(scene.points))
+    axes.grid(alpha=0.3)
+    axes.set(xlabel=f"{words[0]}, from B [m]", ylabel=f"{words[1]}, from B [m]")
+    draw_scene(View(axes, flat, flat, PolyCollection, np.cross(up, right)), scene)

@@ -1,0 +1,274 @@
+"""What there is to see of a plan: hands, rock, limbs and forces, placed in W."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from hand_models.base import Array, Pose
+from hand_models.hand import SettledHand
+from planner.pictures.rock_patches import rock_patch
+from planner.prepare import settle
+from planner.question import HandOnHold, Question, Stance
+from planner.result import HandPlan, Plan
+
+__all__ = ["DrawnHand", "DrawnLimb", "DrawnLoad", "Scene", "Sights", "scene_of", "sights"]
+
+ARROW: Final = 0.5
+"""Length of the longest force arrow in a picture [m]."""
+
+LEANING: Final = 0.3
+"""Horizontal part of a direction from which on it says where ahead is."""
+
+STEEP: Final = 0.9
+"""Vertical part of the direction into the rock from which on the rock is a ceiling or a floor."""
+
+SAME: Final = 1e-3
+"""How far, relatively, a load may be from the robot's weight and still be called so."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnHand:
+    """A hand on its hold; places in W [m].
+
+    Attributes
+    ----------
+    limb : str
+    floats : bool
+        Whether its wrist does.
+    place : ndarray, shape (3,)
+        Origin of H.
+    palm : ndarray, shape (4, 3)
+        Corners of the palm.
+    fingers : tuple of ndarray, shape (4, 3)
+        Joints and tip of each.
+    touching : ndarray, shape (n, 3)
+        Contacts of tiles and nails that hold.
+    rock : ndarray, shape (m, 3, 3)
+        Triangles.
+    force : ndarray, shape (3,), or None
+        Of the rock on the robot, in W [N].
+    utilisation : float or None
+    """
+
+    limb: str
+    floats: bool
+    place: Array
+    palm: Array
+    fingers: tuple[Array, ...]
+    touching: Array
+    rock: Array
+    force: Array | None
+    utilisation: float | None
+
+
+class DrawnLimb(NamedTuple):
+    """A limb: its joints and its H in W, shape (n + 1, 3) [m], and each joint's utilisation (n,).
+
+    None for a plan without torques.
+    """
+
+    limb: str
+    chain: Array
+    utilisations: Array | None
+
+
+class DrawnLoad(NamedTuple):
+    """What the hands hold up: a force at a place, in W [m, N], and a moment about it [N·m].
+
+    ``weight`` tells whether it is the robot's own weight and nothing else.
+    """
+
+    place: Array
+    force: Array
+    moment: Array
+    weight: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that is drawn of a plan.
+
+    Attributes
+    ----------
+    body : Pose
+        B in W.
+    hands : tuple of DrawnHand
+    limbs : tuple of DrawnLimb
+        Empty where nothing is said of joints.
+    torso : ndarray, shape (m, 3, 3)
+        Triangles of the hull of B and the first joints, in W [m].
+    load : DrawnLoad
+    """
+
+    body: Pose
+    hands: tuple[DrawnHand, ...]
+    limbs: tuple[DrawnLimb, ...]
+    torso: Array
+    load: DrawnLoad
+
+    @property
+    def points(self) -> Array:
+        """All places, with the tips of arrows, shape (n, 3) [m]."""
+        parts = [
+            self.body.position,
+            self.load.place,
+            self.load.place + self.scale * self.load.force,
+        ]
+        for hand in self.hands:
+            parts += [hand.rock, hand.palm, *hand.fingers]
+            if hand.force is not None:
+                parts.append(hand.place + self.scale * hand.force)
+        parts += [limb.chain for limb in self.limbs]
+        return np.vstack([np.reshape(part, (-1, 3)) for part in parts])
+
+    @property
+    def scale(self) -> float:
+        """Length of the arrow of a force [m/N]."""
+        forces = [self.load.force, *(hand.force for hand in self.hands if hand.force is not None)]
+        return ARROW / max(1.0, *(float(np.linalg.norm(force)) for force in forces))
+
+
+class Sights(NamedTuple):
+    """Unit directions in W that are seen from the robot: up, ahead, and into the rock.
+
+    Attributes
+    ----------
+    up, ahead : ndarray, shape (3,)
+        Ahead is horizontal.
+    into : ndarray, shape (3,)
+        The mean of the hands' z; ahead where they cancel.
+    toward : bool
+        Whether the rock is ahead; if not, under a ceiling, on a floor or between walls, −z or x of
+        B is.
+    steep : bool
+        Whether the rock is a ceiling or a floor.
+    """
+
+    up: Array
+    ahead: Array
+    into: Array
+    toward: bool
+    steep: bool
+
+
+def sights(stance: Stance) -> Sights:
+    """Return how a stance is looked at."""
+    up = np.array([0.0, 0.0, 1.0])
+    into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
+    x, _, z = stance.body.rotation.T
+    level = [
+        direction - (direction @ up) * up for direction in (into, -z, x, np.array([1.0, 0.0, 0.0]))
+    ]
+    chosen = next(i for i, v in enumerate(level) if np.linalg.norm(v) >= LEANING)
+    ahead = level[chosen] / np.linalg.norm(level[chosen])
+    length = float(np.linalg.norm(into))
+    into = into / length if length >= LEANING else ahead
+    return Sights(up, ahead, into, chosen == 0, bool(abs(into @ up) >= STEEP))
+
+
+def scene_of(plan: Plan, question: Question) -> Scene:
+    """Return what there is to see of a plan for a question."""
+    stance = question.stance
+    plans = {hand.limb: hand for hand in plan.hands or ()}
+    limbs = _limbs(plan, question)
+    return Scene(
+        body=stance.body,
+        hands=tuple(
+            _hand(hand, settle(hand, stance), plans.get(hand.limb)) for hand in stance.hands
+        ),
+        limbs=limbs,
+        torso=_torso(np.array([stance.body.position, *(limb.chain[0] for limb in limbs)])),
+        load=_load(plan, question),
+    )
+
+
+def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> DrawnHand:
+    into_world = hand.pose.apply
+    return DrawnHand(
+        limb=hand.limb,
+        floats=hand.wrist == "floating",
+        place=hand.pose.position,
+        palm=into_world(_palm_corners(settled)),
+        fingers=tuple(into_world(chain) for chain in _finger_chains(settled)),
+        touching=into_world(settled.positions[settled.holding]),
+        rock=into_world(rock_patch(settled)),
+        force=None if plan is None else -hand.pose.rotation @ plan.wrench[:3],
+        utilisation=None if plan is None else plan.utilisation,
+    )
+
+
+def _palm_corners(settled: SettledHand) -> Array:
+    """Return the corners of the palm in H, shape (4, 3)."""
+    hand = settled.hand
+    x, y = np.abs(hand.palm_tiles[:, :2]).max(axis=0) + hand.palm_tile_size / 2.0
+    return np.array([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
+
+
+def _finger_chains(settled: SettledHand) -> list[Array]:
+    """Return each finger's joints and tip in H, shape (4, 3) each."""
+    chains = []
+    up = np.array([0.0, 0.0, 1.0])
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
+    for frame, finger in zip(frames, settled.fingers, strict=True):
+        flat = finger.chain
+        chains.append(frame.joint + flat[:, :1] * frame.along + flat[:, 1:] * up)
+    return chains
+
+
+def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
+    if plan.joints is None:
+        return ()
+    stance, torque, limits = question.stance, plan.joint_torque, plan.joint_torque_limit
+    model = stance.robot.model
+    return tuple(
+        DrawnLimb(
+            limb,
+            stance.body.apply(model.link_chain(plan.joints, limb)),
+            None if torque is None or limits is None else np.abs(torque[limb]) / limits[limb],
+        )
+        for limb in stance.robot.limbs
+    )
+
+
+def _torso(points: Array) -> Array:
+    """Return the triangles of the hull of points (n, 3), whether it is solid, flat or a line."""
+    off = points - points.mean(axis=0)
+    axes = np.linalg.svd(off)[2]
+    for dimensions in (3, 2):
+        try:
+            hull = ConvexHull(off @ axes[:dimensions].T)
+        except (QhullError, ValueError):
+            continue
+        if dimensions == 3:
+            return np.asarray(points[hull.simplices])
+        first, *others = hull.vertices
+        return np.array([points[[first, i, j]] for i, j in pairwise(others)])
+    along = off @ axes[0]
+    ends = points[[int(along.argmin()), int(along.argmax())]]
+    return np.array([(ends[0], ends[1], ends[1])])
+
+
+def _load(plan: Plan, question: Question) -> DrawnLoad:
+    """Return what the hands hold up, at the centre of mass that was planned with."""
+    stance, load = question.stance, question.load
+    robot, turn = stance.robot, stance.body.rotation
+    com = robot.com if plan.joints is None else robot.model.com(plan.joints)
+    if question.body_wrench is None and not load.own:
+        com = robot.com if load.com is None else np.asarray(load.com)
+    force, moment = -plan.body_wrench[:3], -plan.body_wrench[3:]
+    moment = moment - np.cross(com, force)
+    weight = robot.mass * turn.T @ stance.gravity
+    size = SAME * max(float(np.linalg.norm(weight)), 1.0)
+    return DrawnLoad(
+        place=stance.body.apply(com),
+        force=turn @ force,
+        moment=turn @ moment,
+        weight=bool(
+            np.linalg.norm(force - weight) <= size and np.linalg.norm(moment) <= size * robot.reach
+        ),
+    )

@@ -1,0 +1,165 @@
+"""Tables in the picture of a plan: how near each limit is, or what no plan can supply."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.hand import NAIL
+from planner.explanation import barrier_words
+from planner.pictures.plan_scene import DrawnLimb
+from planner.pictures.plan_views import COLOURS, UTILISATION
+from planner.result import Certificate, LimitName, Plan
+
+__all__ = ["draw_joints", "draw_shortfall", "draw_tiles"]
+
+PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
+
+SLANT: Final = 30.0
+"""Of columns' titles that would run together [°]."""
+
+COMPONENTS: Final = ("fx [N]", "fy [N]", "fz [N]", "mx [N·m]", "my [N·m]", "mz [N·m]")
+"""Of a body wrench."""
+
+WRENCH_COLUMNS: Final = ("needed", "nearest", "missing")
+
+FIRST: Final = 24
+"""So many lines at most say what leaves no balance."""
+
+LETTERS: Final = 64
+"""Of such a line."""
+
+GAP: Final = 0.025
+"""Above and below a table, over the panel's height."""
+
+WRENCHES: Final = 0.26
+"""Height of the table of body wrenches, over the panel's."""
+
+SAID: Final[dict[str, Any]] = {"fontsize": 8, "ha": "left", "va": "top"}
+
+
+def draw_tiles(axes: Any, plan: Plan) -> None:
+    """Draw the utilisation of every tile and palm as a table of colours."""
+    hands = plan.hands or ()
+    clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
+    columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
+    names: list[str] = []
+    rows: list[list[float]] = []
+    for hand in hands:
+        for finger in hand.fingers:
+            used = {tile.phalanx: tile for tile in finger.tiles}
+            row = [
+                used[p].utilisation if p in used and used[p].contact != "none" else np.nan
+                for p in columns
+            ]
+            rows.append([*row, np.nan])
+            names.append(
+                f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
+                f"  {finger.tendon_tension:3.0f} N"
+            )
+        rows[-len(hand.fingers)][-1] = hand.palm.utilisation if hand.palm.engaged else np.nan
+    _draw_table(axes, np.array(rows), [*columns, "palm"], names)
+    done = 0
+    for hand in hands[:-1]:
+        done += len(hand.fingers)
+        axes.axhline(done - 0.5, color="black", linewidth=1.0)
+    axes.set_title("utilisation of each tile; tension of each tendon", fontsize=10, loc="right")
+
+
+def draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:
+    """Draw the utilisation of every joint as a table of colours."""
+    used = [np.asarray(limb.utilisations) for limb in limbs]
+    values = np.full((len(limbs), max(map(len, used))), np.nan)
+    for row, joints in zip(values, used, strict=True):
+        row[: len(joints)] = joints
+    columns = [str(i + 1) for i in range(values.shape[1])]
+    _draw_table(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
+    axes.set_title("utilisation of each joint, from the body outward", fontsize=10, loc="right")
+
+
+def _draw_table(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
+    """Draw numbers on their colours; none where a number is NaN."""
+    shown = np.ma.masked_invalid(values)
+    axes.imshow(shown, cmap=COLOURS, norm=UTILISATION, aspect="auto", interpolation="none")
+    axes.set_xticks(range(values.shape[1]), list(columns), fontsize=6.5)
+    axes.set_yticks(range(values.shape[0]), list(rows), fontsize=7)
+    axes.tick_params(length=0)
+    titles = axes.get_xticklabels()
+    widest = max(title.get_window_extent().width for title in titles)
+    if widest > axes.bbox.width / values.shape[1]:
+        for title in titles:
+            title.set(rotation=SLANT, ha="right", rotation_mode="anchor")
+    for (i, j), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "white" if value > 1.0 else "black"
+            axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)
+
+
+def draw_shortfall(axes: Any, plan: Plan) -> None:
+    """Write the body wrench that is missing, and what leaves no balance, where there are no loads.
+
+    The first members of the certificate's irreducible set, or, where that is undecided, of the rows
+    in the way.
+    """
+    axes.set_axis_off()
+    proof = plan.certificate
+    if proof is None:
+        axes.text(0.5, 0.5, "no plan, no loads", ha="center", va="center")
+        return
+    top = 1.0
+    if proof.shortfall is not None and proof.nearest is not None:
+        axes.text(0.0, 1.0, "body wrench in B, and the nearest that can be had", **SAID)
+        _write_wrenches(axes, np.column_stack([plan.body_wrench, proof.nearest, proof.shortfall]))
+        top -= WRENCHES + 2.0 * GAP
+    axes.text(0.0, top, "\n".join(_barriers(proof)), linespacing=1.5, **SAID)
+
+
+def _write_wrenches(axes: Any, values: Array) -> None:
+    """Write wrenches, shape (6, 3), as a table whose lines part the rows."""
+    words = [[f"{round(value, 1) + 0.0:.1f}" for value in row] for row in values]
+    table = axes.table(
+        [[name, *row] for name, row in zip(COMPONENTS, words, strict=True)],
+        colLabels=("", *WRENCH_COLUMNS),
+        edges="horizontal",
+        bbox=(0.0, 1.0 - GAP - WRENCHES, 0.9, WRENCHES),
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(SAID["fontsize"])
+    for cell in table.get_celld().values():
+        cell.set(edgecolor="0.7")
+        cell.set_text_props(ha="right")
+
+
+def _barriers(proof: Certificate) -> list[str]:
+    """Return lines that say what is in the way of a balance."""
+    if proof.irreducible == ():
+        return ["the hands have no loads at all, of any sign, that give it"]
+    if proof.irreducible is None:
+        return ["in the way, the weightiest first:", *_lines(proof.blocking)]
+    head = "these leave no balance, each needed for that; others may be, too:"
+    return [head, *_lines(proof.irreducible)]
+
+
+def _lines(names: Sequence[LimitName]) -> list[str]:
+    """Return what barriers forbid, by hand, a hand's alike in one line; the first of the lines."""
+    alike: dict[str, dict[str, list[str]]] = {}
+    for name in names:
+        parts = (name.phalanx, name.finger, name.joint)
+        whose = " of ".join(part.replace("_", " ") for part in parts if part is not None)
+        alike.setdefault(name.limb, {}).setdefault(barrier_words(name), []).append(whose)
+    lines = []
+    for limb, found in alike.items():
+        lines.append(f"{limb.replace('_', ' ')}:")
+        for words, owners in found.items():
+            of = ", ".join(owner for owner in owners if owner)
+            told = f"{words} ({of})" if of else words
+            lines += textwrap.wrap(
+                told, LETTERS, initial_indent="    ", subsequent_indent="        "
+            )
+    if len(lines) > FIRST:
+        lines[FIRST:] = ["…"]
+    return lines

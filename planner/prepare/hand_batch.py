@@ -1,0 +1,268 @@
+"""The settled hands of a stance in arrays: one hand after another, each with its tiles in order.
+
+There are T tiles and nails, F = 4 H fingers, and H hands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Final, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, Indices
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
+
+__all__ = [
+    "CONTACTS",
+    "KEPT",
+    "KEPT_NAMES",
+    "NONE",
+    "NOTHING",
+    "TOUCHING",
+    "Places",
+    "Same",
+    "Stacked",
+    "Touch",
+    "joined",
+    "places_of",
+    "stacked",
+    "touch_of",
+]
+
+KEPT: Final = 64
+"""Stances whose arrays are kept, those used last; each takes some 40 kB besides its hands."""
+
+KEPT_NAMES: Final = 1024
+"""Lists of names (of tiles, columns, rows) of which something is kept: some 5 kB each."""
+
+PLAIN: Final = 14
+"""Tiles of a hand that does not cling with its nails."""
+
+Number = TypeVar("Number", bound=np.generic)
+
+NOTHING, TOUCHING = 0, 1
+
+CONTACTS: Final = {"none": NOTHING, "face": TOUCHING, "edge": TOUCHING, "frame": 2, NAIL: 3}
+"""What of a tile touches the rock, by number: its face and its edge hold alike."""
+
+NONE: Final = np.zeros(0, dtype=np.intp)
+"""No rows."""
+
+UNLIMITED: Final = (math.inf, math.inf)
+"""Limits of a palm that touches nothing: no part of them is used."""
+
+
+class Same:
+    """Some objects as a key: the same only as these themselves, whatever they are equal to."""
+
+    __slots__ = ("each",)
+
+    def __init__(self, *each: object) -> None:
+        self.each = each
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(id, self.each)))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and tuple(map(id, self.each)) == tuple(map(id, other.each))
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Which tile is whose. Arrays are read-only.
+
+    Attributes
+    ----------
+    hand, finger : ndarray of int, shape (T,)
+        Of each tile, the fingers counted through all hands.
+    first, first_finger : ndarray of int, shape (H,)
+        Each hand's first tile, and finger.
+    first_of_finger : ndarray of int, shape (F,)
+        Each finger's first tile.
+    phalanges : ndarray of int, shape (F, 3)
+        Tiles of each finger's phalanges.
+    tips : ndarray of int, shape (F,)
+        The last of these.
+    bases, base_fingers : ndarray of int, shape (2 H,)
+        The tiles on rotating bases, and their fingers.
+    nails : ndarray of int
+        Nails, whether they hook or not.
+    """
+
+    hand: Indices
+    finger: Indices
+    first: Indices
+    first_finger: Indices
+    first_of_finger: Indices
+    phalanges: Indices
+    tips: Indices
+    bases: Indices
+    base_fingers: Indices
+    nails: Indices
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(T, F, H)."""
+        return len(self.hand), len(self.first_of_finger), len(self.first)
+
+
+@lru_cache(maxsize=KEPT)
+def places_of(counts: tuple[int, ...]) -> Places:
+    """Return the places of hands that have so many tiles each."""
+    parts = [
+        (h, len(FINGERS) * h + i, phalanx)
+        for h, count in enumerate(counts)
+        for i, name in enumerate(FINGERS)
+        for phalanx in ("base", *PHALANGES, NAIL)
+        if (phalanx != "base" or name.startswith("outer")) and (phalanx != NAIL or count > PLAIN)
+    ]
+    hand, finger = (np.array([part[k] for part in parts], dtype=np.intp) for k in (0, 1))
+    phalanx = np.array([part[2] for part in parts])
+    hands = np.arange(len(counts))
+    phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
+    bases = np.flatnonzero(phalanx == "base")
+    places = Places(
+        hand=hand,
+        finger=finger,
+        first=np.searchsorted(hand, hands),
+        first_finger=len(FINGERS) * hands,
+        first_of_finger=np.searchsorted(finger, np.arange(len(phalanges))),
+        phalanges=phalanges,
+        tips=phalanges[:, -1].copy(),
+        bases=bases,
+        base_fingers=finger[bases],
+        nails=np.flatnonzero(phalanx == NAIL),
+    )
+    for array in vars(places).values():
+        array.setflags(write=False)
+    return places
+
+
+class Touch(NamedTuple):
+    """What the tiles of some hands touch. Arrays are read-only.
+
+    Attributes
+    ----------
+    contacts : ndarray of int, shape (T,)
+        `CONTACTS`.
+    touches, framed : ndarray, shape (T,)
+        One for tiles on rock, zero for others; the same of those whose frame rests beside them.
+    away : ndarray of bool, shape (T,)
+        Tiles that are not on rock.
+    touching, idle : ndarray of int
+        Tiles on rock; tiles that touch nothing.
+    shares : ndarray, shape (T,)
+        Share of its finger's lateral reaction that each tile carries.
+    holding : tuple of int, length F
+        How many tiles and nails of each finger are on rock that they hold.
+    """
+
+    contacts: Indices
+    touches: Array
+    framed: Array
+    away: NDArray[np.bool_]
+    touching: Indices
+    idle: Indices
+    shares: Array
+    holding: tuple[int, ...]
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def touch_of(key: Same) -> Touch:
+    """Return what hands with these tuples of tiles touch."""
+    hands: tuple[tuple[Tile, ...], ...] = key.each  # type: ignore[assignment]
+    places = places_of(tuple(map(len, hands)))
+    contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
+    away = contacts != TOUCHING
+    touches = 1.0 - away
+    grips = np.add.reduceat(touches, places.first_of_finger)
+    holds = touches + (contacts == CONTACTS[NAIL])
+    touch = Touch(
+        contacts=contacts,
+        touches=touches,
+        framed=1.0 * (contacts == CONTACTS["frame"]),
+        away=away,
+        touching=np.flatnonzero(touches),
+        idle=np.flatnonzero(contacts == NOTHING),
+        shares=touches / np.maximum(grips, 1.0)[places.finger],
+        holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
+    )
+    for array in touch[:-1]:
+        array.setflags(write=False)
+    return touch
+
+
+@dataclass(frozen=True, eq=False)
+class Stacked:
+    """What the settled hands of a stance say, in arrays of all of them.
+
+    Attributes
+    ----------
+    hands : tuple of SettledHand
+    places : Places
+    touch : Touch
+    points : ndarray, shape (T + H, 3)
+        Where all tiles are, then all palms.
+    axes : ndarray, shape (T, 3, 3)
+    angles : ndarray, shape (F, 3)
+        Of each phalanx [rad].
+    bends : ndarray, shape (F, 3)
+        Of each joint, relative to the phalanx before it [rad].
+    palm_limits : ndarray, shape (H, 2)
+        Of each palm's shear and pressing; infinite where it touches nothing [N].
+    """
+
+    hands: tuple[SettledHand, ...]
+    places: Places
+    touch: Touch
+    points: Array
+    axes: Array
+    angles: Array
+    bends: Array
+    palm_limits: Array
+
+    @cached_property
+    def stops(self) -> NDArray[np.int8]:
+        """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
+        return joined([hand.postures.stops for hand in self.hands])
+
+
+@lru_cache(maxsize=KEPT)
+def stacked(hands: tuple[SettledHand, ...]) -> Stacked:
+    """Return what settled hands say, found once for the same hands."""
+    tiles = [hand.tiles for hand in hands]
+    positions = [hand.positions for hand in hands]
+    postures = [hand.postures for hand in hands]
+    angles = joined([posture.angles for posture in postures])
+    bends = angles.copy()
+    bends[:, 1:] -= angles[:, :-1]
+    limits = [
+        (hand.palm.shear_limit, hand.palm.pressing_limit) if hand.palm.engaged else UNLIMITED
+        for hand in hands
+    ]
+    points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
+    axes = joined([hand.axes for hand in hands])
+    # plans show them
+    points.setflags(write=False)
+    axes.setflags(write=False)
+    return Stacked(
+        hands,
+        places_of(tuple(map(len, tiles))),
+        touch_of(Same(*tiles)),
+        points,
+        axes,
+        angles,
+        bends,
+        np.array(limits),
+    )
+
+
+def joined(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
+    """Return the hands' arrays one after another."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -1,0 +1,314 @@
+"""The hands of a stance about a point: sets of floating ones linearised there, of the others fixed.
+
+A point is where each floating wrist is and what each other hand carries. Sets are exact where they
+are linearised, so what they say of their point is what the model says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+
+from hand_models.base import Array
+from hand_models.compliance import FloatingWrist, PalmMode
+from hand_models.wrench_spaces import SCALE, WrenchSpace
+from planner import programs
+from planner.prepare.stance_constraints import AddedRows
+from planner.programs import (
+    TWIST_UNIT,
+    WRIST_RANGE,
+    HandData,
+    Outcome,
+    StanceData,
+    scaled_rows,
+    scaled_transports,
+    with_held,
+)
+
+__all__ = ["Hands", "Measure", "Point", "Sets", "slopes_of", "widest_at_rest"]
+
+DIFFERENCE: Final = 1e-3
+"""Step of the differences of slopes, in `TWIST_UNIT`."""
+
+
+FARTHEST: Final = 50.0
+"""Farthest that a wrist may go from rest, in `TWIST_UNIT`: beyond, no twist is small."""
+
+
+BALANCED: Final = 2e-8
+"""Largest missing body wrench of a point that is exact, relative, per `WRENCH_UNIT`."""
+
+
+UNBROKEN: Final = 1e-8
+"""By how much hard rows of an exact point may be broken, in `stance_data.LOAD_UNIT`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where the hands' sets are linearised.
+
+    Attributes
+    ----------
+    loads : tuple of ndarray
+        y of each hand: loads [N], or the twist of a floating wrist [m, rad].
+    palms : tuple of PalmMode or None
+        How each floating hand's palm carries; None for a hand with a fixed wrist.
+    factor : float
+        How many times the body wrench is to be balanced.
+    """
+
+    loads: tuple[Array, ...]
+    palms: tuple[PalmMode | None, ...]
+    factor: float = 1.0
+
+
+class Measure(NamedTuple):
+    """What the model says of a point: exact, the sets about it being so there.
+
+    Attributes
+    ----------
+    utilisation : float
+        The largest.
+    missing : float
+        Sum of the components of the body wrench that are missing, scaled.
+    broken : float
+        By how much hard rows are broken at most, scaled; not below zero.
+    effort : float
+        What `program.Effort` makes least: the sum of squared relative tensions and joint torques,
+        and of fixed hands a little of what makes their other loads unique.
+    """
+
+    utilisation: float
+    missing: float
+    broken: float
+    effort: float
+
+    def exact(self, hands: Hands) -> bool:
+        """Whether nothing is missing, and nothing broken."""
+        size = max(1.0, float(np.linalg.norm(hands.wrench)))
+        return self.missing <= BALANCED * size and self.broken <= UNBROKEN
+
+
+class Sets(NamedTuple):
+    """The hands' sets about a point, and the program's data of them."""
+
+    spaces: tuple[WrenchSpace, ...]
+    data: StanceData
+
+    def measure(self, loads: Sequence[Array]) -> Measure:
+        """Return what loads do, exact for those of the point."""
+        used, broken, effort = -math.inf, 0.0, 0.0
+        for hand, y in zip(self.data.hands, loads, strict=True):
+            z = y / hand.unit
+            used = max(used, float((hand.L @ z + hand.l0).max()))
+            broken = max(broken, float((hand.H @ z - hand.h).max(initial=0.0)))
+            effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum(hand.rest * z**2))
+        missing = programs.body_wrench(self.data, loads) - self.data.wrench
+        return Measure(used, float(np.abs(missing).sum()), broken, effort)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every phalanx still finds its rock."""
+        return all(
+            np.isfinite(hand.L).all() and np.isfinite(hand.G).all() for hand in self.data.hands
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Hands:
+    """The hands of a stance, as the planner sees them.
+
+    Attributes
+    ----------
+    spaces : tuple of WrenchSpace
+        Of floating hands, at rest with idle palms.
+    wrists : tuple of FloatingWrist or None
+        None for hands with a fixed wrist.
+    transports : ndarray, shape (hands, 6, 6)
+        Ad(B←H).
+    wrench : ndarray, shape (nb,)
+        What the balance is to give: the body wrench, in `WRENCH_UNIT`, and components of hands'
+        wrenches that are given.
+    held : tuple of ndarray, shape (nb − 6, 6)
+        Of `HandData.of`.
+    added : tuple of AddedRows
+        What the stance adds to each hand's set; `spaces` have it already. Joints and their
+        Jacobians are those at which the hand rests: a floating wrist that gives way by a
+        millimetre or some ten milliradians hardly moves them.
+    """
+
+    spaces: tuple[WrenchSpace, ...]
+    wrists: tuple[FloatingWrist | None, ...]
+    transports: Array
+    wrench: Array
+    held: tuple[Array, ...]
+    added: tuple[AddedRows, ...]
+
+    @property
+    def floating(self) -> bool:
+        """Whether any wrist floats."""
+        return any(wrist is not None for wrist in self.wrists)
+
+    @cached_property
+    def _fixed(self) -> tuple[HandData, ...]:
+        """Data of hands with a fixed wrist; of floating ones a place to fill."""
+        return tuple(
+            HandData.carried(scaled_rows(space), with_held(carried, held))
+            for space, carried, held in zip(
+                self.spaces, scaled_transports(self.transports), self.held, strict=True
+            )
+        )
+
+    def turned(self, wrench: Array) -> Hands:
+        """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
+        aims = self.wrench[len(wrench) :]
+        other = replace(self, wrench=np.concatenate([wrench / programs.WRENCH_UNIT, aims]))
+        # the same data, too, so that a solver sees what is new
+        other.__dict__["_fixed"] = self._fixed
+        return other
+
+    @property
+    def idle(self) -> tuple[PalmMode | None, ...]:
+        """Modes in which no floating hand's palm carries."""
+        return tuple(None if wrist is None else "off" for wrist in self.wrists)
+
+    def at_rest(self, palms: Sequence[PalmMode | None]) -> Point:
+        """Return the point at which wrists are at rest, and the other hands carry nothing."""
+        loads = [np.zeros(len(space.columns)) for space in self.spaces]
+        return Point(tuple(loads), tuple(palms))
+
+    def sets(
+        self,
+        point: Point,
+        within: float | None = None,
+        farthest: Sequence[Array] | None = None,
+    ) -> Sets:
+        """Return the sets about a point.
+
+        Parameters
+        ----------
+        point : Point
+        within : float, optional
+            A range about it for wrists, in `TWIST_UNIT`; by default as far as the rows let.
+        farthest : sequence of ndarray, shape (6,), optional
+            With a range, how far from rest each wrist's twist may be [m, rad].
+        """
+        if not self.floating:
+            return Sets(self.spaces, StanceData(self._fixed, self.goal(point.factor)))
+        reach = None if within is None else within * TWIST_UNIT
+        spaces, data = list(self.spaces), list(self._fixed)
+        for i, (wrist, y, palm) in enumerate(
+            zip(self.wrists, point.loads, point.palms, strict=True)
+        ):
+            if wrist is not None:
+                space = wrist.linearised(y, palm, reach)
+                if farthest is not None:
+                    space = _near_rest(space, farthest[i])
+                spaces[i] = self.added[i].on(space)
+                part = HandData.of(spaces[i], self.transports[i], self.held[i])
+                # where a wrist is costs nothing by itself
+                data[i] = part._replace(rest=np.zeros(len(part.rest)))
+        return Sets(tuple(spaces), StanceData(tuple(data), self.goal(point.factor)))
+
+    def goal(self, factor: float) -> Array:
+        """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
+        if factor == 1.0:
+            return self.wrench
+        return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])
+
+    def curvature(
+        self, point: Point, within: float, duals: Outcome, efforts: Sequence[Array] | None = None
+    ) -> list[Array]:
+        """Return the curvature of each hand's rows, weighed by multipliers, shape (m, m).
+
+        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
+        of the rows of effort are none by default.
+        """
+        slopes = slopes_of(self.sets(point, within), duals, efforts)
+        bent = [np.zeros((len(slope), len(slope))) for slope in slopes]
+        for j, unit in enumerate(TWIST_UNIT):
+            aside = replace(
+                point,
+                loads=tuple(
+                    y if wrist is None else y + DIFFERENCE * unit * (np.arange(len(y)) == j)
+                    for wrist, y in zip(self.wrists, point.loads, strict=True)
+                ),
+            )
+            for i, slope in enumerate(slopes_of(self.sets(aside, within), duals, efforts)):
+                if self.wrists[i] is not None:
+                    bent[i][j] = (slope - slopes[i]) / DIFFERENCE
+        return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
+
+    def near_rest(self, point: Point) -> bool:
+        """Whether no wrist is farther from rest than a small twist."""
+        return self.step(self.at_rest(point.palms), point.loads) <= FARTHEST
+
+    def step(self, point: Point, loads: Sequence[Array]) -> float:
+        """Return how far the wrists move from a point to loads, in `TWIST_UNIT`."""
+        moved = [
+            float(np.abs((y - at) / TWIST_UNIT).max())
+            for wrist, y, at in zip(self.wrists, loads, point.loads, strict=True)
+            if wrist is not None
+        ]
+        return max(moved, default=0.0)
+
+
+def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
+    """Return a set whose wrist, within its range, is also so far from rest at most [m, rad]."""
+    ranges = np.array([row.limit == WRIST_RANGE for row in space.rows[len(space.s) :]])
+    # rows of a range are ±ξ over its half width, in each component
+    most = np.abs(space.H) @ farthest
+    return replace(space, h=np.where(ranges, np.minimum(space.h, most), space.h))
+
+
+def slopes_of(sets: Sets, duals: Outcome, efforts: Sequence[Array] | None = None) -> list[Array]:
+    """Return Lᵀλ + Hᵀμ + Gᵀν + Eᵀε of each hand, shape (m,)."""
+    balance = duals.balance_dual
+    assert balance is not None
+    hands = sets.data.hands
+    weights = [np.zeros(len(hand.e0)) for hand in hands] if efforts is None else efforts
+    return [
+        hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance + hand.E.T @ effort
+        for hand, limit, hard, effort in zip(
+            hands, duals.limit_duals, duals.hard_duals, weights, strict=True
+        )
+    ]
+
+
+def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
+    """Return the widest set at rest over the palm's modes, and how far it is off at most [N].
+
+    The widest has room for the largest ball of twists, in `TWIST_UNIT`. It is held against the
+    model where it reaches farthest along ± each axis, if every phalanx finds its rock there.
+    """
+    palms = wrist.palm_modes()
+    spaces = [wrist.linearised(palm=palm) for palm in palms]
+    rooms = [_room(space) for space in spaces]
+    best = int(np.argmax(rooms))
+    space, error = spaces[best], 0.0
+    for direction in np.vstack([np.eye(6), -np.eye(6)]):
+        slope = -(direction @ space.generators) * TWIST_UNIT
+        result = linprog(slope, A_ub=space.A * TWIST_UNIT, b_ub=space.b, bounds=(None, None))
+        if result.status != 0 or result.x is None:
+            continue
+        twist = result.x * TWIST_UNIT
+        exact = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]
+        off = np.abs((space.wrench(twist) - exact) * SCALE).max()
+        error = max(error, float(off)) if math.isfinite(off) else error
+    return palms[best], space, error
+
+
+def _room(space: WrenchSpace) -> float:
+    """Return the radius of the largest ball within a set, in `TWIST_UNIT`; −∞ if it is empty."""
+    rows = space.A * TWIST_UNIT
+    sizes = np.linalg.norm(rows, axis=1)[:, None]
+    goal = np.append(np.zeros(rows.shape[1]), -1.0)
+    bounds = [*[(None, None)] * rows.shape[1], (0.0, None)]
+    result = linprog(goal, A_ub=np.hstack([rows, sizes]), b_ub=space.b, bounds=bounds)
+    return -math.inf if result.fun is None else -float(result.fun)

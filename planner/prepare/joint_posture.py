@@ -1,0 +1,188 @@
+"""Where the joints of a stance are, what they bear without hands, and what the robot weighs there.
+
+Angles are given, or found by inverse kinematics from the hands' poses; limbs without a hand or an
+angle are at their zero. Torques and the weight are those of one Newton–Euler pass over the whole
+robot, its body accelerated and its joints at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import Array, InvalidInputError, Pose
+from planner.prepare.stance_constraints import JointLoads
+from planner.question import Question, Stance
+from planner.robots import solve_limbs, unreachable
+
+__all__ = ["Posture", "posture"]
+
+OFF: Final = 0.01
+"""How far a hand's pose may be from where given joints put it [m]."""
+
+TURNED: Final = 0.05
+"""How far its axes may be turned from those [rad]."""
+
+BEYOND: Final = 1e-6
+"""How far a given angle may be beyond its joint's limit [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """The joints of a stance.
+
+    Attributes
+    ----------
+    angles : mapping of str to ndarray, shape (n,)
+        Of every limb [rad].
+    joints : mapping of str to JointLoads
+        What every limb's joints bear.
+    body_wrench : ndarray, shape (6,)
+        That the rock must exert on the robot for its own weight and acceleration, in B.
+    solved : bool
+        Whether the angles were found, not given.
+    """
+
+    angles: Mapping[str, Array]
+    joints: Mapping[str, JointLoads]
+    body_wrench: Array
+    solved: bool
+
+
+def posture(question: Question) -> Posture | None:
+    """Return where a question's joints are; None if nothing is said of them.
+
+    Raises
+    ------
+    UnreachableError
+        If a hand's pose is out of its limb's reach; the field is relative to the question.
+    InvalidInputError
+        If given joints are impossible, or not where the hands' poses are.
+    DeadlineError
+        If the time is over before they are found.
+    """
+    stance = question.stance
+    if stance.joints is None:
+        return None
+    poses = hands_in_body(stance)
+    gravity, acceleration = felt(question)
+    angles: Mapping[str, Array]
+    if isinstance(stance.joints, str):
+        angles = _solved(question, poses, gravity - acceleration[:3])
+    else:
+        angles = _given(stance, stance.joints, poses)
+    return posture_at(question, angles)
+
+
+def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
+    """Return what the joints bear at these angles; limbs left out are at zero."""
+    robot = question.stance.robot
+    model = robot.model
+    gravity, acceleration = felt(question)
+    whole = {
+        limb: np.asarray(angles.get(limb, np.zeros(len(model.joint_names[limb]))), dtype=float)
+        for limb in robot.limbs
+    }
+    statics = model.statics(whole, gravity, acceleration)
+    jacobians = model.jacobians(whole)
+    limits = torque_limits(question)
+    return Posture(
+        angles=whole,
+        joints={
+            limb: JointLoads(
+                model.joint_names[limb],
+                statics.joint_torque[limb],
+                jacobians[limb],
+                limits[limb],
+            )
+            for limb in robot.limbs
+        },
+        body_wrench=statics.body_wrench,
+        solved=isinstance(question.stance.joints, str),
+    )
+
+
+def hands_in_body(stance: Stance) -> dict[str, Pose]:
+    """Return H in B of every hand of a stance."""
+    body = stance.body.inverse()
+    return {hand.limb: body @ hand.pose for hand in stance.hands}
+
+
+def felt(question: Question) -> tuple[Array, Array]:
+    """Return gravity (3,) and the body's acceleration (6,), linear and angular, in B.
+
+    A body wrench that is given leaves the acceleration open: it counts as none.
+    """
+    turn = question.stance.body.rotation.T
+    acceleration = np.zeros(6)
+    if question.body_wrench is None:
+        load = question.load
+        acceleration[:3] = turn @ np.asarray(load.acceleration)
+        acceleration[3:] = turn @ np.asarray(load.angular_acceleration)
+    return turn @ question.stance.gravity, acceleration
+
+
+def torque_limits(question: Question) -> dict[str, Array]:
+    """Return what each joint can bear: the caller's figures, or else the robot's [N·m]."""
+    robot, own = question.stance.robot, question.limits.joint_torque
+    if own is None:
+        return {limb: robot.torque_limits[limb] for limb in robot.limbs}
+    found = {}
+    for limb in robot.limbs:
+        known = robot.torque_limits[limb]
+        given = own.get(limb, known) if isinstance(own, Mapping) else own
+        found[limb] = np.broadcast_to(np.asarray(given, dtype=float), known.shape)
+    return found
+
+
+def _given(
+    stance: Stance, joints: Mapping[str, Array], poses: Mapping[str, Pose]
+) -> Mapping[str, Array]:
+    """Return given angles, which must be possible and where the hands' poses are."""
+    model = stance.robot.model
+    for limb, angles in joints.items():
+        low, high = model.lower[limb], model.upper[limb]
+        for i, (angle, least, most) in enumerate(zip(angles, low, high, strict=True)):
+            if not least - BEYOND <= angle <= most + BEYOND:
+                raise InvalidInputError(
+                    f"{model.joint_names[limb][i]} goes from {least:.6g} to {most:.6g} rad, "
+                    f"got {angle:.6g}",
+                    field=f"stance.joints.{limb}[{i}]",
+                )
+    there = model.hand_poses(joints)
+    for i, (limb, pose) in enumerate(poses.items()):
+        if limb not in joints:
+            raise InvalidInputError(
+                f"missing for {limb}, which holds on; valid are all limbs with a hand, or 'solve'",
+                field="stance.joints",
+            )
+        off = float(np.linalg.norm(pose.position - there[limb].position))
+        turned = Rotation.from_matrix(there[limb].rotation.T @ pose.rotation).magnitude()
+        if off > OFF or turned > TURNED:
+            raise InvalidInputError(
+                f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
+                f"up to {OFF:g} m and {TURNED:g} rad are valid",
+                field=f"stance.hands[{i}].pose",
+            )
+    return joints
+
+
+def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> dict[str, Array]:
+    """Return angles for the hands' poses, with low torques where each carries its share."""
+    robot = question.stance.robot
+    force = robot.mass * gravity / len(poses)
+    shares = {
+        limb: np.concatenate([pose.rotation.T @ force, np.zeros(3)]) for limb, pose in poses.items()
+    }
+    found = solve_limbs(robot, poses, loads=shares, gravity=gravity)
+    wrong = unreachable(found)
+    if wrong is not None:
+        limb = next(iter(wrong.missing))
+        index = [hand.limb for hand in question.stance.hands].index(limb)
+        wrong.field = f"stance.hands[{index}].pose"
+        raise wrong
+    return {limb: solution.angles for limb, solution in found.items()}

@@ -1,0 +1,137 @@
+"""The hands of a stance on their holds, and what each can carry at rest."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
+from hand_models.fixed_wrist import wrench_space
+from hand_models.hand import Placement, SettledHand
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare.hand_sets import widest_at_rest
+from planner.question import HandOnHold, Stance
+
+__all__ = [
+    "RestingHand",
+    "floating_wrist",
+    "hand_space",
+    "resting_hand",
+    "settle",
+    "settle_at",
+    "settle_stance",
+    "wrist_at",
+]
+
+
+def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
+    """Close one hand of a stance on its hold."""
+    return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+
+
+def settle_stance(stance: Stance) -> list[SettledHand]:
+    """Close all hands of a stance on their holds, at once.
+
+    Raises
+    ------
+    InvalidInputError
+        If a hand cannot be where it is; of the first one, its field relative to the question.
+    """
+    outcomes = stance.robot.hand.settle_each([_placement(hand) for hand in stance.hands])
+    return [_or_raise(outcome, i) for i, outcome in enumerate(outcomes)]
+
+
+def settle_at(stance: Stance, index: int) -> SettledHand:
+    """Close the hand of that index; an error's field is relative to the question."""
+    (outcome,) = stance.robot.hand.settle_each([_placement(stance.hands[index])])
+    return _or_raise(outcome, index)
+
+
+def _placement(hand: HandOnHold) -> Placement:
+    return Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+
+
+def _or_raise(outcome: SettledHand | InvalidInputError, index: int) -> SettledHand:
+    if isinstance(outcome, InvalidInputError):
+        raise outcome.within(f"stance.hands[{index}]")
+    return outcome
+
+
+def wrist_at(
+    stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
+) -> FloatingWrist | None:
+    """Return how the hand of that index gives way; None if its wrist is fixed."""
+    hand = stance.hands[index]
+    if hand.wrist == "fixed":
+        return None
+    try:
+        return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
+    except InvalidInputError as error:
+        if isinstance(error, UnsupportedError):
+            error.field = "wrist"
+        raise error.within(f"stance.hands[{index}]") from None
+
+
+def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
+    """Return one hand of a stance on its hold, and what it can carry; see `resting_hand`."""
+    hand = resting_hand(stance, limb)
+    return hand.settled, hand.space
+
+
+class RestingHand(NamedTuple):
+    """One hand of a stance on its hold, and what it can carry.
+
+    Attributes
+    ----------
+    settled : SettledHand
+    space : WrenchSpace
+        Of a floating hand the widest of its sets linearised at rest, one for each palm mode.
+    palm : PalmMode or None
+        The mode of that set; None for a fixed wrist.
+    error : float
+        How far it is off at most where it reaches farthest along ± each axis: forces, and moments
+        over 0.1 m [N].
+    """
+
+    settled: SettledHand
+    space: WrenchSpace
+    palm: PalmMode | None = None
+    error: float = 0.0
+
+
+def resting_hand(stance: Stance, limb: str) -> RestingHand:
+    """Return one hand of a stance on its hold, and what it can carry.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance has no such hand, or the hold cannot be where it is.
+    """
+    settled, wrist = _hand_at(stance, limb)
+    if wrist is None:
+        return RestingHand(settled, wrench_space(settled))
+    palm, space, error = widest_at_rest(wrist)
+    return RestingHand(settled, space, palm, error)
+
+
+def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
+    """Return how one hand of a stance gives way.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance has no such hand, its wrist is fixed, or the hold cannot be where it is.
+    """
+    _, wrist = _hand_at(stance, limb)
+    if wrist is None:
+        raise InvalidInputError(f"the wrist of {limb} is fixed; floating is needed", field="limb")
+    return wrist
+
+
+def _hand_at(stance: Stance, limb: str) -> tuple[SettledHand, FloatingWrist | None]:
+    for i, hand in enumerate(stance.hands):
+        if hand.limb == limb:
+            settled = settle_at(stance, i)
+            return settled, wrist_at(stance, i, settled)
+    limbs = ", ".join(hand.limb for hand in stance.hands)
+    raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")

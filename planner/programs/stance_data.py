@@ -1,0 +1,258 @@
+"""The rows of a stance's hands, nondimensional: what the conic programs are given.
+
+Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wrenches over
+`WRENCH_UNIT`, limit rows over their capacities: one physical scaling for all programs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.wrench_spaces import WrenchSpace
+from planner.programs.row_scaling import (
+    JOINT_TORQUE,
+    LOAD_UNIT,
+    TWIST_UNIT,
+    WRIST_RANGE,
+    ScaledRows,
+    scaled_rows,
+)
+
+__all__ = [
+    "JOINT_TORQUE",
+    "LOAD_UNIT",
+    "ROOM",
+    "TWIST_UNIT",
+    "WRENCH_UNIT",
+    "WRIST_RANGE",
+    "HandData",
+    "HandRows",
+    "Shape",
+    "StanceData",
+    "beyond",
+    "body_wrench",
+    "scaled_transports",
+    "used_effort",
+    "with_held",
+]
+
+WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
+"""Scale of a body wrench [N, N·m]."""
+
+ROOM: Final = (16, 256, 32, 16)
+"""What programs have room for at least, (m, nl, nh, ne) of each hand: all tiles and joints."""
+
+
+class HandData(NamedTuple):
+    """One hand's rows, nondimensional; nb rows of balance.
+
+    Attributes
+    ----------
+    G, g : ndarray, shapes (nb, m), (nb,)
+        Its part of the body wrench, and of what hands are to hold, G z + g.
+    L, l0 : ndarray, shapes (nl, m), (nl,)
+        Utilisations L z + l0.
+    H, h : ndarray, shapes (nh, m), (nh,)
+        Hard rows H z ≤ h.
+    E, e0 : ndarray, shapes (ne, m), (ne,)
+        Efforts E z + e0: tensions and joint torques over their capacities.
+    tie : ndarray, shape (m,)
+        Weights of z² in the tie-break.
+    rest : ndarray, shape (m,)
+        Weights of z², of loads that are no tensions, beside the effort; zero for tensions.
+    unit : ndarray, shape (m,)
+        Of z: the loads are ``y = unit z`` [N], of a floating wrist [m, rad].
+    """
+
+    G: Array
+    g: Array
+    L: Array
+    l0: Array
+    H: Array
+    h: Array
+    E: Array
+    e0: Array
+    tie: Array
+    rest: Array
+    unit: Array
+
+    @classmethod
+    def of(cls, space: WrenchSpace, transport: Array, held: Array | None = None) -> HandData:
+        """Scale a hand's set.
+
+        Parameters
+        ----------
+        space : WrenchSpace
+        transport : ndarray, shape (6, 6)
+            Ad(B←H).
+        held : ndarray, shape (nb − 6, 6), optional
+            What the further rows of the balance take of this hand's wrench in H.
+        """
+        carried = scaled_transports(transport)
+        if held is not None:
+            carried = with_held(carried, held)
+        return cls.carried(scaled_rows(space), carried)
+
+    @classmethod
+    def carried(cls, rows: ScaledRows, carried: Array) -> HandData:
+        """Return a hand's rows, its wrench on the rock carried to the balance by (nb, 6)."""
+        # all but the wrench is the same wherever the hand is
+        return cls(carried @ rows.generators, carried @ rows.origin, *rows[2:])
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(m, nl, nh, ne)."""
+        return self.G.shape[1], len(self.l0), len(self.h), len(self.e0)
+
+    def capped(self, utilisation: float) -> HandData:
+        """Return the hand with its limits at a utilisation as hard rows, and no others."""
+        return self._replace(
+            L=self.L[:0],
+            l0=self.l0[:0],
+            H=np.vstack([self.L, self.H]),
+            h=np.concatenate([utilisation - self.l0, self.h]),
+        )
+
+
+def scaled_transports(transports: Array) -> Array:
+    """Return what carries a hand's wrench to the balance, of one or more Ad(B←H), (…, 6, 6)."""
+    return np.asarray(-transports / WRENCH_UNIT[:, None])
+
+
+def with_held(carried: Array, held: Array) -> Array:
+    """Return what carries a hand's wrench to the balance (nb, 6), with what is held of it below."""
+    return np.vstack([carried, held / WRENCH_UNIT]) if len(held) else carried
+
+
+class HandRows(NamedTuple):
+    """All hands' rows in all their loads z (M,): G z of the balance, limits L z, hard rows H z.
+
+    Attributes
+    ----------
+    whole : ndarray, shape (nb + Σ nl + Σ nh, M)
+        G above L above H.
+    rest : ndarray, shape (Σ nl + Σ nh,)
+        −l0 above h.
+    limits : int
+        Σ nl.
+    unit, tie : ndarray, shape (M,)
+        Of `HandData`.
+    """
+
+    whole: Array
+    rest: Array
+    limits: int
+    unit: Array
+    tie: Array
+
+    @classmethod
+    def of(cls, hands: Sequence[HandData], balance: int) -> HandRows:
+        """Write the rows of hands below each other."""
+        unit = np.concatenate([hand.unit for hand in hands])
+        rest = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
+        limits = sum(len(hand.l0) for hand in hands)
+        whole = np.zeros((balance + len(rest), len(unit)))
+        left, limit, below = 0, balance, balance + limits
+        for hand in hands:
+            m, nl, nh, _ = hand.shape
+            right = left + m
+            whole[:balance, left:right] = hand.G
+            whole[limit : limit + nl, left:right] = hand.L
+            whole[below : below + nh, left:right] = hand.H
+            left, limit, below = right, limit + nl, below + nh
+        return cls(whole, rest, limits, unit, np.concatenate([hand.tie for hand in hands]))
+
+
+class Shape(NamedTuple):
+    """What a program is built for: rows of balance, and (m, nl, nh, ne) of each hand."""
+
+    balance: int
+    hands: tuple[tuple[int, int, int, int], ...]
+
+    def with_room(self) -> Shape:
+        """Return the shape of a program that serves this and most others of so many hands.
+
+        All hands have room for `ROOM`, or its double, and so on, as the largest needs.
+        """
+        most = np.max(np.array(self.hands).reshape(-1, len(ROOM)), axis=0, initial=0)
+        room = [
+            least << max(0, math.ceil(math.log2(max(size, 1) / least)))
+            for size, least in zip(most.tolist(), ROOM, strict=True)
+        ]
+        m, nl, nh, ne = room
+        return Shape(self.balance, ((m, nl, nh, ne),) * len(self.hands))
+
+
+@dataclass(frozen=True, eq=False)
+class StanceData:
+    """All hands of a stance, and what their balance is to give, scaled, shape (nb,).
+
+    First the body wrench (6,), then the components of hands' wrenches that are given.
+    """
+
+    hands: tuple[HandData, ...]
+    wrench: Array
+
+    @cached_property
+    def shape(self) -> Shape:
+        """What a program is built for."""
+        return Shape(len(self.wrench), tuple(hand.shape for hand in self.hands))
+
+    @cached_property
+    def offset(self) -> Array:
+        """What the loads' part of the balance is to give, W − Σ g, shape (nb,)."""
+        return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
+
+    def capped(self, utilisation: float) -> StanceData:
+        """Return the stance with limits at a utilisation as hard rows, and no others."""
+        return StanceData(tuple(hand.capped(utilisation) for hand in self.hands), self.wrench)
+
+    @cached_property
+    def rows(self) -> HandRows:
+        """All hands' rows below each other."""
+        return HandRows.of(self.hands, len(self.wrench))
+
+    def turned(self, wrench: Array) -> StanceData:
+        """Return the stance with another balance."""
+        turned = StanceData(self.hands, wrench)
+        for name in ("shape", "rows"):
+            if name in self.__dict__:
+                turned.__dict__[name] = self.__dict__[name]
+        return turned
+
+
+def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the scaled balance that the hands' loads y give, shape (nb,)."""
+    parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
+    return np.asarray(sum(parts, start=np.zeros_like(data.wrench)))
+
+
+def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
+    """Return by how much loads y exceed limits at a cap, or break hard rows, scaled; at least 0."""
+    worst = 0.0
+    for hand, y in zip(data.hands, loads, strict=True):
+        z = y / hand.unit
+        worst = max(worst, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
+        worst = max(worst, float((hand.H @ z - hand.h).max(initial=0.0)))
+    return worst
+
+
+def used(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the utilisation of every limit row, hand by hand, shape (sum of nl,)."""
+    parts = zip(data.hands, loads, strict=True)
+    return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
+
+
+def used_effort(data: StanceData, loads: Sequence[Array]) -> float:
+    """Return Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques."""
+    return sum(
+        float(np.sum((hand.E @ (y / hand.unit) + hand.e0) ** 2))
+        for hand, y in zip(data.hands, loads, strict=True)
+    )

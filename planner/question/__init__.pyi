@@ -1,0 +1,10 @@
+from .question import ForceCap as ForceCap
+from .question import Limits as Limits
+from .question import Load as Load
+from .question import Objective as Objective
+from .question import Question as Question
+from .stance import EARTH as EARTH
+from .stance import SOLVE as SOLVE
+from .stance import HandOnHold as HandOnHold
+from .stance import Stance as Stance
+from .stance import moderate as moderate

@@ -1,0 +1,297 @@
+"""What is asked of a stance: what the body needs, what is best, and what must not be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, finite_vector
+from hand_models.hand import FINGERS
+from planner import deadline
+from planner.question.stance import Stance, known_limbs, moderate
+
+__all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
+
+Frame = Literal["hand", "body", "world"]
+
+FRAMES: Final = get_args(Frame)
+"""In which frames a force may be capped."""
+
+
+LEAST: Final = 1e-3
+"""Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the body weighs and how it is to move.
+
+    Attributes
+    ----------
+    mass : float, optional
+        [kg]; the robot's own with its hands.
+    com : tuple of float, optional
+        Centre of mass in B [m]; the robot's own.
+    acceleration, angular_acceleration : tuple of float
+        Of the body in W [m/s², rad/s²]; the body does not turn yet. The angular one needs joints,
+        which tell how the robot's mass is spread.
+    """
+
+    mass: float | None = None
+    com: tuple[float, float, float] | None = None
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular_acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def own(self) -> bool:
+        """Whether it is the robot's own weight."""
+        return self.mass is None and self.com is None
+
+    def body_wrench(self, stance: Stance) -> Array:
+        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
+
+        ``f = m (a − g)`` at the centre of mass.
+        """
+        mass = stance.robot.mass if self.mass is None else self.mass
+        if not (math.isfinite(mass) and mass > 0.0):
+            raise InvalidInputError(f"must be above 0 kg, got {mass:g}", field="mass")
+        com = finite_vector(stance.robot.com if self.com is None else self.com, 3, "com")
+        acceleration = finite_vector(self.acceleration, 3, "acceleration")
+        if any(self.angular_acceleration):
+            raise InvalidInputError(
+                "needs the stance's joints, and neither mass nor com", field="angular_acceleration"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
+        x, y, z = com.tolist()
+        fx, fy, fz = force.tolist()
+        moment = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        return moderate(np.array([fx, fy, fz, *moment]), None)
+
+
+@dataclass(frozen=True)
+class ForceCap:
+    """The most that a hand may do to its rock.
+
+    Attributes
+    ----------
+    largest_force : float, or tuple of (float, float) of length 3
+        Whatever its direction, or the least and the largest along each axis [N]; those are not
+        above and not below zero, and may be infinite.
+    frame : {'hand', 'body', 'world'}
+        Whose axes they are.
+    """
+
+    largest_force: float | tuple[tuple[float, float], ...]
+    frame: Frame = "hand"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.largest_force, list):
+            ranges = tuple((float(low), float(high)) for low, high in self.largest_force)
+            object.__setattr__(self, "largest_force", ranges)
+        if self.frame not in FRAMES:
+            raise InvalidInputError(
+                f"unknown frame {self.frame!r}; known are {', '.join(FRAMES)}", field="frame"
+            )
+        if isinstance(self.largest_force, tuple):
+            if len(self.largest_force) != 3:
+                raise InvalidInputError(
+                    f"3 axes are needed, got {len(self.largest_force)}", field="largest_force"
+                )
+            for i, (low, high) in enumerate(self.largest_force):
+                if not low <= 0.0 <= high or low == high:
+                    raise InvalidInputError(
+                        f"a range from below to above zero is needed, one end of which may be "
+                        f"zero; got {low:g} to {high:g} N",
+                        field=f"largest_force[{i}]",
+                    )
+                if any(0.0 < abs(end) < LEAST for end in (low, high)):
+                    raise InvalidInputError(
+                        f"an end is zero or at least {LEAST:g} N, got {low:g} to {high:g} N",
+                        field=f"largest_force[{i}]",
+                    )
+        elif not (math.isfinite(self.largest_force) and self.largest_force >= LEAST):
+            raise InvalidInputError(
+                f"must be at least {LEAST:g} N, got {self.largest_force:g}", field="largest_force"
+            )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Caps that a caller puts on a plan.
+
+    Attributes
+    ----------
+    utilisation : float
+        Largest utilisation that still counts as ``optimal``, in (0, 1].
+    tendon_tension : float, optional
+        Of every tendon [N]; the hand's own maximum if that is less.
+    joint_torque : float or mapping of str to (float or sequence of float), optional
+        Of every joint, or by limb, in place of the robot's own figures [N·m].
+    per_hand : mapping of str to ForceCap
+        By limb.
+    tension_change : float, optional
+        Largest change of a tendon's tension from the present one [N].
+    """
+
+    utilisation: float = 1.0
+    tendon_tension: float | None = None
+    joint_torque: float | Mapping[str, float | Sequence[float]] | None = None
+    per_hand: Mapping[str, ForceCap] = field(default_factory=dict)
+    tension_change: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.utilisation <= 1.0:
+            raise InvalidInputError(
+                f"must be in (0, 1], got {self.utilisation:g}", field="utilisation"
+            )
+        for name in ("tendon_tension", "tension_change"):
+            most = getattr(self, name)
+            if most is not None and not (math.isfinite(most) and most > 0.0):
+                raise InvalidInputError(f"must be above 0 N, got {most:g}", field=name)
+        torque = self.joint_torque
+        if torque is None:
+            return
+        if isinstance(torque, Mapping):
+            torque = {
+                limb: tuple(most) if isinstance(most, Sequence) else most
+                for limb, most in torque.items()
+            }
+            object.__setattr__(self, "joint_torque", torque)
+        by_limb = torque if isinstance(torque, Mapping) else {"": torque}
+        for limb, given in by_limb.items():
+            for most in given if isinstance(given, tuple) else (given,):
+                if most is not None and not (math.isfinite(most) and most >= LEAST):
+                    raise InvalidInputError(
+                        f"must be at least {LEAST:g} N·m, got {most:g}",
+                        field="joint_torque" + (f".{limb}" if limb else ""),
+                    )
+
+
+Objective = Literal["max_margin", "min_effort"]
+
+OBJECTIVES: Final = get_args(Objective)
+"""What a plan may be the best in."""
+
+Want = Literal["load_factor", "prices", "model"]
+
+WANTS: Final = get_args(Want)
+"""What may be wanted beside a plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A stance, and what is asked of it.
+
+    Attributes
+    ----------
+    stance : Stance
+    body_wrench : ndarray, shape (6,), optional
+        In B [N, N·m]; computed from ``load`` if it is not given.
+    load : Load
+    limits : Limits
+    want : frozenset of {'load_factor', 'prices', 'model'}
+        Extras.
+    objective : {'max_margin', 'min_effort'}
+        Least utilisation; or least sum of squared relative tensions and joint torques, at a
+        utilisation within the limits.
+    present : mapping of str to ndarray, shape (4,)
+        Tensions of tendons now, by limb [N].
+    deadline : float, optional
+        How long the answer may take [s]; as long as it takes by default.
+    """
+
+    stance: Stance
+    body_wrench: Array | None = None
+    load: Load = field(default_factory=Load)
+    limits: Limits = field(default_factory=Limits)
+    want: frozenset[Want] = frozenset()
+    objective: Objective = "max_margin"
+    present: Mapping[str, Array] = field(default_factory=dict)
+    deadline: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.body_wrench is not None:
+            wrench = finite_vector(self.body_wrench, 6, "body_wrench")
+            moderate(wrench, "body_wrench")
+            object.__setattr__(self, "body_wrench", wrench)
+        if self.objective not in OBJECTIVES:
+            raise InvalidInputError(
+                f"unknown objective {self.objective!r}; known are {', '.join(OBJECTIVES)}",
+                field="objective",
+            )
+        unknown = sorted(set(self.want) - set(WANTS))
+        if isinstance(self.want, str) or unknown:
+            raise InvalidInputError(
+                f"a set of extras is needed, got {self.want!r}; known are {', '.join(WANTS)}",
+                field="want",
+            )
+        object.__setattr__(self, "want", frozenset(self.want))
+        deadline.possible(self.deadline)
+        self._check_limits()
+        wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
+        present = {}
+        for limb, tensions in self.present.items():
+            if wrists.get(limb) != "fixed":
+                valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
+                raise InvalidInputError(
+                    f"only hands of the stance with a fixed wrist have set-points; valid: "
+                    f"{valid or 'none'}",
+                    field=f"present.{limb}",
+                )
+            present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")
+            if present[limb].min() < 0.0:
+                raise InvalidInputError(
+                    f"tensions cannot be below 0 N, got {present[limb].min():g}",
+                    field=f"present.{limb}",
+                )
+        object.__setattr__(self, "present", present)
+        if self.limits.tension_change is not None and not present:
+            raise InvalidInputError(
+                "a change from nothing; present tensions are needed", field="limits.tension_change"
+            )
+
+    def _check_limits(self) -> None:
+        robot, limits = self.stance.robot, self.limits
+        known_limbs(limits.per_hand, robot, "limits.per_hand")
+        for limb in limits.per_hand:
+            if limb not in (hand.limb for hand in self.stance.hands):
+                raise InvalidInputError(
+                    "no hand of this stance; it has "
+                    + ", ".join(hand.limb for hand in self.stance.hands),
+                    field=f"limits.per_hand.{limb}",
+                )
+        if limits.joint_torque is None:
+            return
+        if self.stance.joints is None:
+            raise InvalidInputError(
+                "the stance says nothing of joints; give stance.joints, or 'solve'",
+                field="limits.joint_torque",
+            )
+        if isinstance(limits.joint_torque, Mapping):
+            known_limbs(limits.joint_torque, robot, "limits.joint_torque")
+            for limb, most in limits.joint_torque.items():
+                count = len(robot.model.joint_names[limb])
+                if isinstance(most, tuple) and len(most) != count:
+                    raise InvalidInputError(
+                        f"{count} joints need {count} figures, got {len(most)}",
+                        field=f"limits.joint_torque.{limb}",
+                    )
+
+    def needed_wrench(self, own: Array | None = None) -> Array:
+        """Return the body wrench that is planned for, shape (6,) [N, N·m].
+
+        Parameters
+        ----------
+        own : ndarray, shape (6,), optional
+            That of the robot's own weight and acceleration, where its joints are known.
+        """
+        if self.body_wrench is not None:
+            return self.body_wrench
+        if own is not None and self.load.own:
+            return moderate(own, None)
+        return self.load.body_wrench(self.stance)

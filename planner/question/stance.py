@@ -1,0 +1,236 @@
+"""Where the body, its hands and its joints are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, Pose, finite_vector
+from hand_models.hand import FINGERS, Grasp
+from hand_models.rock import Hold
+from hand_models.tile import Surface
+from planner.robots import Robot, robosimian
+
+__all__ = ["EARTH", "SOLVE", "HandOnHold", "Stance", "Wrist", "known_limbs", "moderate"]
+
+Wrist = Literal["fixed", "floating"]
+
+WRISTS: Final = get_args(Wrist)
+"""How a wrist may be."""
+
+SOLVE: Final = "solve"
+"""Of joints: find them from the hands' poses."""
+
+EARTH: Final = (0.0, 0.0, -9.81)
+"""Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
+
+FARTHEST: Final = 1e9
+"""How far from its parent's origin a frame may be [m]; farther, its digits are all lost."""
+
+HEAVIEST: Final = 1e12
+"""Largest component of a body wrench that is taken for one [N, N·m]."""
+
+TOO_FAR: Final = 10.0
+"""How many times its limb's reach a hand may be from the body: beyond, the units are wrong."""
+
+ORTHONORMAL: Final = 1e-6
+"""How far the products of a pose's axes may be from those of orthonormal ones."""
+
+
+def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
+    """Refuse limbs that the robot does not have."""
+    for limb in named:
+        if limb not in robot.limbs:
+            raise InvalidInputError(
+                f"unknown limb; known are {', '.join(robot.limbs)}", field=f"{field}.{limb}"
+            )
+
+
+def moderate(wrench: Array, field: str | None) -> Array:
+    """Return a body wrench; refuse one that is absurdly large."""
+    if not np.abs(wrench).max() <= HEAVIEST:
+        raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
+    return wrench
+
+
+def _possible(pose: Pose, field: str) -> None:
+    """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
+    if pose.proper:
+        position = pose.position.tolist()
+    else:
+        position = finite_vector(pose.position, 3, f"{field}.position").tolist()
+    if max(map(abs, position)) > FARTHEST:
+        raise InvalidInputError(
+            f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"
+        )
+    if pose.proper:
+        return
+    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").tolist()
+    if not _right_handed(*axes):
+        raise InvalidInputError(
+            "orthonormal right-handed axes are needed", field=f"{field}.orientation"
+        )
+
+
+def _right_handed(
+    a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, i: float
+) -> bool:
+    """Whether columns x = (a, d, g), y and z are orthonormal, and z is x × y."""
+    off = (
+        a * a + d * d + g * g - 1.0,
+        b * b + e * e + h * h - 1.0,
+        c * c + f * f + i * i - 1.0,
+        a * b + d * e + g * h,
+        b * c + e * f + h * i,
+        c * a + f * d + i * g,
+        c * (d * h - g * e) + f * (g * b - a * h) + i * (a * e - d * b) - 1.0,
+    )
+    return max(off) <= ORTHONORMAL and min(off) >= -ORTHONORMAL
+
+
+@dataclass(frozen=True, eq=False)
+class HandOnHold:
+    """One hand of a stance.
+
+    Attributes
+    ----------
+    limb : str
+        One of the robot's limbs.
+    pose : Pose
+        H in W.
+    hold : Hold
+    surface : Surface
+    hold_pose : Pose, optional
+        The hold's frame in W.
+    hold_in_hand : Pose, optional
+        The hold's frame in H. With neither, the hand is seated on the hold.
+    grasp : Grasp
+    wrist : {'fixed', 'floating'}
+        Whether its motors give each tendon the tension that the plan asks for while the wrist keeps
+        its pose, or stand still while the wrist gives way.
+    tendon_preload : ndarray, shape (4,), optional
+        Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
+        default.
+    wrench : tuple of float or None, length 6, optional
+        What the hand must exert on the rock, in H [N, N·m]; components that are None are free.
+    """
+
+    limb: str
+    pose: Pose
+    hold: Hold
+    surface: Surface
+    hold_pose: Pose | None = None
+    hold_in_hand: Pose | None = None
+    grasp: Grasp = field(default_factory=Grasp)
+    wrist: Wrist = "fixed"
+    tendon_preload: Array | None = None
+    wrench: tuple[float | None, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.wrist not in WRISTS:
+            raise InvalidInputError(
+                f"unknown wrist {self.wrist!r}; known are {', '.join(WRISTS)}", field="wrist"
+            )
+        if self.tendon_preload is not None:
+            if self.wrist == "fixed":
+                raise InvalidInputError(
+                    "only a floating wrist holds a preload; valid is none, or wrist floating",
+                    field="tendon_preload",
+                )
+            preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
+            object.__setattr__(self, "tendon_preload", preload)
+        if self.wrench is not None:
+            if len(self.wrench) != 6:
+                raise InvalidInputError(
+                    f"6 components are needed, got {len(self.wrench)}", field="wrench"
+                )
+            given = [0.0 if value is None else value for value in self.wrench]
+            moderate(finite_vector(given, 6, "wrench"), "wrench")
+        if self.hold_pose is not None and self.hold_in_hand is not None:
+            raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
+        _possible(self.pose, "pose")
+        if self.hold_pose is not None:
+            _possible(self.hold_pose, "hold.pose")
+        if self.hold_in_hand is not None:
+            _possible(self.hold_in_hand, "hold.pose_in_hand")
+
+    def placed_hold(self) -> Pose | None:
+        """Return the hold's frame in H, or None if the hand is to be seated."""
+        if self.hold_pose is None:
+            return self.hold_in_hand
+        axes = self.pose.rotation.T
+        return Pose(
+            axes @ (self.hold_pose.position - self.pose.position), axes @ self.hold_pose.rotation
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """Hands on holds around a body.
+
+    Attributes
+    ----------
+    hands : tuple of HandOnHold
+        Between one and the number of the robot's limbs, each limb once.
+    body : Pose
+        B in W.
+    gravity : ndarray, shape (3,)
+        In W [m/s²].
+    robot : Robot
+    joints : mapping of str to ndarray, 'solve' or None
+        Angles of each limb's joints [rad], of every limb that holds on at least; or that they are
+        to be found. None: nothing is said of them, and torques do not count.
+    """
+
+    hands: tuple[HandOnHold, ...]
+    body: Pose
+    gravity: Array = field(default_factory=lambda: np.array(EARTH))
+    robot: Robot = field(default_factory=robosimian)
+    joints: Mapping[str, Array] | Literal["solve"] | None = None
+
+    def __post_init__(self) -> None:
+        self._check_hands()
+        if isinstance(self.joints, str):
+            if self.joints != SOLVE:
+                raise InvalidInputError(
+                    f"valid are angles of each limb, or {SOLVE!r}; got {self.joints!r}",
+                    field="joints",
+                )
+        elif self.joints is not None:
+            names = self.robot.model.joint_names
+            known_limbs(self.joints, self.robot, "joints")
+            joints = {
+                limb: finite_vector(angles, len(names[limb]), f"joints.{limb}")
+                for limb, angles in self.joints.items()
+            }
+            object.__setattr__(self, "joints", joints)
+
+    def _check_hands(self) -> None:
+        if not self.hands:
+            raise InvalidInputError("at least one hand is needed", field="hands")
+        _possible(self.body, "body")
+        object.__setattr__(self, "gravity", finite_vector(self.gravity, 3, "gravity"))
+        seen: set[str] = set()
+        limbs, reach, origin = self.robot.limbs, self.robot.reach, self.body.position.tolist()
+        for i, hand in enumerate(self.hands):
+            if hand.limb not in limbs:
+                raise InvalidInputError(
+                    f"unknown limb {hand.limb!r}; known are {', '.join(limbs)}",
+                    field=f"hands[{i}].limb",
+                )
+            if hand.limb in seen:
+                raise InvalidInputError(
+                    f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
+                )
+            seen.add(hand.limb)
+            away = math.dist(hand.pose.position.tolist(), origin)
+            if away > TOO_FAR * reach:
+                raise InvalidInputError(
+                    f"the hand is {away:.3g} m from the body; its limb reaches about "
+                    f"{reach:.2g} m (positions are in metres)",
+                    field=f"hands[{i}].pose.position",
+                )

@@ -1,0 +1,449 @@
+"""From loads y of hands with fixed wrists to what each tile, tendon, motor and palm carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import accumulate
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
+from hand_models.hand import FINGERS, NAIL, SettledHand, SpinyHand, Tile
+from hand_models.tile import HalfPlane, Surface
+from hand_models.wrench_spaces import Row, WrenchSpace
+from planner.prepare import (
+    CONTACTS,
+    KEPT,
+    KEPT_NAMES,
+    TOUCHING,
+    Places,
+    Same,
+    Stacked,
+    joined,
+    places_of,
+    stacked,
+    touch_of,
+)
+from planner.programs import LOAD_UNIT, is_effort, scaled_rows
+from planner.result.hand_plan import HandPlan, PalmPlan
+from planner.result.plan_arrays import Carried
+
+__all__ = ["Reader", "Reading", "drawn_tendons", "reader_of"]
+
+COUNT: Final = len(FINGERS)
+
+OWN: Final = (
+    *(f"{finger}/{kind}" for kind in ("tension", "lateral", NAIL) for finger in FINGERS),
+    PALM_SHEAR,
+    PALM_PRESSING,
+)
+"""Every column that a hand with a fixed wrist may have."""
+
+PALM_SIGNS: Final = np.array([-1.0, 1.0])
+"""Which way a palm shears and presses along x and z."""
+
+WRENCH: Final = 6
+"""Rows of a wrench."""
+
+SIGNED: Final = ("/lateral", f"/{NAIL}")
+"""Loads that may be negative."""
+
+
+class Reading(NamedTuple):
+    """What loads say.
+
+    Attributes
+    ----------
+    carried : Carried
+    used : ndarray, shape (sum of nl,)
+        Utilisation of every limit row, hand by hand.
+    effort : float
+        Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
+    """
+
+    carried: Carried
+    used: Array
+    effort: float
+
+
+def reader_of(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> Reader:
+    """Return what reads loads of hands, made once for the same hands and sets; see `Reader`."""
+    return _reader_of(Same(*settled), Same(*spaces))
+
+
+@lru_cache(maxsize=KEPT)
+def _reader_of(settled: Same, spaces: Same) -> Reader:
+    return Reader(settled.each, spaces.each)  # type: ignore[arg-type]
+
+
+class Reader:
+    """Reads loads of hands with fixed wrists, all hands at once; made once for their rows.
+
+    Parameters
+    ----------
+    settled : sequence of SettledHand
+    spaces : sequence of WrenchSpace
+        Their sets.
+    """
+
+    def __init__(self, settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> None:
+        self._spaces = spaces
+        self._known = known = stacked(tuple(settled))
+        names = [name for space in spaces for name in (space.columns, space.rows)]
+        pieces = _pieces_of(Same(*[hand.surface for hand in settled]))
+        signs = [2 if hand.grasp.lateral else 1 for hand in settled]
+        limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
+        tiles = [hand.tiles for hand in settled]
+        self._layout = layout = _layout_of(Same(*tiles, *names), tuple(limits))
+
+        laws = joined([hand.loads for hand in settled])
+        self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
+        self._at_zero[:, :2], self._slope[:, :2] = laws[..., 0], laws[..., 1]
+        self._slope[:, 2] = known.touch.shares
+        if len(layout.hooked):
+            self._slope[layout.hooked, 0] = 1.0
+        # rows of all hands, each of as many, and as long, as the largest has: wrench, then limits
+        self._rows = np.zeros((*layout.shape, layout.columns.shape[1]))
+        self._at_rest = np.zeros(layout.shape)
+        for mine, rest, space in zip(self._rows, self._at_rest, spaces, strict=True):
+            own = scaled_rows(space)
+            end, columns = WRENCH + len(own.L), own.L.shape[1]
+            mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
+            rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
+        joints, _, nails = drawn_tendons(known)
+        self._drives, self._per_shear = _drives_of(known.places, Same(settled[0].hand))
+        self._winches = (joints + nails) / settled[0].hand.drive.winch_radius
+        self._fixed = (
+            tuple(tiles),
+            pieces,
+            tuple([hand.palm.engaged for hand in settled]),
+            (None,) * len(settled),
+        )
+
+    def read(self, loads: Sequence[Array]) -> Reading:
+        """Return what loads y of all hands say [N].
+
+        What may not be negative and is, by rounding, counts as zero.
+        """
+        known, layout = self._known, self._layout
+        y = np.concatenate([ZERO, *loads])
+        np.maximum(y, layout.least, out=y)
+        scaled = y.take(layout.columns)
+        scaled /= LOAD_UNIT
+        rows = (self._rows @ scaled[:, :, None])[:, :, 0]
+        rows += self._at_rest
+        wrenches, used = rows[:, :WRENCH], rows.take(layout.limits)
+        efforts = used.take(layout.efforts)
+
+        tensions, palms = y.take(layout.tensions), y.take(layout.palms)
+        of_tiles = y.take(layout.of_tile)
+        of_tiles *= self._slope
+        of_tiles += self._at_zero
+        tile_used = np.maximum.reduceat(used, layout.begins).take(layout.kept)
+        tile_used *= known.touch.touches
+        shears = of_tiles[:, 0]
+        if len(layout.hooked):
+            tile_used[layout.hooked] = used[layout.nail_limits].max(axis=1)
+            shears = shears.copy()
+            shears[layout.hooked] = 0.0
+        drawn = np.add.reduceat(shears, known.places.first_of_finger)
+        at_zero, per_newton = self._drives
+        drives = per_newton * tensions
+        drives += at_zero
+        drives[2] += self._winches
+        drives[2] += self._per_shear * drawn
+        forces = np.zeros((len(known.points), 3))
+        forces[: len(of_tiles)] = (of_tiles[:, None] @ known.axes)[:, 0]
+        forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
+        palm_used = palms / known.palm_limits
+        carried = Carried(
+            tensions,
+            drives,
+            of_tiles,
+            forces,
+            known.points,
+            known.axes,
+            np.maximum(tile_used, 0.0),
+            np.zeros((len(palms), 3)),
+            np.maximum(palm_used[:, 0], palm_used[:, 1]),
+            wrenches,
+            np.maximum(np.maximum.reduceat(used, layout.first_row), 0.0),
+            *self._fixed,
+        )
+        return Reading(carried, used, float(efforts.dot(efforts)))
+
+    def hands(self, limbs: Sequence[str], carried: Carried) -> tuple[HandPlan, ...]:
+        """Return what was read, hand by hand; its arrays are parts of those."""
+        known, nails = self._known, self._nail_planes()
+        firsts = known.places.first.tolist()
+        palm_used, used = carried.palm_utilisations.tolist(), carried.utilisations.tolist()
+        found, tiles, moments = [], len(carried.loads), carried.palm_moments
+        for h, (limb, hand, space) in enumerate(zip(limbs, known.hands, self._spaces, strict=True)):
+            own = slice(firsts[h], firsts[h] + len(hand.tiles))
+            fingers = slice(COUNT * h, COUNT * (h + 1))
+            place, force = carried.points[tiles + h], carried.forces[tiles + h]
+            found.append(
+                HandPlan(
+                    limb=limb,
+                    wrench=carried.wrenches[h],
+                    tensions=carried.tensions[fingers],
+                    drives=carried.drives[:, fingers],
+                    loads=carried.loads[own],
+                    forces=carried.forces[own],
+                    positions=carried.points[own],
+                    axes=carried.axes[own],
+                    tile_utilisations=carried.tile_utilisations[own],
+                    tiles=carried.tiles[h],
+                    half_planes=carried.half_planes[h],
+                    palm=PalmPlan(place, force, moments[h], carried.engaged[h], palm_used[h]),
+                    utilisation=used[h],
+                    seating=hand.seating,
+                    space=space,
+                    laws=hand.loads,
+                    nail_planes=nails.get(h, {}),
+                )
+            )
+        return tuple(found)
+
+    def _nail_planes(self) -> dict[int, dict[int, tuple[HalfPlane, ...]]]:
+        """Return the limits of nails that hook, by hand and tile."""
+        places = self._known.places
+        found: dict[int, dict[int, tuple[HalfPlane, ...]]] = {}
+        for t in self._layout.hooked.tolist():
+            h = int(places.hand[t])
+            tile = t - int(places.first[h])
+            found.setdefault(h, {})[tile] = self._known.hands[h].nail_limits(tile)
+        return found
+
+
+def drawn_tendons(known: Stacked) -> tuple[Array, Array, Array]:
+    """Return what winches draw in besides travel of the tiles, of each finger.
+
+    Returns
+    -------
+    joints : ndarray, shape (F,)
+        [m]
+    losses : ndarray, shape (F,)
+        Sum of the diagonal of M (Eq. 8).
+    nails : ndarray, shape (F,)
+        [m]
+    """
+    hand = known.hands[0].hand
+    radii, losses = _losses(known.places, Same(hand))
+    nails = hand.nail.pulley_radius * joined([each.nail_angles for each in known.hands])
+    return known.bends @ radii, losses, nails
+
+
+@lru_cache(maxsize=KEPT)
+def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
+    """Return what tensions and tiles' shears do to motors and winches, affine in them.
+
+    Returns
+    -------
+    drives : ndarray, shape (2, 3, F)
+        Torque [N·m] and current [A] of each motor, angle of each winch [rad]: at zero tension,
+        straight fingers and without shear; then per newton of tension.
+    per_shear : float
+        Of the winches' angles, per newton of the shears of a tendon's tiles [rad/N].
+    """
+    (hand,) = key.each
+    assert isinstance(hand, SpinyHand)
+    drive, (_, losses) = hand.drive, _losses(places, key)
+    none, one = np.zeros_like(losses), np.ones_like(losses)
+    at_zero, at_one = (
+        np.array([drive.torque(f), drive.current(f), drive.winch_angle(none, f, none, losses)])
+        for f in (none, one)
+    )
+    return np.array([at_zero, at_one - at_zero]), drive.winch_angle(0.0, 0.0, 1.0, 0.0)
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _pieces_of(key: Same) -> tuple[tuple[HalfPlane, ...], ...]:
+    """Return the half-planes of tiles on these surfaces."""
+    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
+    return tuple([surface.pieces() for surface in surfaces])
+
+
+@lru_cache(maxsize=KEPT)
+def _losses(places: Places, key: Same) -> tuple[Array, Array]:
+    """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
+    (hand,) = key.each
+    assert isinstance(hand, SpinyHand)
+    sums = np.add.accumulate((1.0 - hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0))
+    losses = np.full(len(places.phalanges), sums[-2])
+    losses[places.base_fingers] = sums[-1]
+    return np.array(hand.finger.pulley_radii), losses
+
+
+# Layouts ------------------------------------------------------------------------------------------
+
+
+ZERO: Final = np.zeros(1)
+"""A load that a hand does not have, before all others."""
+
+
+class _HandLayout(NamedTuple):
+    """Where everything is in one hand's loads and limit rows.
+
+    Attributes
+    ----------
+    places : ndarray of int, shape (14,)
+        Of each of `OWN` among its m loads, counted from one; zero where there is none.
+    has : ndarray of int, shape (14,)
+        One where there is one, zero elsewhere.
+    least : ndarray, shape (m,)
+        What each load may be at least [N].
+    rows : int
+        How many limit rows it has.
+    begins : ndarray of int
+        Where the limit rows of each tile on rock begin, and where those of the last end.
+    nails : ndarray of int
+        Limit rows of its nails, two of each.
+    efforts : ndarray of int
+        Limit rows whose utilisation counts as effort.
+    """
+
+    places: Indices
+    has: Indices
+    least: Array
+    rows: int
+    begins: Indices
+    nails: Indices
+    efforts: Indices
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _hand_layout(key: Same, limits: int) -> _HandLayout:
+    """Return the layout of a hand.
+
+    Parameters
+    ----------
+    key : Same
+        Its tiles; columns and rows of its set.
+    limits : int
+        Limit rows of each tile, of which a hand has the first, tile by tile.
+    """
+    tiles: tuple[Tile, ...]
+    columns: tuple[str, ...]
+    names: tuple[Row, ...]
+    tiles, columns, names = key.each  # type: ignore[assignment]
+    rows = [row for row in names if row.kind == "limit"]
+    touching = sum(CONTACTS[tile.contact] == TOUCHING for tile in tiles)
+    place = {name: i for i, name in enumerate(columns, start=1)}
+    places = np.array([place.get(name, 0) for name in OWN])
+    return _HandLayout(
+        places=places,
+        has=np.sign(places),
+        least=np.array([-np.inf if name.endswith(SIGNED) else 0.0 for name in columns]),
+        rows=len(rows),
+        begins=limits * np.arange(touching + 1),
+        nails=np.flatnonzero([row.phalanx == NAIL for row in rows]),
+        efforts=np.flatnonzero([is_effort(row) for row in rows]),
+    )
+
+
+class _Layout(NamedTuple):
+    """Where everything is in the loads and in the limit rows of all hands.
+
+    Attributes
+    ----------
+    columns : ndarray of int, shape (H, most m)
+        Each hand's loads among all; before all of them is one that is zero.
+    shape : tuple of int
+        (H, 6 + most limits): so many rows of so many hands.
+    limits : ndarray of int, shape (sum of nl,)
+        The limit rows among all hands' rows, of which the first six of each hand are its wrench.
+    least : ndarray, shape (1 + m,)
+        What each load may be at least [N].
+    tensions : ndarray of int, shape (F,)
+    palms : ndarray of int, shape (H, 2)
+    of_tile : ndarray of int, shape (T, 3)
+        Loads that shear, normal and lateral load of each tile follow.
+    first_row : ndarray of int, shape (H,)
+        Of the limit rows, by hand.
+    begins : ndarray of int
+        Where the limit rows of each tile on rock begin, and where those of a hand's last one end.
+    kept : ndarray of int, shape (T,)
+        Which of them each tile's are; the first for those that are not on rock.
+    hooked : ndarray of int
+        Nails that hook.
+    nail_limits : ndarray of int, shape (number of them, 2)
+        Their limit rows.
+    efforts : ndarray of int
+        Limit rows whose utilisation counts as effort.
+    """
+
+    columns: Indices
+    shape: tuple[int, int]
+    limits: Indices
+    least: Array
+    tensions: Indices
+    palms: Indices
+    of_tile: Indices
+    first_row: Indices
+    begins: Indices
+    kept: Indices
+    hooked: Indices
+    nail_limits: Indices
+    efforts: Indices
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
+    """Return the layout of all hands.
+
+    Parameters
+    ----------
+    key : Same
+        The tiles of each hand; then columns and rows of the set of each.
+    limits : tuple of int
+        Of `_hand_layout`, for each.
+    """
+    count = len(limits)
+    tiles: tuple[tuple[Tile, ...], ...] = key.each[:count]  # type: ignore[assignment]
+    names = zip(tiles, key.each[count::2], key.each[count + 1 :: 2], strict=True)
+    hands = [_hand_layout(Same(*own), rows) for own, rows in zip(names, limits, strict=True)]
+    places, touch = places_of(tuple(map(len, tiles))), touch_of(Same(*tiles))
+    ends = list(accumulate((len(hand.least) for hand in hands), initial=1))
+    found = np.array([hand.places + at * hand.has for hand, at in zip(hands, ends, strict=False)])
+    found -= np.sign(found)
+    first_row = list(accumulate((hand.rows for hand in hands), initial=0))[:-1]
+    tensions, laterals, axials = (
+        found[:, i : i + COUNT].ravel() for i in range(0, 3 * COUNT, COUNT)
+    )
+    of_tile = np.empty((len(places.hand), 3), dtype=np.intp)
+    of_tile[:, :2] = tensions[places.finger, None]
+    of_tile[:, 2] = laterals[places.finger]
+    hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
+    of_tile[hooked, 0] = axials[places.finger[hooked]]
+    pairs = list(zip(first_row, hands, strict=True))
+    columns = np.zeros((count, max(len(hand.least) for hand in hands)), dtype=np.intp)
+    for own, end, hand in zip(columns, ends, hands, strict=False):
+        own[: len(hand.least)] = end + np.arange(len(hand.least))
+    shape = count, WRENCH + max(hand.rows for hand in hands)
+    kept = np.zeros(len(places.hand), dtype=np.intp)
+    kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
+    return _Layout(
+        columns=columns,
+        shape=shape,
+        limits=joined(
+            [
+                shape[1] * h + WRENCH + np.arange(hand.rows, dtype=np.intp)
+                for h, hand in enumerate(hands)
+            ]
+        ),
+        least=np.concatenate([ZERO, *[hand.least for hand in hands]]),
+        tensions=tensions,
+        palms=found[:, 3 * COUNT :],
+        of_tile=of_tile,
+        first_row=np.array(first_row),
+        begins=joined([at + hand.begins for at, hand in pairs]),
+        kept=kept,
+        hooked=hooked,
+        nail_limits=joined([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
+        efforts=joined([at + hand.efforts for at, hand in pairs]),
+    )

@@ -1,0 +1,258 @@
+"""The answer to a question about a stance: data, as `planner.solving.solve.plan` returns it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.wrench_spaces import WrenchSpace
+from planner.deadline import Unfinished
+from planner.result.hand_plan import HandPlan
+
+__all__ = [
+    "Certificate",
+    "LimitName",
+    "Plan",
+    "Price",
+    "SolverInfo",
+    "Status",
+    "TensionPath",
+    "Times",
+]
+
+Status = Literal["optimal", "overloaded", "infeasible", "failed"]
+
+
+class LimitName(NamedTuple):
+    """A limit of one hand, by name.
+
+    Attributes
+    ----------
+    limb : str
+    finger, phalanx : str or None
+        None where the limit is not a finger's, or not a tile's.
+    limit : str
+        What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
+        ``motor_torque``, ``motor_current``, ``finger_shear`` and, with its distal phalanx,
+        ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``, ``hand_load`` and, where
+        it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard row's name.
+    joint : str or None
+        The joint whose torque it is.
+    """
+
+    limb: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+
+
+class Price(NamedTuple):
+    """A limit that binds, and what one more unit of it would take off the utilisation.
+
+    Attributes
+    ----------
+    name : LimitName
+    price : float
+        [1/unit]
+    unit : str
+        Of the limit's capacity: ``N``, ``N·m`` or ``A``.
+    """
+
+    name: LimitName
+    price: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Why no plan balances the body, or none within a cap on the utilisation.
+
+    Checked without the solver: for every body wrench w that the hands can give, and the wrenches v
+    of theirs on the rock with which they do,
+
+        d · w + Σ c · v ≤ supremum < needed = d · W + Σ c · V
+
+    for the body wrench W asked for and the components V of hands' wrenches that are given. Where d
+    and all c are zero, rows contradict each other whatever the hands are to give.
+
+    Attributes
+    ----------
+    utilisation : float or None
+        The cap within which there is no plan; None: there is none at any utilisation.
+    direction : ndarray, shape (6,)
+        d in B [1/N, 1/(N·m)], of unit length in the program's units of 300 N and 30 N·m; zero where
+        what the body needs plays no part.
+    held : mapping of str to ndarray, shape (6,)
+        c in H [1/N, 1/(N·m)] of each hand that is given a wrench, by limb; zero for components that
+        are free.
+    supremum : float
+        Over all loads up to 10⁶ N that keep to hard rows and, within a cap, to limits.
+    needed : float
+        Larger than ``supremum``.
+    shortfall : ndarray, shape (6,), or None
+        What is missing in B: the body wrench asked for minus the nearest that can be had. None
+        where nothing can: the hands' own rows, or the wrenches they are given, leave no loads. None
+        also where a deadline came before it was found; the direction is not zero then.
+    nearest : ndarray, shape (6,), or None
+        That nearest body wrench.
+    blocking : tuple of LimitName
+        Rows that keep the hands from giving more in that direction; empty where no hand has
+        anything at all to give. The caller's own limits come first, then other limits, then hard
+        rows; of each of these the weightiest.
+    irreducible : tuple of LimitName or None
+        Limits and hard rows (all rows of a name together) and given wrenches of hands
+        (``held_wrench``) that by themselves leave no balance, each of them needed for that. Others
+        may be in the way, too. In the order of ``blocking``. Empty where loads of any sign, up to
+        10⁶ N, would not balance it. None where rounding leaves the set undecided.
+    sufficient : tuple of LimitName or None
+        Those of them without any one of which, all other rows in place, there is a plan: within
+        the cap, or at any utilisation. Empty if no single one does. None where that is undecided,
+        or the set has more than 16 members and others alone are not in the way.
+    spaces : mapping of str to WrenchSpace
+        The hands' sets that are meant, by limb; none where no hand has a part in it.
+    """
+
+    utilisation: float | None
+    direction: Array
+    held: Mapping[str, Array]
+    supremum: float
+    needed: float
+    shortfall: Array | None
+    nearest: Array | None
+    blocking: tuple[LimitName, ...]
+    irreducible: tuple[LimitName, ...] | None
+    sufficient: tuple[LimitName, ...] | None
+    spaces: Mapping[str, WrenchSpace]
+
+
+@dataclass(frozen=True)
+class SolverInfo:
+    """Which solver ended how."""
+
+    name: str
+    status: str
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Times:
+    """Where the time went [s]."""
+
+    model: float
+    solve: float
+    total: float
+
+
+@dataclass(frozen=True)
+class TensionPath:
+    """The straight way from the present tensions to the planned ones.
+
+    Attributes
+    ----------
+    safe : bool
+        Whether every point of it balances the body within the cap on the utilisation.
+    safe_part : float
+        How much of it does, from the plan backward; zero where the plan itself does not.
+    utilisation_at_present : float or None
+        The least at the present tensions; None if these balance the body at no utilisation.
+    largest_change : float
+        Of a tension [N].
+    limiting : tuple of LimitName
+        The limits and hard rows that end the safe part, the weightiest first; of a plan beyond the
+        cap those of which it uses most. Empty where the way is safe.
+    """
+
+    safe: bool
+    safe_part: float
+    utilisation_at_present: float | None
+    largest_change: float
+    limiting: tuple[LimitName, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The answer. A value that does not exist for a status is None.
+
+    Attributes
+    ----------
+    status : {'optimal', 'overloaded', 'infeasible', 'failed'}
+    body_wrench : ndarray, shape (6,)
+        The one planned for, in B.
+    utilisation : float or None
+    effort : float or None
+        Sum of squared relative tendon tensions and joint torques of the limbs that hold on.
+    load_factor : float or None
+        Largest s for which s × body wrench has a plan with utilisation ≤ 1, if it was asked for and
+        exists.
+    load_factor_unbounded : bool
+        Whether there is no end to such s.
+    limiting : LimitName or None
+        The limit with the largest utilisation.
+    hands : tuple of HandPlan or None
+        None where there is no balance.
+    prices : tuple of Price or None
+        What one more unit of each limit that binds would take off the utilisation.
+    effort_prices : tuple of Price or None
+        What it would take off the effort, where that is what is least; tensions and torques stay
+        measured by the limits as they are.
+    certificate : Certificate or None
+    residual : ndarray, shape (6,), or None
+        Body wrench of the returned loads minus the one asked for.
+    joints, joint_torque : mapping of str to ndarray, shape (n,), or None
+        Of every limb [rad], [N·m]; None where the stance says nothing of joints, and of torques
+        where there is no balance.
+    joint_torque_limit : mapping of str to ndarray, shape (n,), or None
+        What the joints bear: the caller's figures, or else the robot's [N·m].
+    path : TensionPath or None
+        The way from the present tensions; None where none were given, or there is no plan.
+    verified : bool
+        Whether the independent check passed.
+    reason : str
+        One sentence that a climber understands.
+    warnings : tuple of str
+        What is odd about the stance: hands that touch nothing, or are out of reach. What a deadline
+        has left unfinished.
+    solver : SolverInfo
+    time : Times
+    unfinished : tuple of str
+        What a deadline has left unfinished, by name: see `planner.deadline.unfinished`. Values that
+        are missing for it are None.
+    """
+
+    status: Status
+    body_wrench: Array
+    utilisation: float | None
+    effort: float | None
+    load_factor: float | None
+    load_factor_unbounded: bool
+    limiting: LimitName | None
+    hands: tuple[HandPlan, ...] | None
+    prices: tuple[Price, ...] | None
+    effort_prices: tuple[Price, ...] | None
+    certificate: Certificate | None
+    residual: Array | None
+    joints: Mapping[str, Array] | None
+    joint_torque: Mapping[str, Array] | None
+    joint_torque_limit: Mapping[str, Array] | None
+    path: TensionPath | None
+    verified: bool
+    reason: str
+    warnings: tuple[str, ...]
+    solver: SolverInfo
+    time: Times
+    unfinished: tuple[Unfinished, ...] = ()
+
+    @property
+    def joint_utilisation(self) -> float | None:
+        """Largest torque of a joint over what it bears; None where torques are not known."""
+        if self.joint_torque is None or self.joint_torque_limit is None:
+            return None
+        return max(
+            float(np.max(np.abs(torque) / self.joint_torque_limit[limb]))
+            for limb, torque in self.joint_torque.items()
+        )

@@ -1,0 +1,201 @@
+"""Joint angles that put hands where they are to be, by damped least squares.
+
+With a hand's error e and its Jacobian J, the step is ``Jᵀ (J Jᵀ + λ 1)⁻¹ e``, whose damping λ
+vanishes with e² (Sugihara, *Solvability-unconcerned inverse kinematics by the Levenberg–Marquardt
+method*, IEEE Transactions on Robotics, 2011). Where it ends in a local minimum, it starts again
+from another of many postures whose hands are near the pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hand_models.base import Array, Indices, Pose, finite_vector
+from planner import deadline
+from planner.robots.kinematics import RobotModel
+from planner.robots.limb_batch import Efforts, LimbBatch
+
+__all__ = ["TOLERANCE", "damped_step", "find_angles", "starts_near"]
+
+EYE: Final = np.eye(6)
+
+TOLERANCE: Final = 1e-9
+"""Largest component of a solved pose's error: a part of the limb's reach, or an angle [rad]."""
+
+STEPS: Final = 15
+"""Steps from every start."""
+
+MORE_STEPS: Final = 25
+"""Steps after those while each at least halves the error, as they do where a limb is stretched."""
+
+ABREAST: Final = 4
+"""Starts that are followed together."""
+
+ROUNDS: Final = 8
+"""How often so many starts are tried for a pose that may be within reach."""
+
+CHOICE: Final = 2
+"""Solutions among which the one of the least torques is taken."""
+
+LONGEST_STEP: Final = 1.0
+"""Most that a joint turns in a step [rad]."""
+
+DAMPING: Final = 0.1
+"""Damping over the square of the error."""
+
+LEAST_DAMPING: Final = 1e-12
+"""Damping that is left where there is no error: a stretched limb's matrix is singular."""
+
+SAMPLES: Final = 4096
+"""Random postures of each limb among which starts are looked up."""
+
+TURN_WEIGHT: Final = 0.35
+"""What a hand's axes count for, in reaches, when postures near a pose are looked up."""
+
+
+def find_angles(
+    batch: LimbBatch, seeds: Mapping[str, Array], efforts: Efforts | None = None
+) -> Array:
+    """Return angles within the limits, shape (L, m), that solve the poses or come nearest to it.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    seeds : mapping of str to ndarray, shape (n,)
+        Where to start first, if it is said; where that leads to a solution, it is taken.
+    efforts : Efforts, optional
+        With them, the one of the least torques is taken where several solutions turn up.
+
+    Raises
+    ------
+    InvalidInputError
+        If a seed is not as many finite numbers as its limb has joints.
+    DeadlineError
+        If the time is over before.
+    """
+    best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
+    seeded = np.flatnonzero([limb in seeds for limb in batch.limbs])
+    if len(seeded):
+        first = np.zeros((1, *batch.shape))
+        for i in seeded:
+            own = finite_vector(seeds[batch.limbs[i]], batch.joints[i], f"seeds.{batch.limbs[i]}")
+            first[0, i, : batch.joints[i]] = own
+        first = np.clip(first, batch.lower, batch.upper)
+        best[seeded], least[seeded] = _follow(batch, seeded, first[:, seeded], efforts)
+    for k in range(ROUNDS):
+        # what is beyond the stretched limb is tried once, for the angles that come nearest
+        left = np.flatnonzero((least > TOLERANCE) & ((batch.beyond <= 0.0) | np.isinf(least)))
+        if not len(left):
+            break
+        starts = np.stack([starts_near(batch, int(i), k) for i in left], axis=1)
+        angles, size = _follow(batch, left, starts, efforts)
+        better = size < least[left]
+        best[left[better]], least[left[better]] = angles[better], size[better]
+    return best
+
+
+def _follow(
+    batch: LimbBatch, chosen: Indices, angles: Array, efforts: Efforts | None
+) -> tuple[Array, Array]:
+    """Return where starts lead, the best for each limb, and the size of its error.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    chosen : ndarray, shape (C,)
+        Limbs that are moved.
+    angles : ndarray, shape (S, C, m)
+        Their starts.
+    efforts : Efforts, optional
+        Of the whole batch.
+    """
+    part = batch.part(chosen)
+    angles = angles[:, :, : part.shape[1]]
+    enough = min(len(angles), 1 if efforts is None else CHOICE)
+    size = np.full(angles.shape[:2], np.inf)
+    slow = np.zeros(angles.shape[:2], dtype=bool)
+    for k in range(STEPS + MORE_STEPS):
+        deadline.check("the joint angles were found")
+        errors, jacobians = part.errors(angles)
+        last, size = size, np.abs(errors).max(axis=2)
+        done = size <= TOLERANCE
+        if k >= STEPS:
+            slow |= size > 0.5 * last
+        over = done | slow | (done.sum(axis=0) >= enough)
+        if over.all():
+            break
+        angles = np.where(over[:, :, None], angles, damped_step(part, angles, errors, jacobians))
+    size = np.abs(part.errors(angles)[0]).max(axis=2)
+    rank = size
+    if efforts is not None and len(angles) > 1:
+        whole = np.zeros((len(angles), *batch.shape))
+        whole[:, chosen, : part.shape[1]] = angles
+        cost = efforts.cost(whole)[:, chosen]
+        # solutions by torque, then all others by error
+        rank = np.where(size <= TOLERANCE, -1.0 / (1.0 + cost), size)
+    pick = rank.argmin(axis=0), np.arange(len(chosen))
+    found = np.zeros((len(chosen), batch.shape[1]))
+    found[:, : part.shape[1]] = angles[pick]
+    return found, size[pick]
+
+
+def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array) -> Array:
+    """Return the angles after a damped step; joints that would go on beyond a limit stay there.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    angles : ndarray, shape (S, L, m)
+    errors : ndarray, shape (S, L, 6)
+    jacobians : ndarray, shape (S, L, 6, m)
+    """
+    slope = (errors[..., None, :] @ jacobians)[..., 0, :]
+    stuck = (angles <= batch.lower) & (slope < 0.0) | (angles >= batch.upper) & (slope > 0.0)
+    J = jacobians * ~stuck[..., None, :]
+    transposed = J.swapaxes(-1, -2)
+    damping = DAMPING * (errors * errors).sum(axis=-1) + LEAST_DAMPING
+    inner = np.linalg.solve(J @ transposed + damping[..., None, None] * EYE, errors[..., None])
+    step = (transposed @ inner)[..., 0]
+    longest = np.maximum(np.abs(step).max(axis=-1), LONGEST_STEP)
+    moved = angles + step * (LONGEST_STEP / longest)[..., None]
+    return np.asarray(np.minimum(np.maximum(moved, batch.lower), batch.upper))
+
+
+def starts_near(batch: LimbBatch, i: int, k: int) -> Array:
+    """Return a limb's angles to start from in round k, shape (S, m), the most promising first."""
+    limb, model = batch.limbs[i], batch.robot.model
+    samples, tree = _postures(model)[limb]
+    _, nearest = tree.query(_place(batch.poses[limb], model.reach[limb]), ABREAST * (k + 1))
+    starts = np.zeros((ABREAST, batch.shape[1]))
+    starts[:, : batch.joints[i]] = samples[nearest[-ABREAST:]]
+    return starts
+
+
+@lru_cache(maxsize=32)
+def _postures(model: RobotModel) -> dict[str, tuple[Array, Any]]:
+    """Return random angles of every limb, and a tree of where they put its hand."""
+    rng = np.random.default_rng(0)
+    samples = {
+        limb: rng.uniform(
+            np.maximum(model.lower[limb], -np.pi),
+            np.minimum(model.upper[limb], np.pi),
+            (SAMPLES, len(model.joint_names[limb])),
+        )
+        for limb in model.limbs
+    }
+    places = {limb: np.empty((SAMPLES, 9)) for limb in model.limbs}
+    for k in range(SAMPLES):
+        poses = model.hand_poses({limb: angles[k] for limb, angles in samples.items()})
+        for limb, pose in poses.items():
+            places[limb][k] = _place(pose, model.reach[limb])
+    return {limb: (samples[limb], cKDTree(places[limb])) for limb in model.limbs}
+
+
+def _place(pose: Pose, reach: float) -> Array:
+    """Return nine numbers, near each other for poses that are."""
+    return np.concatenate([pose.position / reach, TURN_WEIGHT * pose.rotation[:, :2].ravel()])

@@ -1,0 +1,255 @@
+"""A robot's own file: which URDF it has, where its hands sit, and what its joints bear.
+
+TOML in the form of ``parameters/robosimian.toml``: ``name``, ``urdf`` (a path, from the file's
+folder) and ``body`` (a link), then numbers with unit and source. ``[limbs.NAME]`` names the
+``link`` that carries a limb's hand; ``[every_limb]`` has what limbs do not say themselves.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from textwrap import shorten
+from typing import Any, Final
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.parameters import LONGEST_QUOTE, ParameterTable
+from planner.robots.build import Mount
+
+__all__ = ["RobotDescription", "RobotFile"]
+
+NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+"""What a robot and a limb may be called: their names are part of keys."""
+
+TEXTS: Final = ("name", "urdf", "body")
+"""Entries of the file that are plain text."""
+
+ROBOT_UNITS: Final = {"com": "m"}
+"""Entries of the whole robot, by name, with their units."""
+
+LIMB_UNITS: Final = {"position": "m", "orientation": "1", "hand_com": "m", "torque_limit": "N·m"}
+"""Entries of a limb, by name, with their units."""
+
+MOST_LIMBS: Final = 16
+"""More limbs than this no program was tried with."""
+
+FARTHEST: Final = 10.0
+"""Largest coordinate of a hand in its link, or of a centre of mass [m]; larger, it is in other
+units."""
+
+WEAKEST: Final = 1e-3
+"""Smallest torque limit that is taken for one [N·m]."""
+
+STRONGEST: Final = 1e6
+"""Largest torque limit that is taken for one [N·m]."""
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """The content of a robot's file, which can be passed on, compared and hashed.
+
+    Attributes
+    ----------
+    name : str
+        The robot's.
+    toml, urdf : str
+        Texts of the file and of its URDF.
+    origin : str
+        What messages call the file.
+    """
+
+    name: str
+    toml: str
+    urdf: str
+    origin: str = field(default="robot", compare=False)
+
+    @classmethod
+    def load(cls, path: Path) -> RobotFile:
+        """Read a robot's file, and the URDF that it names, from disk.
+
+        Raises
+        ------
+        InvalidInputError
+            If one of them cannot be read, or the file does not say which URDF it has.
+        """
+        toml = _text(path, str(path), "TOML")
+        try:
+            texts = _texts(_parsed(toml))
+            urdf = _text(path.parent / texts["urdf"], "urdf", "a URDF")
+        except InvalidInputError as error:
+            if error.field == str(path):
+                raise
+            raise InvalidInputError(str(error), field=str(path)) from None
+        return cls(texts["name"], toml, urdf, str(path))
+
+
+@dataclass(frozen=True, eq=False)
+class RobotDescription:
+    """What a robot's file says.
+
+    Attributes
+    ----------
+    name : str
+    body : str
+        The link whose frame is B.
+    com : tuple of float, optional
+        Centre of mass in B [m] while no joint angles are given.
+    mounts : mapping of str to Mount
+        By limb.
+    torque_limits : mapping of str to tuple of float
+        By limb: one number for all its joints, or one each [N·m].
+    """
+
+    name: str
+    body: str
+    com: tuple[float, ...] | None
+    mounts: Mapping[str, Mount]
+    torque_limits: Mapping[str, tuple[float, ...]]
+
+    @classmethod
+    def read(cls, toml: str) -> RobotDescription:
+        """Parse a robot's file.
+
+        Raises
+        ------
+        InvalidInputError
+            If an entry is unknown, missing or impossible; the field is its place in the file.
+        """
+        raw = _parsed(toml)
+        texts = _texts(raw)
+        for name in raw:
+            if name not in (*TEXTS, "robot", "every_limb", "limbs"):
+                raise InvalidInputError(
+                    f"unknown; known are {', '.join(TEXTS)}, robot, every_limb, limbs", field=name
+                )
+        whole = _table(raw.get("robot", {}), "robot", ROBOT_UNITS)
+        every = _mapping(raw.get("every_limb", {}), "every_limb")
+        _table(every, "every_limb", LIMB_UNITS)
+        limbs = _mapping(raw.get("limbs", {}), "limbs")
+        if not 1 <= len(limbs) <= MOST_LIMBS:
+            raise InvalidInputError(
+                f"from 1 to {MOST_LIMBS} limbs are needed, as [limbs.NAME], got {len(limbs)}",
+                field="limbs",
+            )
+        mounts: dict[str, Mount] = {}
+        torque_limits: dict[str, tuple[float, ...]] = {}
+        for limb, entries in limbs.items():
+            section = f"limbs.{limb}"
+            _named(limb, "limbs")
+            entries = dict(_mapping(entries, section))
+            link = _string(entries.pop("link", None), f"{section}.link")
+            table = _table({**every, **entries}, section, LIMB_UNITS)
+            mounts[limb] = _mount(link, table, section)
+            torque_limits[limb] = _torque_limit(table, section)
+        com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
+        return cls(texts["name"], texts["body"], com, mounts, torque_limits)
+
+
+def _text(path: Path, field: str, what: str) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidInputError(
+            reason if field == str(path) else f"{path}: {reason}", field=field
+        ) from None
+    except (UnicodeDecodeError, ValueError):
+        raise InvalidInputError(f"must be {what} in UTF-8", field=field) from None
+
+
+def _parsed(toml: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(toml)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInputError(str(error)) from None
+
+
+def _texts(raw: Mapping[str, Any]) -> dict[str, str]:
+    texts = {name: _string(raw.get(name), name) for name in TEXTS}
+    _named(texts["name"], "name")
+    return texts
+
+
+def _string(value: Any, field: str) -> str:
+    if not isinstance(value, str) or not value:
+        got = "nothing" if value is None else shorten(repr(value), LONGEST_QUOTE, placeholder=" …")
+        raise InvalidInputError(f"must be text, got {got}", field=field)
+    return value
+
+
+def _named(name: str, field: str) -> None:
+    if not NAME.fullmatch(name):
+        raise InvalidInputError(
+            "a name must begin with a letter and go on with at most 63 letters, digits, _ or -, "
+            f"got {shorten(repr(name), LONGEST_QUOTE, placeholder=' …')}",
+            field=field,
+        )
+
+
+def _mapping(value: Any, field: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InvalidInputError("a section of entries is needed", field=field)
+    return value
+
+
+def _table(entries: Any, section: str, units: Mapping[str, str]) -> ParameterTable:
+    """Return a section's quantities; refuse unknown names and other units."""
+    entries = _mapping(entries, section)
+    for name in entries:
+        if name not in units:
+            link = "link, " if section.startswith("limbs.") else ""
+            raise InvalidInputError(
+                f"unknown entry; known are {link}{', '.join(units)}", field=f"{section}.{name}"
+            )
+    table = ParameterTable.of({section: entries})
+    for _, name, quantity in table:
+        if quantity.unit != units[name]:
+            unit = shorten(quantity.unit, LONGEST_QUOTE, placeholder=" …")
+            raise InvalidInputError(
+                f"must be in {units[name]!r}, got {unit!r}", field=f"{section}.{name}.unit"
+            )
+    return table
+
+
+def _triple(table: ParameterTable, section: str, name: str) -> tuple[float, ...]:
+    """Return a place, three coordinates of a possible size."""
+    values = table.vector(section, name)
+    if len(values) != 3 or not all(abs(value) <= FARTHEST for value in values):
+        raise InvalidInputError(
+            f"must be 3 numbers within ±{FARTHEST:g} m, got {_quoted(values)}",
+            field=f"{section}.{name}",
+        )
+    return values
+
+
+def _mount(link: str, table: ParameterTable, section: str) -> Mount:
+    orientation = table.vector(section, "orientation")
+    try:
+        Pose.from_quaternion((0.0, 0.0, 0.0), orientation)
+    except InvalidInputError as error:
+        raise error.within(section) from None
+    given = table.sections[section]
+    return Mount(
+        link,
+        _triple(table, section, "position"),
+        orientation,
+        _triple(table, section, "hand_com") if "hand_com" in given else (0.0, 0.0, 0.0),
+    )
+
+
+def _torque_limit(table: ParameterTable, section: str) -> tuple[float, ...]:
+    value = table.quantity(section, "torque_limit").value
+    limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
+    if not limits or not all(WEAKEST <= limit <= STRONGEST for limit in limits):
+        raise InvalidInputError(
+            f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
+            field=f"{section}.torque_limit",
+        )
+    return limits
+
+
+def _quoted(values: tuple[float, ...]) -> str:
+    return shorten(", ".join(f"{value:g}" for value in values), LONGEST_QUOTE, placeholder=" …")

@@ -1,0 +1,138 @@
+"""Among the postures that leave the hands where they are, one that asks less of the joints.
+
+Gauss–Newton on ``Σ (τ / τ_max)²`` over the directions in which a redundant limb can move without
+moving its hand, with each step's error of the pose taken back in the next.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from planner import deadline
+from planner.robots.limb_batch import Efforts, LimbBatch
+from planner.robots.pose_search import TOLERANCE, damped_step
+
+__all__ = ["lower_torques"]
+
+STEPS: Final = 6
+"""Steps of lowering, taken back or not."""
+
+LONGEST_STEP: Final = 0.35
+"""Most that a joint turns in one of them [rad]."""
+
+LOWERED: Final = 1e-3
+"""Step after which the torques count as lowered [rad]."""
+
+ASTRAY: Final = 0.1
+"""Largest error of the pose that a step may leave, in the terms of `LimbBatch.errors`."""
+
+CORRECTIONS: Final = 6
+"""Steps back onto the pose at the end."""
+
+DAMPING: Final = 1e-3
+"""First damping, over the sum of the curvatures; it falls with steps kept and grows with others."""
+
+FLAT: Final = 1e-12
+"""Curvature that is always added: joints that bear nothing have none."""
+
+SINGULAR: Final = 1e-8
+"""Added to J Jᵀ, which is singular where a limb is stretched."""
+
+POSE: Final = 6
+"""Joints that a pose takes up."""
+
+
+def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
+    """Return angles for the same poses, within the limits, with joint torques no higher.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    angles : ndarray, shape (L, m)
+        Limbs whose poses they do not solve are left as they are.
+    efforts : Efforts
+        What is lowered.
+
+    Returns
+    -------
+    ndarray, shape (L, m)
+        Σ (τ / τ_max)² of each limb is at most that at ``angles``, and near a local minimum.
+
+    Raises
+    ------
+    DeadlineError
+        If the time is over before.
+    """
+    errors, jacobians = _one(batch.errors(angles[None]))
+    movable = np.abs(errors).max(axis=1) <= TOLERANCE
+    movable &= np.array(batch.joints) > POSE
+    if not movable.any():
+        return angles
+    effort, slopes = _one(efforts(angles[None]))
+    first = cost = (effort * effort).sum(axis=1)
+    start, damping, going = angles, np.full(len(angles), DAMPING), movable
+    for _ in range(STEPS):
+        deadline.check("the joint angles were found")
+        back = damped_step(batch, angles, errors, jacobians) - angles
+        along = _along(_idle(jacobians), effort, slopes, damping)
+        along *= (LONGEST_STEP / np.maximum(np.abs(along).max(axis=1), LONGEST_STEP))[:, None]
+        along *= _room(batch, angles, along)[:, None]
+        tried = np.minimum(np.maximum(angles + along + back, batch.lower), batch.upper)
+        tried = np.where(going[:, None], tried, angles)
+        new_errors, new_jacobians = _one(batch.errors(tried[None]))
+        new_effort, new_slopes = _one(efforts(tried[None]))
+        new_cost = (new_effort * new_effort).sum(axis=1)
+        kept = going & (new_cost < cost) & (np.abs(new_errors).max(axis=1) <= ASTRAY)
+        angles = np.where(kept[:, None], tried, angles)
+        errors = np.where(kept[:, None], new_errors, errors)
+        jacobians = np.where(kept[:, None, None], new_jacobians, jacobians)
+        effort = np.where(kept[:, None], new_effort, effort)
+        slopes = np.where(kept[:, None, None], new_slopes, slopes)
+        cost = np.where(kept, new_cost, cost)
+        damping = np.where(kept, damping / 10.0, damping * 10.0)
+        going = going & (np.abs(along).max(axis=1) > LOWERED)
+        if not going.any():
+            break
+    for _ in range(CORRECTIONS):
+        if np.abs(errors[movable]).max() <= TOLERANCE:
+            break
+        moved = damped_step(batch, angles, errors, jacobians)
+        angles = np.where(movable[:, None], moved, angles)
+        errors, jacobians = _one(batch.errors(angles[None]))
+    good = movable & (np.abs(errors).max(axis=1) <= TOLERANCE)
+    good &= efforts.cost(angles[None])[0] <= first
+    return np.where(good[:, None], angles, start)
+
+
+def _one(pair: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the values of the only posture."""
+    return pair[0][0], pair[1][0]
+
+
+def _idle(jacobians: Array) -> Array:
+    """Return projectors (L, m, m) onto the motions that leave the hands alone."""
+    transposed = jacobians.transpose(0, 2, 1)
+    inner = jacobians @ transposed + SINGULAR * np.eye(POSE)
+    return np.eye(jacobians.shape[2]) - transposed @ np.linalg.solve(inner, jacobians)
+
+
+def _along(idle: Array, effort: Array, slopes: Array, damping: Array) -> Array:
+    """Return the Gauss–Newton step, shape (L, m), among the motions that a projector leaves."""
+    S = slopes @ idle
+    transposed = S.transpose(0, 2, 1)
+    curvature = transposed @ S
+    added = damping * np.einsum("lkk->l", curvature) + FLAT
+    uphill = transposed @ effort[:, :, None]
+    x = np.linalg.solve(curvature + added[:, None, None] * np.eye(idle.shape[1]), -uphill)
+    return np.asarray((idle @ x)[:, :, 0])
+
+
+def _room(batch: LimbBatch, angles: Array, step: Array) -> Array:
+    """Return how much of a step stays within the limits, from 0 to 1, shape (L,)."""
+    gap = np.where(step > 0.0, batch.upper - angles, angles - batch.lower)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.where(np.abs(step) > 0.0, gap / np.abs(step), 1.0)
+    return np.asarray(np.clip(parts.min(axis=1), 0.0, 1.0))

@@ -1,0 +1,283 @@
+"""A route: a sequence of stances and moves, evaluated move by move.
+
+A move takes one limb to its next hold. Before it, the body may shift on all the hands it has; then
+the limb lifts (a stance without that hand); then it takes the new hold:
+
+    start → [shift] → lift → place → [shift] → lift → place → …
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+from hand_models.base import InvalidInputError, Pose
+from planner.prepare import settle
+from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
+from planner.result import Plan
+from planner.robots import UnreachableError
+from planner.solving import plan
+
+__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "Stage", "evaluate"]
+
+Phase = Literal["start", "shift", "lift", "place"]
+
+WORTH_A_PROCESS: Final = 40
+"""Stages below this many are planned faster here than in processes that must first start."""
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """One limb to its next hold.
+
+    Attributes
+    ----------
+    hand : HandOnHold
+        The limb on its new hold.
+    body : Pose, optional
+        Where the body shifts to first, on the hands it has; B in W.
+    """
+
+    hand: HandOnHold
+    body: Pose | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A climb.
+
+    Attributes
+    ----------
+    name : str
+    start : Stance
+    moves : tuple of Move
+    load : Load
+        What the body weighs; the same all the way.
+    limits : Limits
+        Those of a hand count while it is on the rock.
+    objective : {'max_margin', 'min_effort'}
+        Of every stage.
+    """
+
+    name: str
+    start: Stance
+    moves: tuple[Move, ...]
+    load: Load = field(default_factory=Load)
+    limits: Limits = field(default_factory=Limits)
+    objective: Objective = "max_margin"
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One stance of a climb.
+
+    Attributes
+    ----------
+    index : int
+        From zero, in climbing order.
+    move : int
+        The move it belongs to, from one; zero for the start.
+    phase : {'start', 'shift', 'lift', 'place'}
+    limb : str or None
+        The one that moves.
+    question : Question
+    """
+
+    index: int
+    move: int
+    phase: Phase
+    limb: str | None
+    question: Question
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """A stage without a plan: no joint angles put its hands in their places.
+
+    Attributes
+    ----------
+    reason : str
+        Which limb, and how far it is from there.
+    """
+
+    reason: str
+    status: Literal["unreachable"] = "unreachable"
+    utilisation: None = None
+    load_factor: None = None
+    limiting: None = None
+    joint_utilisation: None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RouteResult:
+    """A climb, planned stage by stage.
+
+    Attributes
+    ----------
+    route : Route
+    stages : tuple of Stage
+    plans : tuple of Plan or OutOfReach
+        One for each stage.
+    """
+
+    route: Route
+    stages: tuple[Stage, ...]
+    plans: tuple[Plan | OutOfReach, ...]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every stage is ``optimal``."""
+        return all(p.status == "optimal" for p in self.plans)
+
+    @property
+    def crux(self) -> int:
+        """Index of the hardest stage: no way there, then no plan, then the largest utilisation."""
+        return max(range(len(self.plans)), key=lambda i: _hardness(self.plans[i]))
+
+
+def _hardness(answer: Plan | OutOfReach) -> tuple[int, float]:
+    order = {"optimal": 0, "overloaded": 0, "failed": 1, "infeasible": 2, "unreachable": 3}
+    used = answer.utilisation if answer.utilisation is not None else math.inf
+    return order[answer.status], used
+
+
+def stages(route: Route) -> Iterator[Stage]:
+    """Yield the stances of a climb in order.
+
+    Raises
+    ------
+    InvalidInputError
+        If a move's limb holds nothing to start with, or is the only one that does.
+    """
+    if route.start.joints not in (None, SOLVE):
+        raise InvalidInputError(
+            f"the joints change with every move; valid is {SOLVE!r}, or none", field="stance.joints"
+        )
+    hands = {hand.limb: hand for hand in route.start.hands}
+    for limb in route.limits.per_hand:
+        if limb not in hands:
+            raise InvalidInputError(
+                f"no hand of the start stance; it has {', '.join(hands)}",
+                field=f"limits.per_hand.{limb}",
+            )
+    body = route.start.body
+    index = 0
+
+    def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> Stage:
+        stance = replace(route.start, hands=tuple(held), body=body)
+        on_rock = {hand.limb for hand in held}
+        caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
+        question = Question(
+            stance,
+            load=route.load,
+            limits=replace(route.limits, per_hand=caps),
+            want=frozenset(["load_factor"]),
+            objective=route.objective,
+        )
+        return Stage(index, move, phase, limb, question)
+
+    yield stage(0, "start", None, list(hands.values()))
+    for number, move in enumerate(route.moves, start=1):
+        limb = move.hand.limb
+        if limb not in hands:
+            raise InvalidInputError(
+                f"limb {limb!r} is not in the start stance; it has {', '.join(hands)}",
+                field=f"moves[{number - 1}].limb",
+            )
+        if len(hands) == 1:
+            raise InvalidInputError(
+                "the only hand on the rock cannot lift", field=f"moves[{number - 1}].limb"
+            )
+        if move.body is not None:
+            body = move.body
+            index += 1
+            yield stage(number, "shift", limb, list(hands.values()))
+        index += 1
+        yield stage(number, "lift", limb, [hand for hand in hands.values() if hand.limb != limb])
+        hands[limb] = move.hand
+        index += 1
+        yield stage(number, "place", limb, list(hands.values()))
+
+
+def evaluate(
+    route: Route,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> RouteResult:
+    """Plan every stance of a climb.
+
+    Parameters
+    ----------
+    route : Route
+    workers : int, optional
+        Processes; as many as there are cores where the route is long enough to be worth it.
+    progress : callable, optional
+        Called with (stages done, stages in all).
+
+    Raises
+    ------
+    InvalidInputError
+        If a stance cannot be understood; ``field`` says which move's.
+    """
+    todo = tuple(stages(route))
+    if workers is None:
+        workers = (os.cpu_count() or 1) if len(todo) >= WORTH_A_PROCESS else 1
+    plans: dict[int, Plan | OutOfReach] = {}
+
+    def done(stage: Stage, answer: Plan | OutOfReach) -> None:
+        plans[stage.index] = answer
+        if progress is not None:
+            progress(len(plans), len(todo))
+
+    if workers > 1:
+        _in_processes(todo, workers, done)
+    for stage in todo:
+        if stage.index not in plans:
+            done(stage, _plan_stage(stage))
+    return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
+
+
+def _in_processes(
+    todo: Sequence[Stage], workers: int, done: Callable[[Stage, Plan | OutOfReach], None]
+) -> None:
+    """Plan stages in processes; those of a process that dies are left to the caller."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(todo)), mp_context=context) as pool:
+        futures: dict[Future[Plan | OutOfReach], Stage] = {}
+        try:
+            for stage in todo:
+                futures[pool.submit(_plan_stage, stage)] = stage
+            for future in as_completed(futures):
+                done(futures[future], future.result())
+        except BrokenProcessPool:
+            return
+        except InvalidInputError:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _plan_stage(stage: Stage) -> Plan | OutOfReach:
+    try:
+        if stage.phase == "place":
+            _must_touch(stage)
+        return plan(stage.question)
+    except UnreachableError as error:
+        return OutOfReach(error.message)
+    except InvalidInputError as error:
+        place = "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
+        raise error.within(place) from None
+
+
+def _must_touch(stage: Stage) -> None:
+    """Refuse a move that ends in the air."""
+    stance = stage.question.stance
+    hand = next(hand for hand in stance.hands if hand.limb == stage.limb)
+    settled = settle(hand, stance)
+    if not (settled.holding.any() or settled.palm.engaged):
+        raise InvalidInputError(f"{hand.limb} touches nothing there", field="hold")

@@ -1,0 +1,90 @@
+"""What the multipliers of a program prove: bounds from below of its least value."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from planner.prepare import joined
+from planner.programs import TIE, Outcome, StanceData, tie_weight
+
+__all__ = ["least_bound", "least_effort_bound", "unique_bound"]
+
+ROUNDED: Final = 1e-9
+"""What rounding may add to a bound, relative."""
+
+STATIONARY: Final = 1e-5
+"""How far multipliers may be from stationary, and below zero, to count as a bound."""
+
+
+def least_bound(data: StanceData, outcome: Outcome) -> float:
+    """Return a lower bound of the least utilisation from the multipliers of `Margin`.
+
+    With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
+    u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
+    """
+    return _dual_bound(data, outcome, None, 0.0, _missing(outcome))
+
+
+def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> float:
+    """Return a lower bound of the least utilisation from the multipliers of `Unique`.
+
+    Its second term f is convex, so with the plan z₁ and its slope every plan z has
+
+        u ≥ [least of u + ∇f(z₁)·z] + f(z₁) − ∇f(z₁)·z₁ − f(z),
+
+    the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
+    `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
+    ``share``: how much of its weight the second term had.
+    """
+    rows = data.rows
+    z = joined(outcome.loads) / rows.unit
+    small = share * tie_weight(data.shape) * rows.tie * z
+    value = -float(small @ z) - share * TIE * outcome.value**2
+    slopes = 2.0 * small
+    return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
+
+
+def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
+    """Return a lower bound of the least effort from the multipliers of `Effort`.
+
+    The effort f is convex, so every plan has f(z) ≥ f(z₁) + ∇f(z₁)·(z − z₁) about the plan z₁, and
+    the multipliers bound that linear function from below, as in `least_bound`.
+    """
+    slopes, value = [], 0.0
+    for hand, y in zip(data.hands, outcome.loads, strict=True):
+        z = y / hand.unit
+        effort, small = hand.E @ z + hand.e0, hand.rest * z
+        slopes.append(2.0 * (hand.E.T @ effort + small))
+        value += float(effort @ effort + small @ z - slopes[-1] @ z)
+    return _dual_bound(data, outcome, joined(slopes), cap, 0.0) + value
+
+
+def _missing(outcome: Outcome) -> float:
+    """Return how far the multipliers of limits are from a sum of one."""
+    return abs(1.0 - float(joined(outcome.limit_duals).sum()))
+
+
+def _dual_bound(
+    data: StanceData, outcome: Outcome, slopes: Array | None, cap: float, leak: float
+) -> float:
+    """Return a lower bound of slopes · z over plans, with limits at a cap, from multipliers.
+
+    ``leak``: how far multipliers are from stationary besides.
+    """
+    assert outcome.balance_dual is not None
+    nu, rows = outcome.balance_dual, data.rows
+    signed = joined([*outcome.limit_duals, *outcome.hard_duals])
+    scale = max(1.0, abs(outcome.value))
+    if signed.min(initial=0.0) < -STATIONARY * scale:
+        return -math.inf
+    stationary = np.append(nu, signed) @ rows.whole
+    if slopes is not None:
+        stationary += slopes
+    if leak + float(np.abs(stationary).sum()) > STATIONARY * scale:
+        return -math.inf
+    below = float(signed @ rows.rest + nu @ data.offset) + ROUNDED * scale
+    return -below - cap * float(signed[: rows.limits].sum())

@@ -1,0 +1,70 @@
+"""What is known of a question before a solver is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.hand import SettledHand
+from planner.prepare import Hands, Posture, gather, posture
+from planner.question import Question
+from planner.solving.prepared_checks import Prepared
+
+__all__ = ["Ground", "asked", "ground_of"]
+
+
+class Ground(NamedTuple):
+    """All that is known of a question before a solver is asked.
+
+    Attributes
+    ----------
+    question : Question
+    where : Posture or None
+        The joints; None if the question says nothing of them.
+    settled : sequence of SettledHand
+        The hands on their holds.
+    hands : Hands
+        What the programs need of them.
+    wrench : ndarray, shape (6,)
+        The body wrench that is planned for, in B [N, N·m].
+    prepared : Prepared or None
+        What reads and checks its plans; by default it is made with each.
+    """
+
+    question: Question
+    where: Posture | None
+    settled: Sequence[SettledHand]
+    hands: Hands
+    wrench: Array
+    prepared: Prepared | None = None
+
+
+def asked(question: Question) -> Question:
+    """Return a question.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none.
+    """
+    if not isinstance(question, Question):
+        raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
+    return question
+
+
+def ground_of(question: Question) -> Ground:
+    """Return what is known of a question before a solver is asked.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be understood; the field is relative to the question.
+    """
+    where = posture(question)
+    try:
+        wrench = question.needed_wrench(None if where is None else where.body_wrench)
+    except InvalidInputError as error:
+        raise error.within("load") from None
+    settled, hands = gather(question, where, wrench)
+    return Ground(question, where, settled, hands, wrench)

@@ -1,0 +1,100 @@
+"""What one solved program proves for every body wrench: an affine bound of the least utilisation.
+
+With multipliers λ ≥ 0 of the limit rows, Σ λ = 1, μ ≥ 0 of the hard rows and ν of the balance,
+every plan z of a body wrench W has
+
+    u ≥ λ·(L z + l0) + μ·(H z − h) + ν·(G z + g − W) = λ·l0 − μ·h + ν·(g − W) + r·z,
+
+r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave an r that is small; they are repaired so that it
+is zero but for rounding, and what is left of it is paid for, with no load above `UNLIMITED`. So the
+bound holds exactly, and for every W, not only that of the program.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from planner.programs import UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+
+__all__ = ["Cut", "cut"]
+
+NOTHING: Final = 1e-8
+"""A multiplier below this is taken for none."""
+
+REPAIRS: Final = 3
+"""Most steps of the repair; each takes nearly all of what is left."""
+
+ENOUGH: Final = 1e-9
+"""Price of what is left, in utilisation, that needs no further step."""
+
+DEAREST: Final = 1e-6
+"""Most of the utilisation that may be paid for what is left; with more there is no bound."""
+
+
+class Cut(NamedTuple):
+    """Least utilisation ≥ slope · body wrench + constant.
+
+    Attributes
+    ----------
+    slope : ndarray, shape (6,)
+        [1/N, 1/(N·m)]
+    constant : float
+    """
+
+    slope: Array
+    constant: float
+
+
+def cut(data: StanceData, outcome: Outcome) -> Cut | None:
+    """Return what the multipliers of a program that minimises the utilisation prove.
+
+    Of `program.Margin`, or of `program.Unique`, whose second term the repair takes out.
+
+    Parameters
+    ----------
+    data : StanceData
+    outcome : Outcome
+        Solved.
+
+    Returns
+    -------
+    Cut or None
+        None if the multipliers could not be repaired.
+    """
+    assert outcome.balance_dual is not None
+    limit, hard = np.concatenate(outcome.limit_duals), np.concatenate(outcome.hard_duals)
+    signed = np.concatenate([limit, hard])
+    signed[signed < NOTHING] = 0.0
+    # stationarity (M rows) and Σ λ = 1, as rows over λ, μ, ν
+    whole, balance = data.rows.whole, len(outcome.balance_dual)
+    rows = np.zeros((whole.shape[1] + 1, len(whole)))
+    rows[:-1] = np.hstack([whole[balance:].T, whole[:balance].T])
+    rows[-1, : len(limit)] = 1.0
+    goal = np.zeros(len(rows))
+    goal[-1] = 1.0
+    multipliers = np.concatenate([signed, outcome.balance_dual])
+    for _ in range(REPAIRS):
+        error = goal - rows @ multipliers
+        if UNLIMITED * float(np.abs(error).sum()) <= ENOUGH:
+            break
+        # each changes in proportion to its size, so that none of the signed ones turns over
+        weights = multipliers.copy()
+        weights[len(signed) :] = 1.0
+        kept = np.flatnonzero(weights)
+        scaled = rows[:, kept] * weights[kept]
+        change = np.linalg.lstsq(scaled, error, rcond=None)[0]
+        multipliers[kept] += weights[kept] * change
+        np.maximum(multipliers[: len(signed)], 0.0, out=multipliers[: len(signed)])
+    multipliers /= multipliers[: len(limit)].sum()
+    left = (rows @ multipliers)[:-1]
+    price = UNLIMITED * float(np.abs(left).sum())
+    if not price <= DEAREST:
+        return None
+    nu = multipliers[len(signed) :]
+    g = np.sum([hand.g for hand in data.hands], axis=0)
+    constant = -float(multipliers[: len(signed)] @ data.rows.rest)
+    constant += float(nu @ g - nu[6:] @ data.wrench[6:]) - price
+    return Cut(-nu[:6] / WRENCH_UNIT, constant)

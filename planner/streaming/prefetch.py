@@ -1,0 +1,188 @@
+"""Interpolations that follow a wrench: the newest, the one before, and the next, in a thread.
+
+Where the wrench drifts from the centre, a thread solves the plans of the next interpolation about
+where it is going. All weights change continuously with the wrench:
+
+- φ of an interpolation falls from 1 to 0 in its outermost shell;
+- τ grows from 0 to 1 with the way that the wrench goes after a new interpolation has come; its
+  weight is τ φ, that of the one before (1 − τ) φ.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from planner.streaming.interpolation import PER_RADIUS, Interpolation
+from planner.streaming.stream_stance import StreamStance
+
+__all__ = ["Following", "Mixture"]
+
+log = logging.getLogger(__name__)
+
+SMALLEST: Final = 1.0 / 16.0
+"""Least part of the radius that is tried where a wrench of the 13 has no plan, or is overloaded."""
+
+SHELL: Final = 0.2
+"""Outermost part of an interpolation, in which its weight falls."""
+
+DRIFTED: Final = 0.5
+"""Part of its radius from the centre beyond which the next interpolation is solved."""
+
+AHEAD: Final = 0.5
+"""How much farther that one's centre is, as part of the way from the last centre."""
+
+FADE: Final = 0.1
+"""Way over which a new interpolation takes over, as part of the radius."""
+
+AGAIN: Final = 0.25
+"""Way after which an interpolation that was not found is looked for again, in the same part."""
+
+NOTHING: Final = np.zeros((0, 0))
+
+
+class Mixture(NamedTuple):
+    """What interpolations say of a wrench.
+
+    Attributes
+    ----------
+    weight : float
+        Theirs, at most 1; 0 where they say nothing.
+    loads : ndarray, shape (hands, m)
+        Their mixture [N].
+    bound : float
+        Of the least utilisation, from below.
+    distance : float
+        Σ |t| from the newest one's centre; infinite where there is none.
+    """
+
+    weight: float
+    loads: Array
+    bound: float
+    distance: float
+
+
+class Following:
+    """The interpolations about a wrench, of which one call after another tells; of one thread.
+
+    Parameters
+    ----------
+    stance : StreamStance
+    radius : float
+        Of the interpolations; smaller where plans end [N].
+
+    Attributes
+    ----------
+    newest : Interpolation or None
+    coming : Future or None
+        The next one.
+    """
+
+    def __init__(self, stance: StreamStance, radius: float) -> None:
+        self._stance, self._radius = stance, radius
+        self._per = 1.0 / (radius * PER_RADIUS)
+        self._thread: ThreadPoolExecutor | None = ThreadPoolExecutor(1, "crux-stream")
+        self.coming: Future[Interpolation | None] | None = None
+        self._before: Interpolation | None = None
+        self._fading, self._fade = 1.0, 0.0
+        """τ, and the way over which it grows, in radii."""
+        self.newest = self._found([stance.first])
+        self._missed: Array | None = stance.first if self.newest is None else None
+        """Where the wrench was when an interpolation was asked for that is not there."""
+
+    def close(self) -> ThreadPoolExecutor | None:
+        """Ask for no more interpolations; return the thread, for the caller to end."""
+        thread, self._thread = self._thread, None
+        return thread
+
+    def go(self, last: Array, wrench: Array) -> None:
+        """Go from the last wrench to another."""
+        if self.coming is not None and self.coming.done():
+            self._take_over(self.coming, last)
+        if self._fading < 1.0:
+            self._fading = min(self._fading + self._way(last, wrench) / self._fade, 1.0)
+        if self._fading >= 1.0:
+            self._before = None
+
+    def mixture(self, wrench: Array) -> Mixture:
+        """Return what the interpolations say of the wrench."""
+        weight, loads, bound, distance = 0.0, NOTHING, -math.inf, math.inf
+        if self.newest is not None:
+            distance, loads = self.newest.at(wrench)
+            weight = self._fading * _weight(distance)
+            loads, bound = loads.reshape(self._stance.shape), self.newest.bound(wrench)
+        if self._before is not None:
+            far, others = self._before.at(wrench)
+            part = (1.0 - self._fading) * _weight(far)
+            if part > 0.0:
+                mixed = weight * loads + part * others.reshape(self._stance.shape)
+                weight += part
+                loads, bound = mixed / weight, max(bound, self._before.bound(wrench))
+        return Mixture(weight, loads, bound, distance)
+
+    def look_ahead(self, wrench: Array, distance: float) -> None:
+        """Let the next interpolation be solved if the wrench is far from the newest centre."""
+        if self.coming is not None or self._thread is None:
+            return
+        if self._missed is not None and self._way(self._missed, wrench) < AGAIN:
+            return
+        centres = [wrench]
+        if self.newest is not None:
+            if distance < DRIFTED or (self._fading < 1.0 and distance < 1.0):
+                return
+            if distance < 1.0:
+                centres.insert(0, wrench + AHEAD * (wrench - self.newest.centre))
+        self._missed = wrench
+        self.coming = self._thread.submit(self._found, centres)
+
+    def _take_over(self, coming: Future[Interpolation | None], last: Array) -> None:
+        new = None if coming.cancelled() else coming.result()
+        if new is None:
+            self.coming = None
+            return
+        if new.distance(last) >= 1.0:
+            # the wrench has gone elsewhere
+            self.coming = self._missed = None
+            return
+        known = [one for one in (self.newest, self._before) if one is not None]
+        here = [one for one in known if one.distance(last) < 1.0]
+        if self._before is not None and here:
+            # two of them are being mixed: one after the other
+            return
+        self.coming = self._missed = None
+        self._before, self.newest = here[0] if here else None, new
+        # where no other has a weight, plans are solved, and at its centre they are the same
+        self._fade = FADE if here else min(FADE, self._way(last, new.centre))
+        self._fading = 0.0 if self._fade > 0.0 else 1.0
+
+    def _way(self, start: Array, end: Array) -> float:
+        """Return how far a wrench is from another, in radii."""
+        return float(np.abs((end - start) * self._per).sum())
+
+    def _found(self, centres: Sequence[Array]) -> Interpolation | None:
+        """Return the interpolation about the first of some centres that has one, none too small."""
+        cap = self._stance.cap
+        try:
+            for centre in centres:
+                radius, found = self._radius, None
+                while radius >= SMALLEST * self._radius:
+                    found = Interpolation.about(self._stance, centre, radius) or found
+                    if found is not None and (found.most <= cap or found.utilisation > cap):
+                        break
+                    radius /= 2.0
+                if found is not None:
+                    return found
+        except Exception:
+            log.exception("no interpolation about %s", centres[0].tolist())
+        return None
+
+
+def _weight(distance: float) -> float:
+    """Return φ."""
+    return min(max((1.0 - distance) / SHELL, 0.0), 1.0)

@@ -1,0 +1,226 @@
+"""Set-points for a body wrench that changes a thousand times a second, on a stance that stays.
+
+Plans near a centre are solved before they are asked for, and mixed
+(`planner.streaming.interpolation`), which takes a small part of a solution's time; they follow the
+wrench (`planner.streaming.prefetch`). A set-point is a mixture of plans of its wrench w, so it is a
+plan, too:
+
+    y = s ω y_i(w) + (1 − s ω) y*(w)
+
+of the interpolations, with their weight ω, and of the plan y* that is solved for w alone, wherever
+that weight is not 1. s falls from 1 to 0 where the utilisation comes near the cap: there, and
+beyond, an interpolation cannot tell whether a plan is ``optimal``. All weights change continuously
+with the wrench, so set-points do.
+"""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import wait
+from types import TracebackType
+from typing import Final, Self
+
+from numpy.typing import ArrayLike
+
+from hand_models.base import Array, InvalidInputError, finite_vector
+from hand_models.hand import FINGERS
+from planner.programs import SLACK
+from planner.question import Question, moderate
+from planner.result import SetPoints, Source, no_set_points
+from planner.streaming.prefetch import Following, Mixture
+from planner.streaming.stream_stance import Proof, Read, StreamStance
+
+__all__ = ["RADIUS", "WrenchStream"]
+
+RADIUS: Final = 30.0
+"""Radius of an interpolation by default [N]; of moments a tenth, per metre."""
+
+LARGEST: Final = 1e4
+"""Largest radius [N]."""
+
+NEAR: Final = 0.01
+"""Utilisation below the cap from which on plans are solved one by one."""
+
+PROOFS: Final = 8
+"""Proofs that there is no plan which are kept, those found last."""
+
+NO_PLAN: Final = "a proof that is known shows that no plan balances the body"
+
+
+class WrenchStream:
+    """Set-points of a stance, for one body wrench after another. Safe to use from several threads.
+
+    Parameters
+    ----------
+    question : Question
+        The stance, with fixed wrists, and its limits; its body wrench, or its load, is the first
+        centre. Extras and deadlines do not count.
+    radius : float, optional
+        How far from its centre an interpolation goes along a force [N]; along a moment a tenth of
+        it, per metre. Smaller where plans end.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question cannot be understood, or asks for what a stream does not do
+        (`UnsupportedError`).
+    """
+
+    def __init__(self, question: Question, *, radius: float = RADIUS) -> None:
+        if not 0.0 < radius <= LARGEST:
+            raise InvalidInputError(
+                f"must be above 0 and at most {LARGEST:g} N, got {radius:g}", field="radius"
+            )
+        self.radius = float(radius)
+        self._stance = StreamStance(question)
+        self._following = Following(self._stance, self.radius)
+        self._lock = threading.Lock()
+        self._proofs: list[Proof] = []
+        self._last: SetPoints | None = None
+        self._closed = False
+        self._key = b""
+        """The wrench of the last set-points."""
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Of the hands, in the order of all arrays."""
+        return self._stance.limbs
+
+    @property
+    def columns(self) -> tuple[tuple[str, ...], ...]:
+        """Names of each hand's loads."""
+        return self._stance.columns
+
+    @property
+    def first(self) -> Array:
+        """The first centre, in B, shape (6,) [N, N·m]."""
+        return self._stance.first
+
+    @property
+    def interpolates(self) -> float | None:
+        """Radius of the newest interpolation [N]; None where there is none."""
+        with self._lock:
+            newest = self._following.newest
+        return None if newest is None else newest.radius
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the thread, and give no more set-points."""
+        with self._lock:
+            self._closed = True
+            thread = self._following.close()
+        if thread is not None:
+            thread.shutdown(wait=True, cancel_futures=True)
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for the interpolation that is being solved; say whether it, if any, is there.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            [s]; as long as it takes by default.
+        """
+        with self._lock:
+            coming = self._following.coming
+        return coming is None or not wait([coming], timeout).not_done
+
+    def set_points(self, body_wrench: ArrayLike) -> SetPoints:
+        """Return the set-points of a body wrench.
+
+        Parameters
+        ----------
+        body_wrench : array_like, shape (6,)
+            That the rock must exert on the robot, in B [N, N·m].
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not six finite numbers, or absurdly large, or if the stream is closed.
+        """
+        # a copy: callers may well fill their own array again
+        wrench = moderate(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench").copy()
+        key = wrench.tobytes()
+        with self._lock:
+            if self._closed:
+                raise InvalidInputError("is closed; open another", field="stream")
+            if self._last is not None:
+                if self._last.verified and self._key == key:
+                    return self._last
+                self._following.go(self._last.body_wrench, wrench)
+            mixture = self._following.mixture(wrench)
+            self._last, self._key = self._found(wrench, mixture), key
+            self._following.look_ahead(wrench, mixture.distance)
+            return self._last
+
+    def _found(self, wrench: Array, mixture: Mixture) -> SetPoints:
+        """Return the set-points: from interpolations as far as these go, the rest solved."""
+        share, loads, bound, _ = mixture
+        if share > 0.0:
+            read = self._stance.read(loads)
+            share *= min(max((self._stance.cap - read.utilisation) / NEAR, 0.0), 1.0)
+            if share >= 1.0:
+                points = self._told(wrench, loads, read, bound, "interpolated")
+                if points.verified:
+                    return points
+                share = 0.0
+        solved = self._stance.solve(wrench)
+        if solved is None:
+            return self._without(wrench)
+        if share > 0.0:
+            loads = share * loads + (1.0 - share) * solved.loads
+            read, bound = self._stance.read(loads), max(bound, solved.bound)
+            points = self._told(wrench, loads, read, bound, "blended")
+            if points.verified:
+                return points
+        read = self._stance.read(solved.loads)
+        points = self._told(wrench, solved.loads, read, solved.bound, "solved")
+        return points if points.verified else self._without(wrench)
+
+    def _told(
+        self, wrench: Array, loads: Array, read: Read, bound: float, source: Source
+    ) -> SetPoints:
+        """Return loads, and what they do, as set-points, checked."""
+        stance, check = self._stance, self._stance.check
+        wrenches, utilisation = read
+        used = max(utilisation, check.idle)
+        return SetPoints(
+            status="optimal" if used <= stance.cap + SLACK else "overloaded",
+            body_wrench=wrench,
+            utilisation=used,
+            gap=max(used - max(bound, check.idle), 0.0),
+            tensions=loads[:, : len(FINGERS)],
+            wrenches=wrenches,
+            loads=loads,
+            verified=check.fault(loads, wrenches, used, wrench) is None,
+            source=source,
+            drive=stance.drive,
+        )
+
+    def _without(self, wrench: Array) -> SetPoints:
+        """Return what a whole plan says of a wrench that the solver has no plan for."""
+        for proof in self._proofs:
+            if float(proof.direction @ wrench) > proof.most:
+                return no_set_points("infeasible", wrench, NO_PLAN, verified=True)
+        plan = self._stance.plan(wrench)
+        if plan.hands is not None and plan.utilisation is not None:
+            # of the nearest wrench that can be had: a hair off, by rounding
+            loads = self._stance.loads_of(plan)
+            read = self._stance.read(loads)
+            points = self._told(wrench, loads, read, plan.utilisation, "solved")
+            if points.verified:
+                return points
+        found = self._stance.proof(plan)
+        if plan.status == "infeasible" and found is not None:
+            self._proofs = [found, *self._proofs][:PROOFS]
+            return no_set_points("infeasible", wrench, plan.reason, verified=True)
+        return no_set_points("failed", wrench, plan.reason, verified=False)

@@ -1,0 +1,206 @@
+"""The stance of a stream: known once, and asked about wrench after wrench, in arrays of all hands.
+
+Loads y of all hands are one array (hands, m), each hand's filled up with zeros to the most that one
+has: so readings and checks are products of stacked matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, UnsupportedError
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
+from hand_models.hand import FINGERS, NAIL
+from planner import programs, solving
+from planner.programs import WRENCH_UNIT, Outcome
+from planner.question import Question
+from planner.result import Plan
+from planner.solving import KnownStance, is_least, least_utilisation
+from planner.streaming.affine_bounds import Cut, cut
+from planner.verification import LoadsCheck
+
+__all__ = ["Proof", "Read", "Solved", "StreamStance"]
+
+SIGNED: Final = ("/lateral", f"/{NAIL}")
+"""Loads that may be negative."""
+
+
+class Solved(NamedTuple):
+    """A plan of one wrench, straight from the solver.
+
+    Attributes
+    ----------
+    loads : ndarray, shape (hands, m)
+        [N]
+    outcome : Outcome
+    bound : float
+        Of the least utilisation, from below.
+    """
+
+    loads: Array
+    outcome: Outcome
+    bound: float
+
+
+class Read(NamedTuple):
+    """What loads do: the hands' wrenches (hands, 6) on the rock in H, the largest utilisation."""
+
+    wrenches: Array
+    utilisation: float
+
+
+class Proof(NamedTuple):
+    """No plan has a body wrench w with direction · w > most."""
+
+    direction: Array
+    most: float
+
+
+class StreamStance:
+    """A stance whose hands all have fixed wrists, on its holds.
+
+    Parameters
+    ----------
+    question : Question
+        The stance and its limits. Its body wrench, or its load, is only the first.
+
+    Attributes
+    ----------
+    first : ndarray, shape (6,)
+        That body wrench, in B [N, N·m].
+    cap : float
+        On the utilisation.
+    limbs : tuple of str
+    columns : tuple of tuple of str
+        Names of each hand's loads.
+    check : LoadsCheck
+        That of every plan.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question cannot be understood; an `UnsupportedError` if it asks for what a stream
+        does not do.
+    """
+
+    def __init__(self, question: Question) -> None:
+        _refuse(question)
+        question = replace(question, want=frozenset(), present={}, deadline=None)
+        known = KnownStance(question)
+        if question.body_wrench is None:
+            # whatever accelerates now does not do so in the wrenches to come
+            known = KnownStance(replace(question, body_wrench=known.ground.wrench))
+        self._known, ground = known, known.ground
+        self.first = ground.wrench
+        self.cap = question.limits.utilisation
+        self.limbs = tuple(hand.limb for hand in question.stance.hands)
+        hands = ground.hands
+        spaces, self._data = hands.sets(hands.at_rest(hands.idle))
+        self.columns = tuple(space.columns for space in spaces)
+        sizes = [len(names) for names in self.columns]
+        self.shape = len(spaces), max(sizes)
+        self.check = LoadsCheck(ground.question, ground.settled, self.columns, ground.where)
+        self.drive = ground.settled[0].hand.drive
+        self._least = np.zeros(self.shape)
+        limits = max(len(space.s) for space in spaces)
+        self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
+        self._rest = np.full((len(spaces), limits + 6), -np.inf)
+        for i, (space, size) in enumerate(zip(spaces, sizes, strict=True)):
+            count = len(space.s)
+            self._rows[i, :count, :size] = space.L / space.s[:, None]
+            self._rest[i, :count] = space.l0 / space.s
+            self._rows[i, limits:, :size] = space.generators
+            self._rest[i, limits:] = space.origin
+            signed = [name.endswith(SIGNED) for name in space.columns]
+            self._least[i, :size] = np.where(signed, -np.inf, 0.0)
+        self._limits = limits
+
+    def read(self, loads: Array) -> Read:
+        """Return what loads (hands, m) do."""
+        rows = (self._rows @ loads[:, :, None])[:, :, 0]
+        rows += self._rest
+        used = np.maximum.reduce(rows[:, : self._limits], axis=None)
+        return Read(rows[:, self._limits :], float(used))
+
+    def solve(self, body_wrench: Array) -> Solved | None:
+        """Return the plan of least utilisation that is meant; None without one that is proven."""
+        data = self._data.turned(self._scaled(body_wrench))
+        outcome, bound, loads = found = least_utilisation(data)
+        if not found.proven:
+            loads = None
+            outcome = programs.margin(data)
+            if not outcome.solved:
+                return None
+            bound = solving.least_bound(data, outcome)
+            if not is_least(outcome.value, bound):
+                return None
+        if loads is None:
+            tidy = programs.least_tensions(data, outcome.value)
+            loads = tidy.loads if tidy.solved else outcome.loads
+        return Solved(self._stacked(loads), outcome, bound)
+
+    def cut(self, body_wrench: Array, solved: Solved) -> Cut | None:
+        """Return what the solver's answer proves for every wrench."""
+        return cut(self._data.turned(self._scaled(body_wrench)), solved.outcome)
+
+    def plan(self, body_wrench: Array) -> Plan:
+        """Return the whole plan of a wrench, or the proof that there is none."""
+        return self._known.plan(body_wrench)
+
+    def proof(self, plan: Plan) -> Proof | None:
+        """Return what the proof of a plan that is infeasible says of other wrenches."""
+        found = plan.certificate
+        if found is None or found.utilisation is not None:
+            return None
+        # the part of wrenches that hands are given stays as it is
+        given = found.needed - float(found.direction @ plan.body_wrench)
+        return Proof(found.direction, found.supremum - given)
+
+    def loads_of(self, plan: Plan) -> Array:
+        """Return the loads (hands, m) of a plan."""
+        loads = np.zeros(self.shape)
+        for row, names, hand in zip(loads, self.columns, plan.hands or (), strict=True):
+            fingers = [tile.finger for tile in hand.tiles]
+            by_name = {PALM_SHEAR: -hand.palm.force[0], PALM_PRESSING: hand.palm.force[2]}
+            for i, finger in enumerate(FINGERS):
+                own = [t for t, name in enumerate(fingers) if name == finger]
+                by_name[f"{finger}/tension"] = hand.tensions[i]
+                by_name[f"{finger}/lateral"] = hand.loads[own, 2].sum()
+                by_name[f"{finger}/{NAIL}"] = hand.loads[own[-1], 0]
+            row[: len(names)] = [by_name[name] for name in names]
+        return loads
+
+    def _scaled(self, body_wrench: Array) -> Array:
+        whole = self._data.wrench.copy()
+        whole[:6] = body_wrench / WRENCH_UNIT
+        return whole
+
+    def _stacked(self, loads: Sequence[Array]) -> Array:
+        """Return the hands' loads as one array; what may not be negative by rounding is zero."""
+        whole = np.zeros(self.shape)
+        for row, y in zip(whole, loads, strict=True):
+            row[: len(y)] = y
+        return np.maximum(whole, self._least)
+
+
+def _refuse(question: Question) -> None:
+    """Refuse what a stream does not do."""
+    for i, hand in enumerate(question.stance.hands):
+        if hand.wrist != "fixed":
+            raise UnsupportedError(
+                f"{hand.wrist} is not for streams, whose plans are mixed; valid is fixed",
+                field=f"stance.hands[{i}].wrist",
+            )
+    if question.objective != "max_margin":
+        raise UnsupportedError(
+            f"{question.objective} is not for streams; valid is max_margin", field="objective"
+        )
+    if question.limits.tension_change is not None:
+        raise UnsupportedError(
+            "not for streams, whose tensions change with the wrench; leave it out",
+            field="limits.tension_change",
+        )

@@ -1,0 +1,325 @@
+"""The check of a floating hand: from where its wrist goes back to the rock, law by law.
+
+Nothing here is shared with the way the plan was found, which settles every finger in closed form
+and knows the tendon by its regimes. The postures that the plan tells are held against the chain of
+phalanges and the rock; slips are measured along the rock between a tile's contacts before and
+after; stick and slip of the tendon are solved as one complementarity problem
+(`FingerTendon.held`), and the normals from the balance of the free joints; what tiles do across the
+finger and the palm against the rock is put into their own laws (Section 5.3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.finger import PHALANGES, SettledFinger
+from hand_models.hand import FINGERS, FingerFrame, SettledHand
+from hand_models.sections import Section
+from hand_models.tendon import FingerTendon, TendonState, share_load
+from planner.result import WristPlan
+
+__all__ = ["FingerCheck", "Said", "check_finger", "check_palm", "moved"]
+
+PLACE: Final = 1e-9
+"""How far a contact may be from its phalanx, or from the rock [m]."""
+
+BESIDE: Final = 4e-3
+"""How far beside a contact the rock is looked at, and twice that [m]."""
+
+STRAIGHT: Final = 1e-12
+"""Turn of the rock's normal below which it is flat [rad]."""
+
+ROUND: Final = 1e-11
+"""How far from a circle or a line rock may be that counts as one [m]."""
+
+
+class Said(NamedTuple):
+    """What a plan says of one finger.
+
+    Attributes
+    ----------
+    loads, positions : ndarray, shape (n, 3)
+    axes : ndarray, shape (n, 3, 3)
+        As `HandPlan` has them, of its tiles.
+    tension : float
+    """
+
+    loads: Array
+    positions: Array
+    axes: Array
+    tension: float
+
+
+class FingerCheck(NamedTuple):
+    """A floating finger as recomputed.
+
+    Attributes
+    ----------
+    shear, normal : ndarray, shape (n,)
+        Of each tile, the base tile's first if there is one [N].
+    lateral : ndarray, shape (n,)
+        [N]
+    stop : ndarray, shape (3,)
+        Torque with which each joint presses on its stop [N·m].
+    tension : float
+        Of the tendon where it leaves its motor [N].
+    wrong : tuple of str
+        What of its posture cannot be.
+    """
+
+    shear: Array
+    normal: Array
+    lateral: Array
+    stop: Array
+    tension: float
+    wrong: tuple[str, ...]
+
+
+def moved(place: Array, wrist: WristPlan) -> Array:
+    """Return how far a place of the hand goes, shape (3,) [m].
+
+    As the model takes it, to second order in the turn.
+    """
+    x, y, z = wrist.twist[3:]
+    turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(wrist.twist[:3] + turn @ place + turn @ turn @ place / 2.0)
+
+
+def check_finger(
+    hand: SettledHand,
+    index: int,
+    planned: Said,
+    wrist: WristPlan,
+    preload: float,
+    at_rest: Array,
+) -> FingerCheck:
+    """Recompute one finger of a floating hand.
+
+    Parameters
+    ----------
+    hand : SettledHand
+        At rest.
+    index : int
+        Of the finger.
+    planned : Said
+    wrist : WristPlan
+    preload : float
+        Of its tendon at rest [N].
+    at_rest : ndarray, shape (n,)
+        Shears of its tiles at rest [N].
+    """
+    finger, model = hand.fingers[index], hand.fingers[index].model
+    frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
+    own = np.flatnonzero(hand.finger_of == index)
+    outer = len(own) > len(PHALANGES)
+    loads = planned.loads[-len(PHALANGES) :]
+    positions, axes = planned.positions[-len(PHALANGES) :], planned.axes[-len(PHALANGES) :]
+    step = moved(frame.joint, wrist)
+    turned = -float(wrist.twist[3:] @ frame.across)
+    joint = np.array([step @ frame.along, step[2]])
+    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
+    wrong: list[str] = []
+    angles, joints, points, slips = [], [], [], []
+    exact = True
+    for phalanx, position, (drag, _, _), contact in zip(
+        PHALANGES, positions, axes, finger.contacts, strict=True
+    ):
+        u = np.array([-drag @ frame.along, -drag[2]])
+        point = np.array([(position - frame.joint) @ frame.along, position[2]])
+        point[1] -= frame.joint[2]
+        arm = point - joint
+        rise = u[0] * arm[1] - u[1] * arm[0]
+        if not abs(rise - model.tile_height) <= PLACE:
+            wrong.append(f"{phalanx} contact is {rise:.6g} m above its joint")
+        angles.append(math.atan2(u[1], u[0]))
+        joints.append(joint)
+        points.append(point)
+        slip = 0.0
+        if contact.kind in ("face", "edge") and section is not None:
+            before = np.array(contact.point(model.tile_height))
+            lies = contact.angle if contact.kind == "face" else None
+            arc = _arc(section, before, point, u, lies)
+            exact &= arc is not None
+            slip = float(arm @ u) - contact.along - (arc or 0.0)
+        slips.append(slip)
+        joint = joint + model.joint_spacing * u
+    rest = np.array([contact.angle for contact in finger.contacts])
+    change = np.array(angles) - rest
+    change = change - math.tau * np.round(change / math.tau)
+    turns = np.diff(change, prepend=turned)
+    shear = planned.loads[:, 0].copy()
+    tendon, state = _tendon(hand, index, preload, at_rest)
+    tension, local = planned.tension, None
+    if exact:
+        base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
+        held = tendon.held(
+            state,
+            [base, *slips] if outer else slips,
+            [0.0, *turns] if outer else turns,
+        )
+        shear, local = held.shears, held.tensions[-len(PHALANGES) :]
+        tension = float(held.tensions[0])
+    normal, stop = _normals(finger, shear, local, np.array(joints), np.array(points), angles, turns)
+    if local is None:
+        normal = loads[:, 1]
+        stop = np.zeros(len(PHALANGES))
+    if outer:
+        normal = np.append(0.0, normal)
+    return FingerCheck(
+        shear, normal, _laterals(hand, frame, own, wrist), stop, tension, tuple(wrong)
+    )
+
+
+def _arc(
+    section: Section, before: Array, after: Array, u: Array, lies: float | None
+) -> float | None:
+    """Return how far the contact went along the rock, positive away from the base [m].
+
+    From the chord and the turn of the rock's normal, as on a circle; None where the rock is none
+    there: the model takes it as one, which only the model knows. ``lies``: the angle of a face that
+    touches at rest, which on a flat is the rock's own but for the search's tolerance [rad].
+    """
+    first, last = (np.array(section.normal((float(p[0]), float(p[1])))) for p in (before, after))
+    gap = _clearance(section, before)
+    if not _is_round(section, before - gap * first, first):
+        return None
+    turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
+    middle = first + last
+    tangent = np.array([-middle[1], middle[0]]) / float(np.linalg.norm(middle))
+    if lies is not None and abs(turn) < STRAIGHT:
+        tangent = np.array([math.cos(lies), math.sin(lies)])
+    sign = math.copysign(1.0, float(tangent @ u))
+    chord = float((after - before) @ tangent)
+    path = chord if abs(turn) < STRAIGHT else chord * (turn / 2.0) / math.sin(turn / 2.0)
+    return sign * (path - gap * turn)
+
+
+def _clearance(section: Section, point: Array) -> float:
+    return section.clearance((float(point[0]), float(point[1])))
+
+
+def _is_round(section: Section, foot: Array, out: Array) -> bool:
+    """Whether a section is a circle or a line about a place of it.
+
+    Beside a circle of radius R a point at e along its tangent is √(R² + e²) − R away from it.
+    """
+    aside = np.array([-out[1], out[0]])
+    near = [_clearance(section, foot + side * BESIDE * aside) for side in (1.0, -1.0)]
+    far = [_clearance(section, foot + 2.0 * side * BESIDE * aside) for side in (1.0, -1.0)]
+    away = 0.5 * sum(near)
+    if away < 0.0:
+        return False
+    expected = 0.0
+    if away > ROUND:
+        radius = (BESIDE**2 - away**2) / (2.0 * away)
+        expected = math.hypot(radius, 2.0 * BESIDE) - radius
+    spread = [*(x - away for x in near), *(x - expected for x in far)]
+    return max(map(abs, spread)) <= ROUND
+
+
+def _tendon(
+    hand: SettledHand, index: int, preload: float, at_rest: Array
+) -> tuple[FingerTendon, TendonState]:
+    own = np.flatnonzero(hand.finger_of == index)
+    table = hand.hand.table
+    known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
+    stiffness = [
+        k if hand.tiles[t].contact in ("face", "edge") else 0.0
+        for k, t in zip(known.contact_stiffness, own, strict=True)
+    ]
+    friction = max(known.friction, hand.hand.tendon_friction)
+    tendon = FingerTendon(
+        known.pulley_ratio,
+        tuple(stiffness),
+        known.spring_stiffness,
+        known.pulley_radii,
+        friction,
+        known.entry_friction,
+    )
+    nothing = np.zeros(len(own))
+    losses = np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float))
+    return tendon, TendonState(preload, np.asarray(preload * losses), at_rest, nothing, nothing)
+
+
+def _normals(
+    finger: SettledFinger,
+    shear: Array,
+    local: Array | None,
+    joints: Array,
+    points: Array,
+    angles: list[float],
+    turns: Array,
+) -> tuple[Array, Array]:
+    """Return normals by the balance of the free joints, and what presses on the others' stops."""
+    model, count = finger.model, len(PHALANGES)
+    normals, stop = np.zeros(count), np.zeros(count)
+    if local is None:
+        return normals, stop
+    rest = np.array([contact.angle for contact in finger.contacts])
+    bends = np.diff(rest, prepend=0.0) + turns
+    A, b = np.zeros((count, count)), np.zeros(count)
+    for i in range(count):
+        b[i] = local[i] * model.pulley_radii[i] - model.joint_preload[i]
+        b[i] -= model.joint_stiffness[i] * bends[i]
+        for j in range(i, count):
+            arm = points[j] - joints[i]
+            u = np.array([math.cos(angles[j]), math.sin(angles[j])])
+            # the rock's forces on the phalanx: shear along u, the normal against (−u_z, u_x)
+            b[i] += (arm[0] * u[1] - arm[1] * u[0]) * shear[j - count]
+            A[i, j] = arm[0] * u[0] + arm[1] * u[1]
+    free = [i for i, contact in enumerate(finger.contacts) if contact.stop is None]
+    bears = [i for i, contact in enumerate(finger.contacts) if contact.kind != "none"]
+    if free:
+        normals[bears] = np.linalg.solve(A[np.ix_(free, bears)], b[free])
+    left = b - A @ normals
+    sides = {"upper": 1.0, "lower": -1.0}
+    for i, contact in enumerate(finger.contacts):
+        stop[i] = sides.get(str(contact.stop), 0.0) * left[i]
+    return normals, stop
+
+
+def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristPlan) -> Array:
+    """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
+    found = np.zeros(len(own))
+    those = [k for k, t in enumerate(own) if hand.tiles[t].contact in ("face", "edge")]
+    if not (hand.grasp.lateral and those):
+        return found
+    body = hand.hand
+    places = hand.positions[own[those]]
+    away = [float(moved(place, wrist) @ frame.across) for place in places]
+    out = [max(float((place - frame.joint) @ frame.along), 0.0) for place in places]
+    high = [float(place[2] - frame.joint[2]) for place in places]
+    give = np.eye(len(those)) / body.lateral_stiffness
+    for i, a in enumerate(out):
+        for j, b in enumerate(out):
+            near, far = min(a, b), max(a, b)
+            give[i, j] += near**2 * (3.0 * far - near) / (6.0 * body.bending_stiffness)
+            give[i, j] += high[i] * high[j] * near / body.torsional_stiffness
+    found[those] = np.linalg.solve(give, away)
+    return found
+
+
+def check_palm(
+    hand: SettledHand, limb: str, force: Array, wrist: WristPlan, allowed: float
+) -> list[str]:
+    """Return what is wrong with the force of the palm of a floating hand."""
+    if not hand.palm.engaged:
+        return []
+    body, engaged = hand.hand, hand.palm.engaged
+    sharing = share_load(
+        tuple(body.palm_contact[i] for i in engaged),
+        body.palm_spring,
+        body.palm_friction,
+        body.palm_own_friction,
+    )
+    step = moved(hand.palm.centre, wrist)
+    shear = max(-float(sharing.tile_stiffness.sum()) * step[0], 0.0)
+    pressing = max(body.palm_pressing_stiffness * len(engaged) * step[2], 0.0)
+    off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
+    if off <= allowed:
+        return []
+    return [f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"]

@@ -1,0 +1,204 @@
+"""What the check of a plan says of limbs: joints, and what is asked of a hand's force and tendons.
+
+Joints are checked against the robot's URDF itself, by moments about each axis (`LinkTree`), not by
+the Jacobians and the Newton–Euler pass that the program's rows are made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import Array
+from hand_models.hand import FINGERS
+from planner.prepare import BALL, Posture
+from planner.question import HandOnHold, Question
+from planner.robots import LimbTorques, LinkTree
+
+__all__ = ["LimbUse", "check_asked", "check_limbs", "force_use"]
+
+TORQUE: Final = 1e-6
+"""Largest disagreement of a joint's torque, relative to the largest of its limb or 1 N·m."""
+
+WEIGHT: Final = 1e-9
+"""Largest disagreement of the body wrench with the robot's weight and acceleration, relative."""
+
+PLACED: Final = (0.01, 0.05)
+"""How far given joints may put a hand from its pose [m], and turn it [rad]."""
+
+FOUND: Final = (1e-5, 1e-5)
+"""The same of joints that were found."""
+
+BEYOND: Final = 1e-6
+"""How far an angle may be beyond its joint's limit [rad]."""
+
+
+class LimbUse(NamedTuple):
+    """How much of their joints' torques limbs use.
+
+    Attributes
+    ----------
+    utilisation : dict of str to float
+        By limb: the largest of |torque| over limit.
+    effort : dict of str to float
+        By limb: the sum of (torque / limit)².
+    """
+
+    utilisation: dict[str, float]
+    effort: dict[str, float]
+
+
+def check_limbs(
+    found: list[str],
+    question: Question,
+    wrenches: Mapping[str, Array],
+    body_wrench: Array,
+    where: Posture | None,
+) -> LimbUse:
+    """Check joints and the robot's own weight; return how much all limbs use of their joints.
+
+    Parameters
+    ----------
+    found : list of str
+        What is wrong so far; more is appended.
+    question : Question
+    wrenches : mapping of str to ndarray, shape (6,)
+        Of the hands on the rock, by limb.
+    body_wrench : ndarray, shape (6,)
+        The one planned for, in B.
+    where : Posture or None
+    """
+    use = LimbUse({}, {})
+    if (where is None) != (question.stance.joints is None):
+        found.append("the joints are not what the question says of them")
+    if where is None:
+        return use
+    robot = question.stance.robot
+    own = _hold_up(question, wrenches, where)
+    _check_places(found, question, where, own)
+    if question.body_wrench is None and question.load.own:
+        off = float(np.linalg.norm(body_wrench - own.body_wrench))
+        if not off <= WEIGHT * max(1.0, float(np.linalg.norm(own.body_wrench))):
+            found.append(f"the robot's weight and acceleration ask for {off:.3g} N or N·m else")
+    for limb in robot.limbs:
+        said = where.joints[limb]
+        torques = own.torques[limb]
+        claimed = said.torques(wrenches.get(limb, np.zeros(6)))
+        allowed = TORQUE * max(1.0, float(np.abs(torques).max()))
+        for name, torque, claim in zip(said.names, torques, claimed, strict=True):
+            if not abs(torque - claim) <= allowed:
+                found.append(f"{limb}: joint {name} bears {torque:.6g} N·m, not {claim:.6g}")
+        shares = np.abs(torques) / _limits(question, limb)
+        use.utilisation[limb] = float(shares.max())
+        use.effort[limb] = float(np.sum(shares**2))
+    return use
+
+
+def _limits(question: Question, limb: str) -> Array:
+    """Return what a limb's joints bear: what the caller says of them, else the robot [N·m]."""
+    limits, asked = question.stance.robot.torque_limits[limb], question.limits.joint_torque
+    own = asked.get(limb) if isinstance(asked, Mapping) else asked
+    return limits if own is None else np.array(own, dtype=float) * np.ones(len(limits))
+
+
+def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) -> LimbTorques:
+    stance, model = question.stance, question.stance.robot.model
+    tree = LinkTree(model.urdf, model.body, model.mounts, model.hand_mass)
+    into_body = stance.body.rotation.T
+    acceleration = np.zeros((2, 3))
+    if question.body_wrench is None:
+        load = question.load
+        acceleration = np.array([load.acceleration, load.angular_acceleration])
+    return tree.hold_up(
+        {limb: where.joints[limb].names for limb in stance.robot.limbs},
+        where.angles,
+        wrenches,
+        into_body @ stance.gravity,
+        (acceleration @ into_body.T).ravel(),
+    )
+
+
+def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
+    """Check that joints put the hands where the stance has them, within the joints' limits."""
+    stance, model = question.stance, question.stance.robot.model
+    most_off, most_turned = FOUND if where.solved else PLACED
+    body = stance.body.inverse()
+    for place in stance.hands:
+        pose, there = body @ place.pose, own.hands[place.limb]
+        off = float(np.linalg.norm(pose.position - there.position))
+        turned = Rotation.from_matrix(there.rotation.T @ pose.rotation).magnitude()
+        if not (off <= most_off and turned <= most_turned):
+            found.append(
+                f"{place.limb}: its joints put the hand {off:.3g} m and {turned:.3g} rad from its "
+                "pose"
+            )
+    for limb, angles in where.angles.items():
+        beyond = np.maximum(model.lower[limb] - angles, angles - model.upper[limb])
+        if not float(beyond.max()) <= BEYOND:
+            found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
+        if not isinstance(stance.joints, str | None):
+            given = stance.joints.get(limb, np.zeros(len(angles)))
+            if not np.array_equal(given, angles):
+                found.append(f"{limb}: its joints are not at the angles that were given")
+
+
+def force_use(
+    found: list[str], question: Question, place: HandOnHold, wrench: Array, allowed: float
+) -> float:
+    """Check the cap on a hand's force, by its wrench; return its utilisation.
+
+    Without a direction, that of its rows must be no less than that of the force itself.
+    """
+    cap = question.limits.per_hand.get(place.limb)
+    if cap is None:
+        return 0.0
+    force = wrench[:3]
+    if not isinstance(cap.largest_force, tuple):
+        used = float((BALL @ force).max()) / cap.largest_force
+        size = float(np.linalg.norm(force))
+        if not size <= used * cap.largest_force + allowed:
+            found.append(f"{place.limb}: the hand exerts {size:.6g} N, more than its rows say")
+        return used
+    if cap.frame != "hand":
+        force = place.pose.rotation @ force
+    if cap.frame == "body":
+        force = question.stance.body.rotation.T @ force
+    used = 0.0
+    for axis, along, (low, high) in zip("xyz", force, cap.largest_force, strict=True):
+        end = high if along > 0.0 else low
+        if end == 0.0:
+            if not abs(along) <= allowed:
+                found.append(
+                    f"{place.limb}: {along:.6g} N along {axis} of the {cap.frame}, of none"
+                )
+        else:
+            used = max(used, float(along / end))
+    return used
+
+
+def check_asked(
+    found: list[str],
+    question: Question,
+    place: HandOnHold,
+    wrench: Array,
+    tensions: Array,
+    allowed: float,
+) -> None:
+    """Check what is asked of a hand: given components of its wrench, small changes of tensions."""
+    for j, value in enumerate(place.wrench or ()):
+        if value is not None and not abs(wrench[j] - value) <= allowed:
+            found.append(
+                f"{place.limb}: component {j + 1} of the wrench is {wrench[j]:.6g}, not {value:.6g}"
+            )
+    most, present = question.limits.tension_change, question.present.get(place.limb)
+    if most is None or present is None:
+        return
+    for name, tension, before in zip(FINGERS, tensions, present, strict=True):
+        change = tension - before
+        if not abs(change) <= most + allowed:
+            found.append(
+                f"{place.limb}: tension of {name} changes by {change:.6g} N, more than {most:g}"
+            )

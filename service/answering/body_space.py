@@ -1,0 +1,271 @@
+"""What a stance can hold, on its way from a request to a reply and a table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+
+from hand_models.base import Array, InvalidInputError
+from planner.capability import COMPONENTS, BodySpace, End, Section
+from planner.result import LimitName
+from service import replies
+from service.answering.answers import limit_reply, vector
+from service.answering.own_robot import ROBOTS, Robots
+from service.answering.questions import question
+from service.commands import table_of
+from service.replies import BodySpaceReply
+from service.requests import BodySpaceRequest, PlanRequest
+
+__all__ = ["Explored", "explore", "print_body_space"]
+
+APPROXIMATE: Final = (
+    "floating wrists: what their hands hold is linearised where the plan puts them; at the extents "
+    "the exact model differs by up to {:.1f} N (moments over 0.1 m)"
+)
+NO_LOAD: Final = "no accelerations: a body wrench tells nothing of the mass; give a load instead"
+NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
+
+NONE: Final = 1e-6
+"""How far below zero a reach is still zero but for rounding [N, N·m]."""
+
+FINEST: Final = 1e-3
+"""A gap below this is told as this [N]."""
+
+OTHERS: Final = {
+    "needed": "the others as asked for",
+    "zero": "the others zero",
+    "free": "whatever the others",
+}
+
+
+class Explored(NamedTuple):
+    """A body space, the plane of it that was asked for, and the reply."""
+
+    space: BodySpace
+    section: Section
+    reply: BodySpaceReply
+
+
+def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
+    """Answer a body-space request.
+
+    Parameters
+    ----------
+    request : BodySpaceRequest
+    robots : Robots, optional
+        Those that may be asked about.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    SolverError
+        If a program has no answer that passes the checks.
+    """
+    start = time.perf_counter()
+    directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]
+    asked = question(_plan_request(request), robots)
+    space = BodySpace(asked)
+    modelled = time.perf_counter()
+    section = space.section(request.axes, request.others)
+    signs = {f"{sign}{axis}": 1.0 if sign == "+" else -1.0 for axis in COMPONENTS for sign in "+-"}
+    ways = {name: sign * np.eye(6)[COMPONENTS.index(name[1:])] for name, sign in signs.items()}
+    extents = {name: space.support(way) for name, way in ways.items()}
+    error = space.error([end for end in extents.values() if end is not None])
+    capability = {
+        name: _capability(space.more(way), space.pure(way), extents[name])
+        for name, way in ways.items()
+    }
+    linear = _accelerations(space, dict(_axes(3)))
+    turning = _accelerations(space, dict(_axes(6))) if space.turns else None
+    along = [_acceleration(space, direction) for direction in directions]
+    ended = time.perf_counter()
+    reply = BodySpaceReply(
+        id=request.id,
+        robot=asked.stance.robot.name,
+        status=space.plan.status,
+        reason=space.plan.reason,
+        body_wrench=vector(space.needed),
+        utilisation=space.plan.utilisation,
+        exact=space.exact,
+        error=error,
+        capability=capability,
+        section=_section(section),
+        acceleration=linear,
+        angular_acceleration=turning,
+        along=None if linear is None else [one for one in along if one is not None],
+        time=replies.Time(modelled - start, ended - modelled, ended - start),
+        warnings=[*space.plan.warnings, *_warnings(space, linear is not None, error)],
+    )
+    return Explored(space, section, reply)
+
+
+def _plan_request(request: BodySpaceRequest) -> PlanRequest:
+    """Return the plan request with the same stance, load and limits."""
+    return PlanRequest(
+        v=1,
+        stance=request.stance,
+        body_wrench=request.body_wrench,
+        load=request.load,
+        limits=request.limits,
+        present=request.present,
+    )
+
+
+def _unit(given: Sequence[float], field: str) -> Array:
+    direction = np.array(given)
+    length = float(np.linalg.norm(direction))
+    if not length > 0.0:
+        raise InvalidInputError("a direction that is not zero is needed", field=field)
+    return np.asarray(direction / length)
+
+
+def _axes(end: int) -> Iterator[tuple[str, Array]]:
+    """Yield ± the last three of so many axes, by their names."""
+    for axis, unit in zip("xyz", np.eye(end)[end - 3 :], strict=True):
+        yield f"+{axis}", unit
+        yield f"-{axis}", -unit
+
+
+def _capability(more: End | None, pure: End | None, extent: End | None) -> replies.BodyCapability:
+    end = more or extent
+    return replies.BodyCapability(
+        more=None if more is None else max(more.reach, 0.0),
+        pure=None if pure is None or pure.reach < -NONE else max(pure.reach, 0.0),
+        extent=None if extent is None else extent.reach,
+        limiting=None if end is None else _limit(end.limiting),
+    )
+
+
+def _section(section: Section) -> replies.BodySection:
+    polygon = section.polygon
+    return replies.BodySection(
+        axes=list(section.axes),
+        others=section.others,
+        inner=[] if polygon is None else [vector(corner) for corner in polygon.inner],
+        outer=[] if polygon is None else [vector(corner) for corner in polygon.outer],
+        gap=None if polygon is None else polygon.gap,
+        limiting=[] if polygon is None else [_limit(name) for name in polygon.limiting],
+    )
+
+
+def _accelerations(
+    space: BodySpace, ways: dict[str, Array]
+) -> dict[str, replies.Acceleration] | None:
+    """Return the largest acceleration along each way; None where there are none."""
+    found = {}
+    for name, way in ways.items():
+        one = _acceleration(space, way)
+        if one is None:
+            return None
+        found[name] = one
+    return found
+
+
+def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
+    end = space.acceleration(way) if space.accelerates else None
+    if end is None:
+        return None
+    return replies.Acceleration(
+        direction=vector(way[-3:]),
+        acceleration=max(end.reach, 0.0),
+        limiting=_limit(end.limiting),
+    )
+
+
+def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
+    if not space.exact:
+        yield APPROXIMATE.format(error)
+    if not moves:
+        yield NOT_AT_REST if space.accelerates else NO_LOAD
+
+
+def _limit(name: LimitName | None) -> replies.LimitName | None:
+    return None if name is None else limit_reply(name)
+
+
+# For a person -----------------------------------------------------------------------------------
+
+
+def print_body_space(reply: BodySpaceReply, out: Console) -> None:
+    """Print what a stance can hold."""
+    used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
+    out.print(f"[bold]{reply.status.upper()}[/bold]{used}   {1e3 * reply.time.total:.0f} ms")
+    out.print(reply.reason, markup=False)
+    for warning in reply.warnings:
+        out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    asked = ", ".join(
+        f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
+    )
+    out.print(f"body wrench asked for (in B): {asked} [N, N·m]", markup=False)
+    _print_capability(reply, out)
+    _print_section(reply.section, out)
+    _print_accelerations(reply, out)
+
+
+def _print_capability(reply: BodySpaceReply, out: Console) -> None:
+    table = table_of("axis")
+    for name in ("more", "pure", "extent"):
+        table.add_column(name, justify="right")
+    table.add_column("first to let go")
+    for name, end in reply.capability.items():
+        cells = [
+            "-" if cell is None else f"{cell:z.1f}" for cell in (end.more, end.pure, end.extent)
+        ]
+        table.add_row(f"{name} {_unit_of(name[1:])}", *cells, _words(end.limiting))
+    out.print("\n[bold]how far body wrenches that are held go along the axes of B[/bold]")
+    out.print(table)
+    out.print("more: beyond the body wrench asked for, and what lets go there first")
+    out.print("pure: with every other component zero; extent: with whatever else; -: none")
+
+
+def _print_section(section: replies.BodySection, out: Console) -> None:
+    plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
+    if not section.inner or section.gap is None:
+        out.print(f"{plane}: nothing is held", markup=False)
+        return
+    corners = np.array(section.inner)
+    ranges = ", ".join(
+        f"{axis} {low:z.1f} to {high:z.1f} {_unit_of(axis)}"
+        for axis, low, high in zip(
+            section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
+        )
+    )
+    over = " (moments over 0.1 m)" if any(axis.startswith("m") for axis in section.axes) else ""
+    shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
+    out.print(
+        f"{plane}: {shape}, {ranges}; known to {max(section.gap, FINEST):.2g} N{over}", markup=False
+    )
+
+
+def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
+    if reply.acceleration is None:
+        return
+    table = table_of("along")
+    table.add_column("largest", justify="right")
+    table.add_column("first to let go")
+    turning = reply.angular_acceleration or {}
+    for unit, found in (("m/s²", reply.acceleration), ("rad/s²", turning)):
+        for name, one in found.items():
+            table.add_row(f"{name} {unit}", f"{one.acceleration:z.2f}", _words(one.limiting))
+    for one in reply.along or ():
+        where = ", ".join(f"{value:.3g}" for value in one.direction)
+        table.add_row(f"({where}) m/s²", f"{one.acceleration:z.2f}", _words(one.limiting))
+    out.print("\n[bold]largest accelerations of the body from rest, in W[/bold]")
+    out.print(table)
+
+
+def _unit_of(axis: str) -> str:
+    return "N" if axis.startswith("f") else "N·m"
+
+
+def _words(name: replies.LimitName | None) -> str:
+    if name is None:
+        return "-"
+    parts = (name.limb, name.joint, name.finger, name.phalanx, name.limit)
+    return " ".join(part for part in parts if part is not None)

@@ -1,0 +1,273 @@
+"""From the bytes of a query to the bytes of its answer, whatever the bytes are."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final, NamedTuple
+
+import msgspec
+import numpy as np
+
+from hand_models.base import CruxError, InvalidInputError
+from hand_models.fixed_wrist import tension_limits
+from hand_models.parameters import ParameterTable
+from planner import deadline, prepare, solving
+from planner.deadline import DeadlineError
+from planner.question import Question
+from planner.result import Plan, WristPlan
+from service.answering.answers import plan_reply, wrench_space_reply
+from service.answering.body_space import explore
+from service.answering.own_hand import over_default
+from service.answering.own_robot import ROBOTS, Robots
+from service.answering.questions import question, stance
+from service.answering.streams import STREAMS, Streams
+from service.replies import (
+    BodySpaceReply,
+    PlanReply,
+    SetPointsReply,
+    SetPointsRequest,
+    StreamReply,
+    StreamRequest,
+    WrenchSpaceReply,
+)
+from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
+from service.wire import (
+    BODY_SPACE,
+    PLAN,
+    REQUEST_KINDS,
+    SET_POINTS,
+    STREAM,
+    WRENCH_SPACE,
+    Format,
+    decode_request,
+    encode_error,
+    identifier,
+)
+
+__all__ = [
+    "SERVICES",
+    "Answer",
+    "Planned",
+    "body_space",
+    "handle",
+    "plan",
+    "planned",
+    "wrench_space",
+]
+
+log = logging.getLogger(__name__)
+
+
+class Answer(NamedTuple):
+    """What goes back to the caller.
+
+    Attributes
+    ----------
+    payload : bytes
+    encoding : str
+        Of the payload, with its schema.
+    good : bool
+        Whether it is a reply, and not an error.
+    """
+
+    payload: bytes
+    encoding: str
+    good: bool
+
+
+def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply:
+    """Answer a plan request.
+
+    Parameters
+    ----------
+    request : PlanRequest
+    robots : Robots, optional
+        Those that may be asked about.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    return planned(request, robots).reply
+
+
+class Planned(NamedTuple):
+    """A plan request as the planner understands it, its plan, and what goes back."""
+
+    question: Question
+    plan: Plan
+    reply: PlanReply
+
+
+def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
+    """Answer a plan request, and keep what the reply leaves out; as `plan`."""
+    asked = question(request, robots)
+    answer = solving.plan(asked)
+    reply = plan_reply(answer, request.id, model="model" in request.want)
+    return Planned(asked, answer, reply)
+
+
+def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
+    """Answer a wrench-space request; parameters as for `plan`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible.
+    """
+    asked = stance(request.stance, robots)
+    hand = prepare.resting_hand(asked, request.limb)
+    wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
+    return wrench_space_reply(
+        asked.robot.name,
+        request.limb,
+        hand.settled,
+        hand.space,
+        tension_limits(hand.settled),
+        wrist,
+    )
+
+
+def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceReply:
+    """Answer a body-space request; parameters as for `plan`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    return explore(request, robots).reply
+
+
+def stream(
+    request: StreamRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
+) -> StreamReply:
+    """Declare a stream; parameters as for `handle`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    return streams.declare(request, robots)
+
+
+def set_points(
+    request: SetPointsRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
+) -> SetPointsReply:
+    """Answer a question to a stream; parameters as for `handle`.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such stream.
+    """
+    return streams.set_points(request)
+
+
+class _Service(NamedTuple):
+    """What is asked at a key, and who answers.
+
+    ``streams``: whether the answer is of one of the streams. ``waits``: whether it waits for its
+    turn; one that does not has to be safe beside any other.
+    """
+
+    request: (
+        type[PlanRequest]
+        | type[WrenchSpaceRequest]
+        | type[BodySpaceRequest]
+        | type[StreamRequest]
+        | type[SetPointsRequest]
+    )
+    answer: Callable[..., msgspec.Struct]
+    streams: bool = False
+    waits: bool = True
+
+
+SERVICES: Final[dict[str, _Service]] = {
+    PLAN: _Service(PlanRequest, plan),
+    WRENCH_SPACE: _Service(WrenchSpaceRequest, wrench_space),
+    BODY_SPACE: _Service(BodySpaceRequest, body_space),
+    STREAM: _Service(StreamRequest, stream, streams=True),
+    SET_POINTS: _Service(SetPointsRequest, set_points, streams=True, waits=False),
+}
+"""By the last part of the key."""
+
+
+def handle(
+    key: str,
+    payload: bytes,
+    encoding: str = "",
+    hand: ParameterTable | None = None,
+    robots: Robots = ROBOTS,
+    *,
+    started: float | None = None,
+    turn: threading.Lock | None = None,
+    streams: Streams = STREAMS,
+) -> Answer:
+    """Answer a query.
+
+    Parameters
+    ----------
+    key : str
+        Ends in the name of one of `SERVICES`.
+    payload : bytes
+    encoding : str, optional
+        Zenoh's name of it; the answer's is of the same format.
+    hand : ParameterTable, optional
+        Entries of the hand in which the service's is not the bundled one; a request's own entries
+        go on top.
+    robots : Robots, optional
+        Those that may be asked about.
+    started : float, optional
+        When a request's deadline began, on the clock of `time.perf_counter`; now by default.
+    turn : Lock, optional
+        Held while the request is answered; it is waited for no longer than the deadline.
+    streams : Streams, optional
+        Those that may be asked; by default those of this process that belong to no service.
+
+    Returns
+    -------
+    Answer
+        A reply, or a structured error; nothing is raised.
+    """
+    form = Format.JSON
+    try:
+        form = Format.named(encoding)
+        service = SERVICES[key.rpartition("/")[2]]
+        request = decode_request(payload, service.request, form)
+        if not isinstance(request, SetPointsRequest):
+            request = over_default(request, hand)
+        seconds = request.deadline if isinstance(request, PlanRequest) else None
+        about = (request, robots, streams) if service.streams else (request, robots)
+        with deadline.within(seconds, started=started), _taking(turn if service.waits else None):
+            reply = service.answer(*about)
+        return Answer(form.encode(reply), form.label(reply), True)
+    except InvalidInputError as error:
+        kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
+        return Answer(*encode_error(kind, error, form, identifier(payload, form)), False)
+    except DeadlineError as error:
+        return Answer(*encode_error(error.kind, error, form, identifier(payload, form)), False)
+    except Exception as error:
+        log.exception("the request at %s failed", key)
+        excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
+        return Answer(*encode_error("internal", excuse, form, identifier(payload, form)), False)
+
+
+@contextmanager
+def _taking(turn: threading.Lock | None) -> Iterator[None]:
+    """Hold a lock, if there is one, and if it can be had before the deadline."""
+    if turn is None:
+        yield
+        return
+    left, seconds = deadline.left(), deadline.seconds()
+    if not turn.acquire(timeout=-1.0 if left is None else left):
+        raise DeadlineError(seconds or 0.0, "other questions were answered")
+    try:
+        yield
+    finally:
+        turn.release()

@@ -1,0 +1,261 @@
+"""From a request to the planner's own terms."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final, Literal, cast, get_args, overload
+
+import msgspec
+import numpy as np
+
+from hand_models import rock
+from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.hand import Grasp
+from hand_models.parameters import ParameterTable, own_hand
+from hand_models.rock import Mesh, Profile
+from hand_models.tile import Surface
+from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
+from planner.route import Move, Route
+from service import requests
+from service.answering.own_robot import ROBOTS, Robots, builder_of
+
+__all__ = ["question", "route", "stance"]
+
+GRASPS: Final = 64
+"""Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
+
+
+class _within:  # noqa: N801 (reads as the statement it makes)
+    """Put a path before the field of an error."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if isinstance(error, InvalidInputError):
+            raise error.within(self.path) from None
+
+
+def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
+    """Return what a plan request asks.
+
+    Parameters
+    ----------
+    request : PlanRequest
+    robots : Robots, optional
+        Those that may be asked about.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field is relative to the request.
+    """
+    if request.body_wrench is not None and request.load is not None:
+        raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
+    return Question(
+        stance=stance(request.stance, robots),
+        body_wrench=None if request.body_wrench is None else np.array(request.body_wrench),
+        load=_load(request.load),
+        limits=_limits(request.limits),
+        want=frozenset(request.want),
+        objective=_objective(request.objective),
+        present={limb: np.array(tensions) for limb, tensions in request.present.items()},
+        deadline=request.deadline,
+    )
+
+
+def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
+    """Return the climb of a route file; parameters as for `question`.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field is relative to the file.
+    """
+    start = stance(request.stance, robots)
+    numbers = start.robot.hand.table
+    return Route(
+        name=request.name,
+        start=start,
+        moves=tuple(
+            Move(_hand(move, numbers, f"moves[{i}]"), _pose(move.body, f"moves[{i}].body"))
+            for i, move in enumerate(request.moves)
+        ),
+        load=_load(request.load),
+        limits=_limits(request.limits),
+        objective=_objective(request.objective),
+    )
+
+
+def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
+    """Return the stance of a request; parameters as for `question`.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field begins with ``stance``.
+    """
+    with _within("stance"):
+        build = builder_of(message.robot, robots)
+        with _within("hand"):
+            own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
+            robot = build(own)
+        numbers = robot.hand.table
+        return Stance(
+            hands=tuple(
+                _hand(hand, numbers, f"hands[{i}]") for i, hand in enumerate(message.hands)
+            ),
+            body=_pose(message.body, "body"),
+            gravity=np.array(EARTH if message.gravity is None else message.gravity),
+            robot=robot,
+            joints=_joints(message.joints),
+        )
+
+
+def _joints(
+    message: dict[str, list[float]] | Literal["solve"] | None,
+) -> dict[str, Array] | Literal["solve"] | None:
+    if not isinstance(message, dict):
+        return message
+    return {limb: np.array(angles) for limb, angles in message.items()}
+
+
+def _objective(name: str) -> Objective:
+    for known in get_args(Objective):
+        if name == known:
+            return cast(Objective, known)
+    raise InvalidInputError(f"{name} is not supported", field="objective")
+
+
+def _load(message: requests.Load | None) -> Load:
+    message = message or requests.Load()
+    return Load(message.mass, message.com, message.acceleration, message.angular_acceleration)
+
+
+def _limits(message: requests.Limits) -> Limits:
+    torque: float | dict[str, float | tuple[float, ...]] | None
+    if isinstance(message.joint_torque, dict):
+        torque = {
+            limb: tuple(most) if isinstance(most, list) else most
+            for limb, most in message.joint_torque.items()
+        }
+    else:
+        torque = message.joint_torque
+    with _within("limits"):
+        return Limits(
+            utilisation=message.utilisation,
+            tendon_tension=message.tendon_tension,
+            joint_torque=torque,
+            per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
+            tension_change=message.tension_change,
+        )
+
+
+def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:
+    given = message.largest_force
+    most = tuple(_range(axis) for axis in given) if isinstance(given, list) else given
+    with _within(f"per_hand.{limb}"):
+        return ForceCap(most, message.frame)
+
+
+def _range(axis: requests.AxisForce) -> tuple[float, float]:
+    """Return the least and the largest force along an axis."""
+    if axis is None:
+        return -math.inf, math.inf
+    return (axis[0], axis[1]) if isinstance(axis, list) else (-axis, axis)
+
+
+def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnHold:
+    with _within(path):
+        grasp, surface = _grasp(message.grasp), _surface(message.surface)
+        try:
+            hold = _hold(message.hold, numbers)
+            hold_pose = _pose(message.hold.pose, "pose")
+            hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
+        except InvalidInputError as error:
+            raise error.within("hold") from None
+        return HandOnHold(
+            limb=message.limb,
+            pose=_pose(message.pose, "pose"),
+            hold=hold,
+            surface=surface,
+            hold_pose=hold_pose,
+            hold_in_hand=hold_in_hand,
+            grasp=grasp,
+            wrist=message.wrist,
+            tendon_preload=None
+            if message.tendon_preload is None
+            else np.array(message.tendon_preload),
+            wrench=message.wrench,
+        )
+
+
+@overload
+def _pose(message: requests.Pose, field: str) -> Pose: ...
+@overload
+def _pose(message: requests.Pose | None, field: str) -> Pose | None: ...
+def _pose(message: requests.Pose | None, field: str) -> Pose | None:
+    if message is None:
+        return None
+    try:
+        return Pose.from_quaternion(message.position, message.orientation)
+    except InvalidInputError as error:
+        raise error.within(field) from None
+
+
+@lru_cache(maxsize=GRASPS)
+def _grasp(message: requests.Grasp) -> Grasp:
+    try:
+        return Grasp(**msgspec.structs.asdict(message))
+    except InvalidInputError as error:
+        raise error.within("grasp") from None
+
+
+def _surface(message: str | requests.Surface) -> Surface:
+    try:
+        if isinstance(message, str):
+            return Surface.named(message)
+        given = msgspec.structs.asdict(message)
+        return Surface.from_values({name: v for name, v in given.items() if v is not None})
+    except InvalidInputError as error:
+        raise error.within("surface") from None
+
+
+def _hold(message: requests.Hold, numbers: ParameterTable) -> rock.Hold:
+    match message:
+        case requests.Plane():
+            return rock.Plane()
+        case requests.Cylinder():
+            return rock.Cylinder(message.diameter)
+        case requests.Sphere():
+            return rock.Sphere(message.diameter)
+        case requests.Ellipsoid():
+            return rock.Ellipsoid(message.semi_axes)
+        case requests.Edge():
+            return rock.Edge(message.fillet_radius, message.angle)
+        case requests.Profile():
+            return _profile(message, numbers)
+        case requests.Mesh():
+            return _mesh(message, numbers)
+
+
+def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
+    if message.points is not None and message.profiles is None:
+        return Profile(message.points, numbers)
+    if message.profiles is not None and message.points is None:
+        return Profile(msgspec.structs.asdict(message.profiles), numbers)
+    raise InvalidInputError("give points or profiles, one of them", field="points")
+
+
+def _mesh(message: requests.Mesh, numbers: ParameterTable) -> Mesh:
+    if message.file is not None:
+        raise InvalidInputError(
+            "only the command line reads files; send vertices and faces", field="file"
+        )
+    if message.vertices is None or message.faces is None:
+        missing = "vertices" if message.vertices is None else "faces"
+        raise InvalidInputError("missing", field=missing)
+    return Mesh(message.vertices, message.faces, numbers)

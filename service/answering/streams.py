@@ -1,0 +1,174 @@
+"""The wrench streams of a service: declared, asked, and let go."""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections import OrderedDict
+from typing import Final
+
+from hand_models.base import InvalidInputError, UnsupportedError
+from planner.result import SetPoints
+from planner.streaming import WrenchStream
+from service.answering.own_robot import ROBOTS, Robots
+from service.answering.questions import question
+from service.replies import (
+    HandColumns,
+    HandSetPoints,
+    SetPointsReply,
+    SetPointsRequest,
+    StreamReply,
+    StreamRequest,
+)
+from service.requests import PlanRequest
+
+__all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
+
+KEPT: Final = 16
+"""Streams that a service keeps; then the one that was asked for longest ago goes."""
+
+
+def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
+    """Return the stream that a request declares, for the caller to close.
+
+    Parameters
+    ----------
+    request : StreamRequest
+    robots : Robots, optional
+        Those that may be asked about.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible; the field is relative to it.
+    """
+    if request.limits.tension_change is not None:
+        raise UnsupportedError(
+            "not for streams, whose tensions change with the wrench; leave it out",
+            field="limits.tension_change",
+        )
+    asked = PlanRequest(
+        v=1,
+        stance=request.stance,
+        body_wrench=request.body_wrench,
+        load=request.load,
+        limits=request.limits,
+    )
+    return WrenchStream(question(asked, robots), radius=request.radius)
+
+
+class Streams:
+    """Streams by their identifiers. Safe to use from several threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[str, WrenchStream] = OrderedDict()
+
+    def declare(self, request: StreamRequest, robots: Robots = ROBOTS) -> StreamReply:
+        """Answer a declaration; parameters and errors as of `opened`."""
+        start = time.perf_counter()
+        stream = opened(request, robots)
+        first = stream.set_points(stream.first)
+        identifier = uuid.uuid4().hex
+        with self._lock:
+            self._kept[identifier] = stream
+            gone = [self._kept.popitem(last=False)[1] for _ in range(len(self._kept) - KEPT)]
+        for old in gone:
+            old.close()
+        return StreamReply(
+            stream=identifier,
+            radius=stream.interpolates,
+            status=first.status,
+            reason=first.reason,
+            body_wrench=stream.first.tolist(),
+            utilisation=first.utilisation,
+            gap=first.gap,
+            hands=[
+                HandColumns(limb=limb, columns=list(columns))
+                for limb, columns in zip(stream.limbs, stream.columns, strict=True)
+            ],
+            took=time.perf_counter() - start,
+        )
+
+    def set_points(self, request: SetPointsRequest) -> SetPointsReply:
+        """Answer a question for set-points.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such stream.
+        """
+        start = time.perf_counter()
+        with self._lock:
+            stream = self._kept.get(request.stream)
+            if stream is not None:
+                self._kept.move_to_end(request.stream)
+        if stream is None:
+            raise InvalidInputError(
+                f"no stream {request.stream!r}: declare one; the last {KEPT} that were used are "
+                "kept",
+                field="stream",
+            )
+        points = stream.set_points(request.body_wrench)
+        return set_points_reply(request.stream, stream, points, start)
+
+    def close(self) -> None:
+        """Let all streams go."""
+        with self._lock:
+            gone, self._kept = self._kept, OrderedDict()
+        for stream in gone.values():
+            stream.close()
+
+
+def set_points_reply(
+    identifier: str, stream: WrenchStream, points: SetPoints, start: float
+) -> SetPointsReply:
+    """Return set-points as they travel.
+
+    Parameters
+    ----------
+    identifier : str
+    stream : WrenchStream
+    points : SetPoints
+    start : float
+        When the question came, on the clock of `time.perf_counter`.
+    """
+    hands = None
+    if points.tensions is not None:
+        assert points.motor_torque is not None
+        assert points.motor_current is not None
+        assert points.wrenches is not None
+        hands = [
+            HandSetPoints(
+                limb=limb,
+                tensions=tensions,
+                motor_torque=torque,
+                motor_current=current,
+                wrench=wrench,
+            )
+            for limb, tensions, torque, current, wrench in zip(
+                stream.limbs,
+                points.tensions.tolist(),
+                points.motor_torque.tolist(),
+                points.motor_current.tolist(),
+                points.wrenches.tolist(),
+                strict=True,
+            )
+        ]
+    return SetPointsReply(
+        stream=identifier,
+        status=points.status,
+        reason=points.reason,
+        body_wrench=points.body_wrench.tolist(),
+        utilisation=points.utilisation,
+        gap=points.gap,
+        hands=hands,
+        verified=points.verified,
+        source=points.source,
+        took=time.perf_counter() - start,
+    )
+
+
+STREAMS: Final = Streams()
+"""Those of this process that belong to no service."""

@@ -1,0 +1,1 @@
+from .tables import table_of as table_of

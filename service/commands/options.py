@@ -1,0 +1,153 @@
+"""Options that commands share: own hands and robots, pictures, folders, JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+import msgspec
+
+from hand_models.parameters import ParameterTable
+from service.answering import read_hand, with_hand
+from service.requests import PlanRequest, RouteRequest, Want
+from service.serving import TIMEOUT
+
+if TYPE_CHECKING:
+    from planner.robots import RobotFile
+
+__all__ = [
+    "asked",
+    "check_picture",
+    "folder_option",
+    "hand_option",
+    "json_option",
+    "limb_option",
+    "plot_option",
+    "robot_option",
+    "timeout_option",
+    "with_extras",
+]
+
+R = TypeVar("R", PlanRequest, RouteRequest)
+
+PICTURES: Final = (".png", ".pdf", ".svg")
+HAND_FILE: Final = ".toml"
+EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
+"""What the command line asks for besides the plan."""
+
+
+def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
+    """Return a request for a hand and a robot of the caller's own."""
+    request = with_hand(request, hand)
+    if robot is None:
+        return request
+    from service.answering import with_robot
+
+    return with_robot(request, robot)
+
+
+def with_extras(request: PlanRequest) -> PlanRequest:
+    """Return a request that wants what the command line shows besides the plan, too."""
+    return msgspec.structs.replace(request, want=list(dict.fromkeys([*request.want, *EXTRAS])))
+
+
+def check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+    """Refuse a picture that cannot be written, before any work is done."""
+    if path is not None and path.suffix not in PICTURES:
+        raise click.BadParameter(f"{path}: valid endings are {', '.join(PICTURES)}")
+    if path is not None and not path.parent.is_dir():
+        raise click.BadParameter(f"{path}: no such folder")
+    return path
+
+
+def _read_hand(
+    _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
+) -> ParameterTable | None:
+    if not paths:
+        return None
+    if len(paths) > 1:
+        raise click.BadParameter(f"one FILE at most, got {', '.join(map(str, paths))}")
+    if paths[0].suffix != HAND_FILE and not paths[0].exists():
+        raise click.BadParameter(
+            f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
+        )
+    return read_hand(paths[0])
+
+
+def _read_robot(_: click.Context, __: click.Parameter, path: Path | None) -> RobotFile | None:
+    if path is None:
+        return None
+    from service.answering import read_robot
+
+    return read_robot(path)
+
+
+def _limb_and_hand(
+    _: click.Context, __: click.Parameter, given: tuple[str, ...]
+) -> tuple[str, ParameterTable | None]:
+    """Tell the limb, which the contract calls a hand, from the file of one."""
+    files = [value for value in given if value.endswith(HAND_FILE)]
+    limbs = [value for value in given if not value.endswith(HAND_FILE)]
+    if len(limbs) != 1 or len(files) > 1:
+        raise click.BadParameter(
+            f"one LIMB and at most one FILE that ends in {HAND_FILE}, got {', '.join(given)}"
+        )
+    return limbs[0], read_hand(Path(files[0])) if files else None
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+hand_option = click.option(
+    "--hand",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    callback=_read_hand,
+    metavar="FILE",
+    help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
+)
+limb_option = click.option(
+    "--hand",
+    "limb_and_hand",
+    required=True,
+    multiple=True,
+    callback=_limb_and_hand,
+    metavar="LIMB",
+    help="Whose wrench space. A second --hand FILE, ending in .toml, has numbers of a hand of your "
+    "own; all others are the bundled hand's.",
+)
+robot_option = click.option(
+    "--robot",
+    type=click.Path(path_type=Path),
+    callback=_read_robot,
+    metavar="FILE",
+    help="TOML that describes a robot of your own, and names its URDF.",
+)
+timeout_option = click.option(
+    "--timeout", type=click.FloatRange(min=0.01), default=TIMEOUT, show_default=True, help="[s]"
+)
+
+
+def plot_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return an option that names a picture, which is passed on as ``picture``."""
+    return click.option(
+        "--plot",
+        "picture",
+        type=click.Path(path_type=Path),
+        callback=check_picture,
+        metavar="FILE",
+        help=text,
+    )
+
+
+def folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return an option that names where files go, which is passed on as ``folder``."""
+    return click.option(
+        "-o",
+        "--output",
+        "folder",
+        type=click.Path(path_type=Path, file_okay=False),
+        required=True,
+        metavar="DIR",
+        help=text,
+    )

@@ -1,0 +1,38 @@
+"""A climb as a table for a person. Apart from the other tables, which do not need the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from planner.pictures import summary
+from planner.route import RouteResult
+from service.commands.tables import table_of
+
+__all__ = ["print_route"]
+
+
+def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) -> None:
+    """Print a climb, stage by stage, its crux, and where its files are."""
+    out.print(f"[bold]{escape(result.route.name)}[/bold]: {len(result.route.moves)} moves")
+    table = table_of("", "move", "phase", "limb", "status")
+    table.add_column("util", justify="right")
+    table.add_column("load factor", justify="right")
+    joints = any(plan.joint_utilisation is not None for plan in result.plans)
+    if joints:
+        table.add_column("joints", justify="right")
+    for stage, plan in zip(result.stages, result.plans, strict=True):
+        numbers = [plan.utilisation, plan.load_factor]
+        if joints:
+            numbers.append(plan.joint_utilisation)
+        shown = ("-" if number is None else f"{number:.2f}" for number in numbers)
+        cells = (str(stage.move), stage.phase, stage.limb or "-", plan.status, *shown)
+        hard = stage.index == result.crux
+        table.add_row("crux" if hard else "", *cells, style="bold" if hard else "")
+    out.print(table)
+    out.print(summary(result)["crux"]["sentence"], markup=False)
+    for name, path in files.items():
+        out.print(f"{name}: {path}", markup=False, soft_wrap=True)

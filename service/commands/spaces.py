@@ -1,0 +1,167 @@
+"""Commands that show what can be carried: by one hand, and by the whole body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+import click
+import msgspec
+
+from hand_models.parameters import ParameterTable
+from service.commands.options import (
+    asked,
+    hand_option,
+    json_option,
+    limb_option,
+    plot_option,
+    robot_option,
+)
+from service.commands.stances import read_request
+from service.commands.tables import console, print_wrench_space
+from service.commands.terminal import (
+    DONE,
+    EXIT_STATUS,
+    FAILED,
+    OVERLOADED,
+    progress,
+    say,
+    waiting,
+    writing,
+)
+from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest
+
+if TYPE_CHECKING:
+    from planner.robots import RobotFile
+
+__all__ = ["body_space", "wrench_space"]
+
+
+@click.command("wrench-space")
+@click.argument("stance")
+@limb_option
+@plot_option("Draw it there.")
+@click.option(
+    "--search",
+    "per_axis",
+    type=click.IntRange(3, 25),
+    metavar="N",
+    help="Of a floating hand: search N^6 poses of its wrist, too.",
+)
+@robot_option
+@json_option
+def wrench_space(
+    stance: str,
+    limb_and_hand: tuple[str, ParameterTable | None],
+    picture: Path | None,
+    per_axis: int | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Show what one hand can carry."""
+    from planner import prepare
+    from planner.capability import survey
+    from service import answering
+    from service.answering import robots_of
+    from service.commands.surveys import print_survey, survey_json
+
+    limb, hand = limb_and_hand
+    robots = robots_of(robot)
+    request = WrenchSpaceRequest(
+        v=1, stance=asked(read_request(stance), hand, robot).stance, limb=limb
+    )
+    reply = answering.wrench_space(request, robots)
+    found = None
+    if per_axis is not None:
+        wrist = prepare.floating_wrist(answering.stance(request.stance, robots), limb)
+        with progress(f"{per_axis}^6 poses of {limb}") as tell:
+            found = survey(wrist, per_axis, tell)
+    if picture is not None:
+        from planner import pictures
+
+        drawn = answering.stance(request.stance, robots)
+        settled, space = prepare.hand_space(drawn, limb)
+        shown, preload = space if reply.vertices else None, None
+        if reply.wrist.mode == "floating":
+            preload = prepare.floating_wrist(drawn, limb).hand.preload
+        with writing(picture):
+            pictures.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}", preload)
+    if as_json:
+        searched = {} if found is None else {"search": survey_json(found)}
+        say(msgspec.to_builtins(reply) | searched)
+    else:
+        print_wrench_space(reply, console())
+        if found is not None:
+            print_survey(found, console())
+    return DONE if reply.vertices else OVERLOADED
+
+
+def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]:
+    names = [name.strip() for name in given.split(",")]
+    axes = [axis for name in names for axis in get_args(Axis) if axis == name]
+    if len(names) != 2 or len(axes) != 2 or axes[0] == axes[1]:
+        raise click.BadParameter(
+            f"two different ones of {', '.join(get_args(Axis))} are wanted, as fx,fz; got {given}"
+        )
+    return axes
+
+
+@click.command("body-space")
+@click.argument("stance")
+@click.option(
+    "--axes",
+    default="fx,fz",
+    show_default=True,
+    callback=_check_axes,
+    metavar="AXIS,AXIS",
+    help="Of the plane of body wrenches that is shown: fx, fy, fz, mx, my or mz, in B.",
+)
+@click.option(
+    "--projection",
+    is_flag=True,
+    help="Whatever the other components; as asked for by default.",
+)
+@click.option("--pure", is_flag=True, help="With the other components zero.")
+@plot_option("Draw it there, and the largest accelerations in two planes.")
+@hand_option
+@robot_option
+@json_option
+def body_space(
+    stance: str,
+    axes: list[Axis],
+    projection: bool,
+    pure: bool,
+    picture: Path | None,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Show what the body can bear: which wrenches, and which accelerations."""
+    if projection and pure:
+        raise click.UsageError("give --projection or --pure, not both")
+    from service.answering import explore, print_body_space, robots_of
+
+    plan = asked(read_request(stance), hand, robot)
+    request = BodySpaceRequest(
+        v=1,
+        id=plan.id,
+        stance=plan.stance,
+        body_wrench=plan.body_wrench,
+        load=plan.load,
+        limits=plan.limits,
+        present=plan.present,
+        axes=axes,
+        others="free" if projection else "zero" if pure else "needed",
+    )
+    with waiting(f"exploring {stance}", plan):
+        found = explore(request, robots_of(robot))
+        if picture is not None:
+            from planner import pictures
+
+            with writing(picture):
+                pictures.plot_body_space(found.space, found.section, picture, stance)
+    if as_json:
+        say(found.reply)
+    else:
+        print_body_space(found.reply, console())
+    return EXIT_STATUS.get(found.reply.status, FAILED)

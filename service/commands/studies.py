@@ -1,0 +1,121 @@
+"""Studies on the command line: what a sweep is asked, and claims as a table for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import click
+from rich.console import Console
+from rich.markup import escape
+
+from hand_models.base import InvalidInputError
+from hand_models.studies import Claim, Study, StudyResult, load_study
+from hand_models.tile import surface_names
+from service.commands.tables import table_of
+
+__all__ = ["chosen_study", "print_study", "sweep_options"]
+
+SWEEP: Final = "sweep"
+"""The one study that takes options."""
+
+AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
+
+
+def sweep_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of the study `SWEEP` to a command."""
+    for option in (
+        click.option(
+            "--measure",
+            "measures",
+            multiple=True,
+            metavar="NAME",
+            help="Of a sweep: shear, normal, moment or volume, again for more than one map; by "
+            "default shear and normal.",
+        ),
+        click.option(
+            "--surface",
+            metavar="NAME",
+            help=f"Of a sweep: {', '.join(surface_names())}; by default that of Fig. 16.",
+        ),
+        click.option(
+            "--tension", type=float, help="Of a sweep: of both tendons [N]; by default Fig. 16's."
+        ),
+        click.option(
+            "--diameter", type=float, help="Of a sweep: of the rock [m]; by default Fig. 16's A."
+        ),
+        click.option(
+            "--y", metavar=AXIS, help="Of a sweep: the other number, as --x; by default Fig. 16's."
+        ),
+        click.option(
+            "--x",
+            metavar=AXIS,
+            help="Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
+            "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
+            "default Fig. 16's.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def chosen_study(name: str, **options: Any) -> str | Study:
+    """Return a study by its name, or a sweep of what the options ask for.
+
+    Raises
+    ------
+    InvalidInputError
+        If a study other than the sweep is given options.
+    """
+    given = {key: value for key, value in options.items() if value not in (None, ())}
+    if name != SWEEP or not given:
+        load_study(name)
+        if given:
+            option = "--measure" if "measures" in given else f"--{min(given)}"
+            raise InvalidInputError(f"only the study {SWEEP} takes it, not {name}", field=option)
+        return name
+    from hand_models.experiments import Conditions, Sweep
+
+    of_rock = {key: given.pop(key) for key in ("diameter", "tension", "surface") if key in given}
+    if "measures" in given:
+        given["measures"] = tuple(dict.fromkeys(given["measures"]))
+    return Sweep(conditions=replace(Conditions.of_fig16()[0], **of_rock), **given)
+
+
+def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> None:
+    """Print what was claimed, what came out, and where the files are."""
+    out.print(f"{result.name}: {result.title}", style="bold", markup=False)
+    for line in result.data.get("summary", ()):
+        out.print(line, markup=False)
+    if result.claims:
+        _print_claims(result, out)
+    for what in result.data.get("not_tested", ()):
+        out.print(f"not tested: {what}", markup=False)
+    for path in files:
+        out.print(str(path), markup=False, soft_wrap=True)
+
+
+def _print_claims(result: StudyResult, out: Console) -> None:
+    table = table_of("")
+    for name in ("claim", "claimed", "got"):
+        table.add_column(name, overflow="fold")
+    for claim in result.claims:
+        cells = (escape(claim.claim), _cell(claim.claimed), _cell(claim.got))
+        table.add_row(_verdict(claim), *cells, style=None if claim.holds else "bold")
+    out.print(table)
+    held = sum(claim.holds for claim in result.claims)
+    out.print(f"{held} of {len(result.claims)} claims hold", markup=False)
+    if any(claim.role == "calibration" for claim in result.claims):
+        out.print("fitted: a parameter was calibrated to the claim", markup=False)
+
+
+def _verdict(claim: Claim) -> str:
+    if not claim.holds:
+        return "missed"
+    return "fitted" if claim.role == "calibration" else "holds"
+
+
+def _cell(value: str | float) -> str:
+    return escape(value) if isinstance(value, str) else f"{value:.4g}"

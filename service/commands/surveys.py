@@ -1,0 +1,124 @@
+"""A floating hand's search, as JSON and as a table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, Final
+
+from rich.console import Console
+from rich.table import Table
+
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, NAIL
+from hand_models.wrench_spaces import Row
+from planner.capability import Survey
+from service.commands.tables import table_of
+from service.replies import AXES
+
+__all__ = ["print_survey", "survey_json"]
+
+DRAGGED: Final = "a tile dragged backwards"
+"""What ends the way where no limit does: a part that can only push or only pull is about to do the
+other, which is a tile nearly always."""
+
+WHOLE: Final = "finger"
+"""Column of a finger's limits that are no tile's."""
+
+ORDER: Final = (WHOLE, "base", *PHALANGES, NAIL)
+"""Of the columns of a finger's parts."""
+
+
+def survey_json(survey: Survey) -> dict[str, Any]:
+    """Return the search as JSON has it: extreme wrenches, poses, and what lets go at each."""
+    found = survey.found
+    return {
+        "tried": found.tried,
+        "held": found.held,
+        "wrenches": found.wrenches.tolist(),
+        "twists": found.poses.tolist(),
+        "limiting": [_limit(row) for row in found.limiting],
+        "ends": {
+            name: None
+            if end is None
+            else {
+                "reach": end.reach,
+                "wrench": end.wrench.tolist(),
+                "twist": end.twist.tolist(),
+                "limiting": _limit(end.limiting),
+            }
+            for name, end in zip(_names(), survey.ends, strict=True)
+        },
+    }
+
+
+def _names() -> list[str]:
+    return [f"{sign}{axis}" for axis in AXES for sign in "+-"]
+
+
+def _limit(row: Row | None) -> dict[str, str | None] | None:
+    if row is None:
+        return None
+    return {"finger": row.finger, "phalanx": row.phalanx, "limit": row.limit}
+
+
+def print_survey(survey: Survey, out: Console) -> None:
+    """Print how far the hand goes along each axis, and which tiles let go first."""
+    found = survey.found
+    out.print(
+        f"search: at {found.held} of {found.tried} poses of the wrist nothing lets go; "
+        f"{len(found.poses)} extreme wrenches",
+        markup=False,
+    )
+    _print_ends(survey, out)
+    if found.limiting:
+        out.print(f"\n[bold]what lets go first, at how many of {len(found.limiting)}[/bold]")
+        out.print(failures_table(found.limiting))
+
+
+def _print_ends(survey: Survey, out: Console) -> None:
+    """Print where the hand lets go along each axis."""
+    table = table_of("axis")
+    table.add_column("reach", justify="right")
+    for name in ("finger", "phalanx", "limit"):
+        table.add_column(name)
+    for name, end in zip(_names(), survey.ends, strict=True):
+        unit = "N" if name[1] == "f" else "N·m"
+        if end is None:
+            table.add_row(f"{name} {unit}", "-", "", "", "")
+            continue
+        row = end.limiting
+        cells = ("-",) * 3 if row is None else (row.finger or "-", row.phalanx or "-", row.limit)
+        table.add_row(f"{name} {unit}", f"{end.reach:.2f}", *cells)
+    out.print(table)
+    if any(end is None for end in survey.ends):
+        out.print("reach -: no way along the axis was found that holds", markup=False)
+    if any(end is not None and end.limiting is None for end in survey.ends):
+        out.print(
+            f"limit -: no limit binds there; the way ends at {DRAGGED}, or where the search "
+            "stopped",
+            markup=False,
+        )
+
+
+def failures_table(limiting: Sequence[Row | None]) -> Table:
+    """Return how often each tile of each finger lets go first, and what is no finger's."""
+    counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
+    parts = [part for part in ORDER if any(finger and name == part for finger, name in counts)]
+    table = table_of("")
+    for name in (*parts, "all"):
+        table.add_column(name, justify="right")
+    for finger in FINGERS:
+        own = [counts[finger, part] for part in parts]
+        table.add_row(finger, *(str(count or "-") for count in own), str(sum(own)))
+    for (other, name), count in counts.items():
+        if other is None:
+            table.add_row(name, *[""] * len(parts), str(count))
+    return table
+
+
+def _place(row: Row) -> tuple[str | None, str]:
+    """Return finger and part of a limit; for what is no finger's, the limit in words."""
+    if row.finger is None:
+        return None, row.limit.replace("_", " ")
+    return row.finger, row.phalanx or WHOLE

@@ -1,0 +1,349 @@
+"""Replies as tables for a person, in 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from planner.explanation import barrier_words
+from planner.result import LimitName as PlannedLimit
+from service.replies import (
+    AXES,
+    AxisCapability,
+    Certificate,
+    Finger,
+    Hand,
+    LimitName,
+    PlanReply,
+    Price,
+    TensionPath,
+    Tile,
+    WrenchSpaceReply,
+)
+
+__all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
+
+MOST_PRICES: Final = 8
+"""Prices shown; the dearest first."""
+
+JOINTS_A_LINE: Final = 7
+"""Joint torques of a limb in one line of a table."""
+
+CARRIES: Final[Mapping[str, str]] = {
+    "off": "carries nothing",
+    "drags": "drags on the rock",
+    "presses": "presses on the rock",
+    "drags_and_presses": "drags and presses on the rock",
+}
+"""What a palm does in each of its modes."""
+
+
+def console(stderr: bool = False) -> Console:
+    """Return the console on standard output, or on standard error."""
+    return Console(highlight=False, stderr=stderr)
+
+
+def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None = None) -> None:
+    """Print a plan.
+
+    Parameters
+    ----------
+    reply : PlanReply
+    out : Console
+    without_palm : PlanReply, optional
+        The same question's answer with every palm left out.
+    """
+    parts = [f"[bold]{reply.status.upper()}[/bold]"]
+    if reply.utilisation is not None:
+        parts.append(f"utilisation {reply.utilisation:.3f}")
+    parts.append(f"load factor {_load_factor(reply)}")
+    if reply.effort is not None:
+        parts.append(f"effort {reply.effort:.3g}")
+    parts.append(f"{1e3 * reply.time.total:.0f} ms")
+    out.print("   ".join(parts))
+    out.print(reply.reason, markup=False)
+    for warning in reply.warnings:
+        out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    if reply.path is not None:
+        out.print(_path_sentence(reply.path), markup=False)
+    if without_palm is not None:
+        out.print(f"load factor without the palms: {_load_factor(without_palm)}")
+    if reply.hands is not None:
+        _show(
+            "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
+        )
+        floating = [hand for hand in reply.hands if hand.wrist.twist is not None]
+        if floating:
+            title = "where floating wrists go (mm, mrad), and how their palms carry"
+            _show(title, _wrist_table(floating), out)
+        title = "tendons and their motors, and each finger's most loaded tile"
+        _show(title, _tendon_table(reply.hands), out)
+    if reply.joint_torque is not None and reply.joint_torque_limit is not None:
+        title = "joint torques [N·m], from the body outward; * most of its limit"
+        _show(title, _joint_table(reply.joint_torque, reply.joint_torque_limit), out)
+    for prices, what in ((reply.prices, "utilisation"), (reply.effort_prices, "effort")):
+        if prices:
+            title = f"what one unit more of a limit would take off the {what}"
+            if len(prices) > MOST_PRICES:
+                title += f" ({MOST_PRICES} of {len(prices)})"
+            _show(title, _price_table(prices[:MOST_PRICES]), out)
+    if reply.certificate is not None:
+        _print_certificate(reply.certificate, reply.body_wrench, out)
+
+
+def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
+    """Print what one hand can carry."""
+    seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
+    out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
+    out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
+    if reply.wrist.error is not None:
+        _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
+    _show(
+        "contacts, and the tendon tension [N] at which each part was at rest",
+        _closing_table(reply),
+        out,
+    )
+    tensions = table_of("finger", "phalanx")
+    tensions.add_column("f_t(max) N", justify="right")
+    for limit in reply.tension_limits:
+        tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
+        tensions.add_row(limit.finger, limit.phalanx or "-", tension)
+    _show("tendon tension at which the finger's first tile lets go", tensions, out)
+    if reply.half_spaces is None or reply.capability is None:
+        out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
+        return
+    out.print(
+        f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
+        f"dimension {reply.dimension}"
+    )
+    _print_capability(reply.capability, out)
+
+
+def _print_floating(palm: str, error: float, out: Console) -> None:
+    """Say what the set of a floating hand stands for, and what it does not."""
+    out.print(
+        f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
+        f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
+        "--search N finds what the hand really holds, palm and all.",
+        markup=False,
+    )
+
+
+def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
+    """Print the least and the most of each component, and those of it alone if there are any."""
+    with_pure = any(end.pure is not None for end in capability.values())
+    reaches = table_of("axis")
+    for name in ("least", "most", *(("pure least", "pure most") if with_pure else ())):
+        reaches.add_column(name, justify="right")
+    for axis in AXES:
+        less, more = capability[f"-{axis}"], capability[f"+{axis}"]
+        unit = "N" if axis.startswith("f") else "N·m"
+        cells = [-less.extent, more.extent]
+        pure = [None if less.pure is None else -less.pure, more.pure] if with_pure else []
+        shown = ("-" if cell is None else _fixed(cell, 2) for cell in (*cells, *pure))
+        reaches.add_row(f"{axis} {unit}", *shown)
+    _show("wrenches on the rock along the axes of H", reaches, out)
+    out.print("least, most: with whatever else the hand can carry")
+    if with_pure:
+        out.print("pure: with every other component zero; -: none")
+    if any(capability[f"{sign}{AXES[0]}"].pure is None for sign in "+-"):
+        out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
+
+
+def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console) -> None:
+    """Print what is missing, what could be held instead, and what is in the way."""
+    if proof.shortfall is not None and proof.nearest is not None:
+        where = "at any utilisation"
+        if proof.utilisation is not None:
+            where = f"up to a utilisation of {proof.utilisation:g}"
+        table = table_of("")
+        for axis in AXES:
+            table.add_column(axis, justify="right")
+        parts = {"needed": needed, "nearest held": proof.nearest, "missing": proof.shortfall}
+        for name, wrench in parts.items():
+            table.add_row(name, *(_fixed(value, 1) for value in wrench))
+        _show(f"body wrenches {where}, in B [N, N·m]", table, out)
+    if proof.irreducible:
+        title = "these leave no balance, each needed for that; others may be in the way, too"
+        _show(title, _barrier_table(proof.irreducible), out)
+        words = {name.limit: barrier_words(_planned(name)) for name in proof.irreducible}
+        for limit, said in words.items():
+            out.print(f"{limit}: {said}", markup=False)
+        if proof.sufficient is not None:
+            out.print()
+            out.print(_sufficient_sentence(proof.sufficient), markup=False)
+
+
+def _sufficient_sentence(names: Sequence[LimitName]) -> str:
+    """Say which limits, taken away alone, would do."""
+    if not names:
+        return "no single one of them, taken away alone, would do"
+    which = "this one" if len(names) == 1 else "any one of these"
+    told = ", ".join(
+        f"{limb} {limit}" + (f" ({', '.join(owners)})" if owners else "")
+        for (limb, limit), owners in _alike(names).items()
+    )
+    return f"{which}, taken away alone, would let it be held: {told}"
+
+
+def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
+    """Return limits by limb and kind, in their order, with what of the limb each is of."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        parts = (name.phalanx, name.finger, name.joint)
+        whose = " of ".join(part for part in parts if part is not None)
+        owners = alike.setdefault((name.limb, name.limit), [])
+        owners += [whose] if whose else []
+    return alike
+
+
+def _barrier_table(names: Iterable[LimitName]) -> Table:
+    """Return limits by hand and kind, in their order."""
+    table = table_of("hand", "limit")
+    table.add_column("of")
+    for (limb, limit), owners in _alike(names).items():
+        table.add_row(limb, limit, ", ".join(owners) or "-")
+    return table
+
+
+def _planned(name: LimitName) -> PlannedLimit:
+    return PlannedLimit(name.limb, name.finger, name.phalanx, name.limit, name.joint)
+
+
+def _closing_table(reply: WrenchSpaceReply) -> Table:
+    """Return what of each finger touches, and when it stopped moving."""
+    table = table_of("finger", "base")
+    kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
+    for part in (stage.part for stage in reply.closing[0].stages):
+        table.add_column(part, justify="right")
+    for closing in reply.closing:
+        cells = [
+            f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
+            for stage in closing.stages
+        ]
+        table.add_row(closing.finger, kinds.get((closing.finger, "base"), ""), *cells)
+    return table
+
+
+def _path_sentence(path: TensionPath) -> str:
+    """Say what the way from the present tensions is like."""
+    used = path.utilisation_at_present
+    there = "no balance" if used is None else f"utilisation {used:.3f}"
+    way = "safe" if path.safe else "not safe"
+    return f"from the present tensions ({there}): changes up to {path.largest_change:.1f} N, {way}"
+
+
+def _load_factor(reply: PlanReply) -> str:
+    if reply.load_factor_unbounded:
+        return "unbounded"
+    return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Return a number without the sign of a zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _show(title: str, table: Table, out: Console) -> None:
+    out.print(f"\n[bold]{title}[/bold]")
+    out.print(table)
+
+
+def table_of(*names: str) -> Table:
+    """Return a table with left-justified columns of names."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for name in names:
+        table.add_column(name, no_wrap=True)
+    return table
+
+
+def _hand_table(hands: Iterable[Hand]) -> Table:
+    table = table_of("hand")
+    for name in (*AXES, "hand\nutil", "palm\nshear", "palm\npress"):
+        table.add_column(name, justify="right")
+    for hand in hands:
+        force = hand.palm.force
+        cells = [_fixed(value, 0) for value in hand.wrench[:3]]
+        cells += [_fixed(value, 1) for value in hand.wrench[3:]]
+        cells += [_fixed(hand.utilisation, 2), _fixed(-force[0], 0), _fixed(force[2], 0)]
+        table.add_row(hand.limb, *cells)
+    return table
+
+
+def _wrist_table(hands: Iterable[Hand]) -> Table:
+    table = table_of("hand")
+    for name in ("vx", "vy", "vz", "wx", "wy", "wz"):
+        table.add_column(name, justify="right")
+    table.add_column("palm")
+    for hand in hands:
+        cells = [_fixed(1e3 * value, 2) for value in hand.wrist.twist or ()]
+        table.add_row(hand.limb, *cells, (hand.wrist.palm or "-").replace("_", " "))
+    return table
+
+
+def _tendon_table(hands: Iterable[Hand]) -> Table:
+    table = table_of("hand", "finger")
+    for name in ("tension N", "current A"):
+        table.add_column(name, justify="right")
+    table.add_column("tile")
+    table.add_column("util", justify="right")
+    for hand in hands:
+        for finger in hand.fingers:
+            worst = _worst(finger)
+            cells = ("-", "-") if worst is None else (worst.phalanx, f"{worst.utilisation:.2f}")
+            drive = (f"{finger.tendon_tension:.1f}", f"{finger.motor_current:.3f}")
+            table.add_row(hand.limb, finger.name, *drive, *cells)
+        table.add_section()
+    return table
+
+
+def _joint_table(
+    torques: Mapping[str, Sequence[float]], limits: Mapping[str, Sequence[float]]
+) -> Table:
+    """Return each limb's torques, in lines of so many as fit, with how much of its joints is used.
+
+    The joint that uses most of its limit is marked.
+    """
+    most = max((len(row) for row in torques.values()), default=0)
+    columns = min(most, JOINTS_A_LINE)
+    table = table_of("limb")
+    table.padding = 0  # otherwise seven torques do not fit
+    for i in range(columns):
+        table.add_column(str(i + 1) if most <= columns else f"+{i + 1}", justify="right")
+    for name in ("of", "util"):
+        table.add_column(name, justify="right")
+    for limb, row in torques.items():
+        used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
+        worst = used.index(max(used))
+        cells = [
+            _fixed(torque, 0 if abs(torque) >= 1e3 else 1) + ("*" if i == worst else " ")
+            for i, torque in enumerate(row)
+        ]
+        ends = (f"{limits[limb][worst]:.4g}", f"{used[worst]:.2f}")
+        for start in range(0, len(cells), columns):
+            line = cells[start : start + columns]
+            line += [""] * (columns - len(line))
+            named, last = (limb, ends) if start == 0 else (f"  from {start + 1}", ("", ""))
+            table.add_row(named, *line, *last)
+    return table
+
+
+def _worst(finger: Finger) -> Tile | None:
+    """Return the most loaded tile of those that touch rock."""
+    touching = [tile for tile in finger.tiles if tile.contact != "none"]
+    return max(touching, key=lambda tile: tile.utilisation, default=None)
+
+
+def _price_table(prices: Iterable[Price]) -> Table:
+    table = table_of("hand", "finger, joint", "tile", "limit")
+    table.add_column("price", justify="right")
+    for price in prices:
+        part = price.finger or price.joint or "-"
+        names = (price.limb, part, price.phalanx or "-", price.limit)
+        table.add_row(*names, f"{price.price:.2g} /{price.unit}")
+    return table

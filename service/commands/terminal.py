@@ -1,0 +1,121 @@
+"""How commands tell what came out: results, pictures and progress, and their exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+import msgspec
+
+from hand_models.base import InvalidInputError
+from service.commands.tables import console, print_plan
+from service.replies import PlanReply
+from service.requests import PlanRequest
+
+if TYPE_CHECKING:
+    from service.answering import Planned
+
+__all__ = [
+    "BAD_INPUT",
+    "DONE",
+    "EXIT_STATUS",
+    "FAILED",
+    "OVERLOADED",
+    "draw_plan",
+    "filling_folder",
+    "note",
+    "progress",
+    "say",
+    "show",
+    "waiting",
+    "writing",
+]
+
+DONE: Final = 0
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+OVERLOADED: Final = 3
+
+EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": OVERLOADED}
+"""By a plan's status; any other is `FAILED`."""
+
+
+def note(message: str) -> None:
+    """Write one line on standard error."""
+    click.echo(f"crux: {' '.join(message.split())}", err=True)
+
+
+def say(result: object) -> None:
+    """Write a result as one line of JSON."""
+    click.echo(msgspec.json.encode(result))
+
+
+def show(reply: PlanReply, as_json: bool) -> int:
+    """Write a plan, and return its exit status."""
+    if as_json:
+        say(reply)
+    else:
+        print_plan(reply, console())
+    return EXIT_STATUS.get(reply.status, FAILED)
+
+
+def draw_plan(answer: Planned, picture: Path) -> None:
+    """Draw a plan in its stance."""
+    from planner import pictures
+
+    with writing(picture):
+        pictures.plot_plan(answer.plan, answer.question, picture)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what goes wrong in writing a picture into one line about the option."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"cannot write {path}: {error}", field="--plot") from None
+
+
+@contextmanager
+def filling_folder() -> Iterator[None]:
+    """Turn what goes wrong in writing a folder into one line about it."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+
+
+@contextmanager
+def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard error while the work lasts; yields what tells it done and total.
+
+    Where no bar can be shown, the line, if there is one, is written when the first step is told.
+    """
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    lines = [line] if line is not None and not screen.is_terminal else []
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(title, total=None)
+
+        def tell(done: int, total: int) -> None:
+            if lines:
+                note(lines.pop())
+            bar.update(task, completed=done, total=total)
+
+        yield tell
+
+
+@contextmanager
+def waiting(title: str, request: PlanRequest) -> Iterator[None]:
+    """Show on a terminal's standard error that hands with floating wrists take a while."""
+    screen = console(stderr=True)
+    slow = any(hand.wrist == "floating" for hand in request.stance.hands)
+    if slow and screen.is_terminal:
+        with screen.status(title):
+            yield
+    else:
+        yield

@@ -1,0 +1,172 @@
+"""Commands that answer and ask over zenoh."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+import msgspec
+import zenoh
+
+from hand_models.parameters import ParameterTable
+from service.commands.options import (
+    asked,
+    check_picture,
+    hand_option,
+    json_option,
+    robot_option,
+    timeout_option,
+    with_extras,
+)
+from service.commands.stances import read_request
+from service.commands.tables import console
+from service.commands.terminal import draw_plan, note, say, show
+from service.serving import (
+    CruxClient,
+    listening,
+    open_session,
+    start_zenoh_log,
+    zenoh_config,
+    zenoh_options,
+)
+from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
+
+if TYPE_CHECKING:
+    from planner.robots import RobotFile
+
+__all__ = ["demo", "query", "serve"]
+
+DEMO_STANCE: Final = "wall-300-joints"
+
+
+@click.command()
+@zenoh_options
+@hand_option
+@robot_option
+@json_option
+def serve(
+    config: zenoh.Config, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool
+) -> None:
+    """Answer questions on zenoh until SIGTERM or Ctrl-C.
+
+    The hand of --hand is that of every question; a question's own numbers go on top. The robot of
+    --robot is the only one that is planned for, and gives the keys its name.
+    """
+    stop = _StopSignal()
+    from service.serving import PlanService, prepare_zenoh
+
+    logging.basicConfig(format="crux: %(levelname)s: %(message)s")
+    prepare_zenoh()
+    start_zenoh_log()
+    endpoints = listening(config)
+    with open_session(config) as session:
+        service = PlanService(session, robot, hand)
+        if service.has_rival():
+            note(
+                f"another service already answers {service_key(service.robot, '…')}: queries may "
+                "reach either; --no-multicast-scouting keeps services apart"
+            )
+        with service:
+            if as_json:
+                say({"v": 1, "keys": service.keys, "listen": endpoints})
+            where = ", ".join(endpoints) or "no address"
+            note(f"serving {', '.join(service.keys)}; listening on {where}")
+            stop.wait()
+
+
+class _StopSignal:
+    """SIGTERM or Ctrl-C, from now on.
+
+    A signal may well arrive in a thread of zenoh's or of a solver's, and does not wake the main
+    thread then; what does is the byte that its handler writes to a pipe.
+    """
+
+    NUMBERS = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self) -> None:
+        self._arrived, wakeup = os.pipe()
+        os.set_blocking(wakeup, False)
+        signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
+        for number in self.NUMBERS:
+            signal.signal(number, lambda *_: None)
+
+    def wait(self) -> None:
+        """Wait for the first; a second one kills."""
+        os.read(self._arrived, 1)
+        for number in self.NUMBERS:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@click.command()
+@click.argument("stance")
+@zenoh_options
+@timeout_option
+@hand_option
+@robot_option
+@json_option
+def query(
+    stance: str,
+    config: zenoh.Config,
+    timeout: float,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Ask a running service for a plan.
+
+    It has to serve the robot that the stance or --robot names.
+    """
+    request = with_extras(asked(read_request(stance), hand, robot))
+    start_zenoh_log()
+    with CruxClient(config, request.stance.robot or DEFAULT_ROBOT, timeout=timeout) as client:
+        reply = client.plan(request)
+    return show(reply, as_json)
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    "picture",
+    type=click.Path(path_type=Path),
+    callback=check_picture,
+    default=Path("crux-demo.png"),
+    show_default=True,
+    metavar="FILE",
+    help="Where the picture goes.",
+)
+@hand_option
+@robot_option
+@json_option
+def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool) -> int:
+    """Start the service, ask it for a plan of a real stance, and draw the answer.
+
+    A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
+    """
+    from service import answering
+    from service.answering import robots_of
+    from service.serving import PlanService
+
+    request = with_extras(asked(read_request(DEMO_STANCE), hand, robot))
+    start_zenoh_log()
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(config) as session, PlanService(session, robot) as service:
+        client = CruxClient(session, service.robot)
+        try:
+            reply = client.plan(request)
+        except ServiceError as error:
+            if error.kind != UNREACHABLE:
+                raise
+            note(f"planned without joints: {error.message}")
+            stance = msgspec.structs.replace(request.stance, joints=None)
+            request = msgspec.structs.replace(request, stance=stance)
+            reply = client.plan(request)
+    draw_plan(answering.planned(request, robots_of(robot)), picture)
+    status = show(reply, as_json)
+    if not as_json:
+        console().print(f"picture: {picture}", markup=False)
+    return status

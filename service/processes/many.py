@@ -1,0 +1,230 @@
+"""Many plan requests at once, in processes: replies in their order, errors in their places.
+
+Encoded requests and replies travel between processes, and each is answered as the service would
+answer it.
+"""
+
+from __future__ import annotations
+
+import gc
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, NamedTuple, Self
+
+from hand_models.base import CruxError, InvalidInputError
+from hand_models.parameters import ParameterTable
+from service.processes.workers import Lost, Workers, cores
+from service.replies import ErrorReply, PlanReply
+from service.requests import PlanRequest
+from service.wire import PLAN, Format, LostError, MalformedError, encode_error, identifier
+
+if TYPE_CHECKING:
+    from planner.robots import RobotFile
+
+__all__ = ["Answered", "Planners", "plan_many", "worth"]
+
+WORTH_A_PROCESS: Final = 500
+"""Requests below this many are planned faster here than in processes that must first start."""
+
+
+class Answered(NamedTuple):
+    """An encoded reply, or an encoded error if it is not good."""
+
+    payload: bytes
+    good: bool
+
+
+class Planners:
+    """Processes that plan, kept open while it is entered; their start is paid for once.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes; as many as there are cores by default. One of them is this process itself, which
+        plans alone until the others have started.
+    robot : RobotFile, optional
+        The only robot that is planned for; those that are bundled by default.
+    hand : ParameterTable, optional
+        Entries in which hands are not the bundled one; a request's own go on top.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1, or after the end, when it is asked to plan.
+    """
+
+    def __init__(
+        self,
+        workers: int | None = None,
+        *,
+        robot: RobotFile | None = None,
+        hand: ParameterTable | None = None,
+    ) -> None:
+        count = cores() if workers is None else _whole(workers)
+        self._make = partial(_answering, robot, hand)
+        self._closed = False
+        self._workers: Workers[tuple[bytes, Format], Answered] | None = None
+        if count > 1:
+            self._workers = Workers(self._make, count - 1)
+
+    def __enter__(self) -> Self:
+        self._closed = False
+        if self._workers is not None:
+            self._workers.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._closed = True
+        if self._workers is not None:
+            self._workers.__exit__(kind, error, traceback)
+
+    def wait(self) -> None:
+        """Wait until all processes have started, if that is better than to begin without them."""
+        if self._workers is not None and not self._closed:
+            self._workers.wait()
+
+    def plan_many(
+        self,
+        requests: Sequence[PlanRequest],
+        progress: Callable[[int, int], None] | None = None,
+    ) -> list[PlanReply | ErrorReply]:
+        """Return the reply to each request, or the error in its place; as `plan_many`."""
+        form = Format.MSGPACK
+        found: dict[int, Answered] = {}
+        good, payloads = [], []
+        for i, request in enumerate(requests):
+            try:
+                payloads.append(form.encode(request))
+                good.append(i)
+            except (TypeError, ValueError, OverflowError, RecursionError) as error:
+                name = getattr(request, "id", None)
+                known = name if isinstance(name, str) else None
+                found[i] = _refused(MalformedError(f"no request: {error}"), form, known)
+        for k, answer in self.answers(payloads, form):
+            found[good[k]] = answer
+            if progress is not None:
+                progress(len(found), len(requests))
+        with _no_collection():
+            return [_decoded(found[i], form) for i in range(len(requests))]
+
+    def answers(
+        self, payloads: Sequence[bytes], form: Format = Format.JSON
+    ) -> Iterator[tuple[int, Answered]]:
+        """Yield each encoded request's index and encoded answer, as they are done."""
+        if self._closed:
+            raise InvalidInputError("is closed; enter another, or this one again", field="planners")
+        answer = self._make()
+        if self._workers is None:
+            yield from ((i, answer((payload, form))) for i, payload in enumerate(payloads))
+            return
+        for i, found in self._workers.each([(payload, form) for payload in payloads], answer):
+            if isinstance(found, Lost):
+                name = identifier(payloads[i], form)
+                yield i, _refused(LostError(found.reason), form, name)
+            else:
+                yield i, found
+
+
+def plan_many(
+    requests: Sequence[PlanRequest],
+    *,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[PlanReply | ErrorReply]:
+    """Return the reply to each request, or the error in its place.
+
+    Parameters
+    ----------
+    requests : sequence of PlanRequest
+    workers : int, optional
+        Processes; as many as there are cores where the requests are enough to be worth it. One is
+        this process itself. A program that starts processes needs its
+        ``if __name__ == "__main__":``.
+    progress : callable, optional
+        Called with (requests done, requests in all).
+
+    Returns
+    -------
+    list of PlanReply or ErrorReply
+        In the order of the requests. Nothing that is wrong with one of them is raised.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1.
+    """
+    with Planners(worth(len(requests), workers)) as planners:
+        return planners.plan_many(requests, progress)
+
+
+def worth(count: int, workers: int | None = None) -> int:
+    """Return how many processes so many requests are worth: no more than are wanted.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``workers`` is no whole number of at least 1.
+    """
+    if workers is not None:
+        return min(_whole(workers), max(1, count))
+    return cores() if count >= WORTH_A_PROCESS else 1
+
+
+def _whole(workers: object) -> int:
+    """Return a number of processes, checked."""
+    try:
+        count = 0 if isinstance(workers, bool) else operator.index(workers)  # type: ignore[arg-type]
+    except TypeError:
+        count = 0
+    if count < 1:
+        raise InvalidInputError(
+            f"must be a whole number of at least 1, got {workers!r}", field="workers"
+        )
+    return count
+
+
+def _answering(
+    robot: RobotFile | None, hand: ParameterTable | None
+) -> Callable[[tuple[bytes, Format]], Answered]:
+    """Return what answers an encoded request. Here the planner is imported, in each process."""
+    from service.answering import handle, robots_of
+
+    robots = robots_of(robot)
+
+    def answer(asked: tuple[bytes, Format]) -> Answered:
+        payload, form = asked
+        found = handle(PLAN, payload, form.value, hand, robots)
+        return Answered(found.payload, found.good)
+
+    return answer
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Let the garbage collector rest: it would go through all replies again and again."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+def _refused(error: CruxError, form: Format, name: str | None) -> Answered:
+    payload, _ = encode_error(error.kind, error, form, name)
+    return Answered(payload, False)
+
+
+def _decoded(answer: Answered, form: Format) -> PlanReply | ErrorReply:
+    if answer.good:
+        return form.decode(answer.payload, PlanReply)
+    return form.decode(answer.payload, ErrorReply)

@@ -1,0 +1,104 @@
+"""What travels of a wrench stream: a stance is declared once, then asked for set-points."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from service.replies.messages import Reply, Vector
+from service.requests import Limits, Load, Name, Request, Stance, Wrench
+
+__all__ = [
+    "HandColumns",
+    "HandSetPoints",
+    "SetPointsReply",
+    "SetPointsRequest",
+    "StreamReply",
+    "StreamRequest",
+]
+
+Radius = Annotated[
+    float,
+    Meta(
+        gt=0.0,
+        le=1e4,
+        description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
+    ),
+]
+
+
+class StreamRequest(Request, frozen=True, kw_only=True):
+    """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
+
+    stance: Stance
+    body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
+        None
+    )
+    load: Load | None = None
+    limits: Limits = Limits()
+    radius: Radius = 30.0
+
+
+class SetPointsRequest(Request, frozen=True, kw_only=True):
+    """Asks a stream for the set-points of a body wrench."""
+
+    stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
+    body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
+
+
+class HandColumns(Struct, kw_only=True):
+    """One hand of a stream, and the names of its set's loads."""
+
+    limb: str
+    columns: list[str]
+
+
+class StreamReply(Reply, kw_only=True):
+    """A stream that is declared. It is there until many others are, or the service ends.
+
+    ``radius``: within which of ``body_wrench``, the first centre, set-points are interpolated, null
+    where they are solved one by one. ``status``, ``utilisation``, ``gap``: at that centre.
+    ``took``: the time of it [s].
+    """
+
+    stream: str
+    radius: float | None
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandColumns]
+    took: float
+
+
+class HandSetPoints(Struct, kw_only=True):
+    """What one hand is to do: tensions [N], motors [N·m, A], its wrench on the rock in H."""
+
+    limb: str
+    tensions: Vector
+    motor_torque: Vector
+    motor_current: Vector
+    wrench: Vector
+
+
+class SetPointsReply(Reply, kw_only=True):
+    """Set-points of one body wrench.
+
+    ``status``, ``utilisation``, ``verified``: as of a plan. ``gap``: the least utilisation of any
+    plan is no more than this below, which is proven. ``source``: ``interpolated`` from plans known
+    before, ``solved`` for this wrench, or ``blended`` of both. ``reason``: why there is no plan;
+    then ``utilisation``, ``gap`` and ``hands`` are null. ``took``: the time of it [s].
+    """
+
+    stream: str
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandSetPoints] | None
+    verified: bool
+    source: str
+    took: float

@@ -1,0 +1,167 @@
+"""A typed client of the service."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Final, Self, TypeVar
+
+import msgspec
+import zenoh
+
+from service.replies import (
+    BodySpaceReply,
+    ErrorReply,
+    PlanReply,
+    Reply,
+    SetPointsReply,
+    SetPointsRequest,
+    StreamReply,
+    StreamRequest,
+    WrenchSpaceReply,
+)
+from service.requests import BodySpaceRequest, PlanRequest, Request, WrenchSpaceRequest
+from service.serving.config import open_session
+from service.wire import (
+    BODY_SPACE,
+    DEFAULT_ROBOT,
+    PLAN,
+    SET_POINTS,
+    STREAM,
+    WRENCH_SPACE,
+    Format,
+    MalformedError,
+    NoServiceError,
+    ServiceError,
+    ServiceTimeout,
+    service_key,
+)
+
+__all__ = ["TIMEOUT", "CruxClient"]
+
+R = TypeVar("R", bound=Reply)
+
+TIMEOUT: Final = 10.0
+"""How long a client waits for an answer by default [s]."""
+
+SECOND_TRY_AFTER: Final = 0.3
+"""Pause before an empty answer is believed: a service that has just come back needs it [s]."""
+
+
+class CruxClient:
+    """Asks a robot's plan service.
+
+    Parameters
+    ----------
+    where : zenoh.Session or zenoh.Config
+        A session, which stays open, or the configuration of one that the client opens and closes.
+    robot : str, optional
+    timeout : float, optional
+        Of each question [s].
+    form : Format, optional
+        How messages travel.
+
+    Raises
+    ------
+    NoServiceError
+        If no session can be opened.
+    """
+
+    def __init__(
+        self,
+        where: zenoh.Session | zenoh.Config,
+        robot: str = DEFAULT_ROBOT,
+        *,
+        timeout: float = TIMEOUT,
+        form: Format = Format.MSGPACK,
+    ) -> None:
+        self.robot = robot
+        self.timeout = timeout
+        self.form = form
+        self._owned: zenoh.Session | None = None
+        if isinstance(where, zenoh.Config):
+            self._session = self._owned = open_session(where)
+        else:
+            self._session = where
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the session, if it is the client's own."""
+        if self._owned is not None:
+            self._owned.close()
+
+    def plan(self, request: PlanRequest) -> PlanReply:
+        """Return the service's plan.
+
+        Raises
+        ------
+        ServiceError
+            If the service refuses the request or fails on it.
+        NoServiceError
+            If nobody answers.
+        ServiceTimeout
+            If nobody answers in time.
+        """
+        return self._ask(PLAN, request, PlanReply)
+
+    def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
+        """Return one hand's wrench space; raises what `plan` raises."""
+        return self._ask(WRENCH_SPACE, request, WrenchSpaceReply)
+
+    def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
+        """Return what a stance can hold; raises what `plan` raises."""
+        return self._ask(BODY_SPACE, request, BodySpaceReply)
+
+    def stream(self, request: StreamRequest) -> StreamReply:
+        """Declare a stance for set-points; raises what `plan` raises."""
+        return self._ask(STREAM, request, StreamReply)
+
+    def set_points(self, request: SetPointsRequest) -> SetPointsReply:
+        """Return a stream's set-points for a body wrench; raises what `plan` raises."""
+        return self._ask(SET_POINTS, request, SetPointsReply)
+
+    def _ask(self, name: str, request: Request, kind: type[R]) -> R:
+        key = service_key(self.robot, name)
+        reply = self._get(key, request)
+        if reply is None:
+            time.sleep(SECOND_TRY_AFTER)
+            reply = self._get(key, request)
+        if reply is None:
+            raise NoServiceError(f"nobody answers at {key}")
+        if reply.ok is not None:
+            return self._read(reply.ok.payload, reply.ok.encoding, kind)
+        if reply.err is None or not str(reply.err.encoding).startswith("application/"):
+            # an error of zenoh's own, in a plain string: it has only this one
+            raise ServiceTimeout(
+                f"no answer at {key} within {self.timeout:g} s; the service may be busy with "
+                "another question: allow it longer (--timeout)"
+            )
+        detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
+        raise ServiceError(detail.kind, detail.message, field=detail.field)
+
+    def _get(self, key: str, request: Request) -> zenoh.Reply | None:
+        """Return the first reply, or None where there is none."""
+        replies = self._session.get(
+            key,
+            payload=self.form.encode(request),
+            encoding=self.form.label(request),
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=self.timeout,
+        )
+        return next(iter(replies), None)
+
+    def _read(self, payload: zenoh.ZBytes, encoding: zenoh.Encoding, kind: type[R]) -> R:
+        try:
+            return Format.named(str(encoding)).decode(payload.to_bytes(), kind)
+        except (MalformedError, msgspec.ValidationError) as error:
+            raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None

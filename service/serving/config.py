@@ -1,0 +1,177 @@
+"""Zenoh's own command-line flags, and the configuration they stand for."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any, Final
+
+import click
+import msgspec
+import zenoh
+
+from hand_models.base import InvalidInputError
+from service.wire import NoServiceError
+
+__all__ = [
+    "MODES",
+    "listening",
+    "open_session",
+    "start_zenoh_log",
+    "zenoh_config",
+    "zenoh_options",
+]
+
+MODES: Final = ("peer", "client", "router")
+
+STANDARD_OUTPUT: Final = 1
+STANDARD_ERROR: Final = 2
+"""File descriptors."""
+
+
+def zenoh_config(
+    *,
+    mode: str | None = None,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    file: Path | None = None,
+    settings: Sequence[str] = (),
+    multicast: bool = True,
+) -> zenoh.Config:
+    """Return a zenoh configuration.
+
+    Parameters
+    ----------
+    mode : {'peer', 'client', 'router'}, optional
+    connect, listen : sequence of str, optional
+        Endpoints, such as ``tcp/127.0.0.1:7447``.
+    file : Path, optional
+        A JSON5 configuration to begin with; otherwise that of ``ZENOH_CONFIG``, if it is set.
+    settings : sequence of str, optional
+        ``KEY:VALUE`` with JSON5 values; they have the last word.
+    multicast : bool, optional
+        Whether to look for others by multicast.
+
+    Raises
+    ------
+    InvalidInputError
+        If zenoh does not accept a part of it.
+    """
+    config = _read(file)
+    # queries through shared memory can be dropped unseen (zenoh issue 2628)
+    _insert(config, "transport/shared_memory/enabled", "false", "shared_memory")
+    if mode is not None:
+        _insert(config, "mode", _json(mode), "--mode")
+    if connect:
+        _insert(config, "connect/endpoints", _json(list(connect)), "--connect")
+    if listen:
+        _insert(config, "listen/endpoints", _json(list(listen)), "--listen")
+    if not multicast:
+        _insert(config, "scouting/multicast/enabled", "false", "--no-multicast-scouting")
+    for setting in settings:
+        key, colon, value = setting.partition(":")
+        if not colon:
+            raise InvalidInputError(f"KEY:VALUE is needed, got {setting!r}", field="--cfg")
+        _insert(config, key, value, "--cfg")
+    return config
+
+
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Open a session.
+
+    Raises
+    ------
+    NoServiceError
+        If zenoh cannot: nobody to connect to, or an address that is taken.
+    """
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise NoServiceError(f"no zenoh session: {_first_line(error)}") from None
+
+
+def listening(config: zenoh.Config) -> list[str]:
+    """Return the endpoints on which a session of a configuration listens."""
+    endpoints = msgspec.json.decode(config.get_json("listen/endpoints"))
+    if isinstance(endpoints, dict):
+        mode = msgspec.json.decode(config.get_json("mode"))
+        endpoints = endpoints.get(mode or MODES[0], [])
+    return [str(endpoint) for endpoint in endpoints]
+
+
+def start_zenoh_log() -> None:
+    """Let zenoh say its errors, or what ``RUST_LOG`` asks for, on standard error.
+
+    It writes to the process's standard output, which is for results: so that becomes another name
+    of standard error, and only Python goes on writing to the real one.
+    """
+    sys.stdout.flush()
+    results = os.dup(STANDARD_OUTPUT)
+    os.dup2(STANDARD_ERROR, STANDARD_OUTPUT)
+    sys.stdout = os.fdopen(results, "w", encoding=sys.stdout.encoding)
+    zenoh.init_log_from_env_or("error")
+
+
+def _read(file: Path | None) -> zenoh.Config:
+    try:
+        if file is not None:
+            return zenoh.Config.from_file(file)
+        if "ZENOH_CONFIG" in os.environ:
+            return zenoh.Config.from_env()
+    except zenoh.ZError as error:
+        field = "--config" if file is not None else "ZENOH_CONFIG"
+        raise InvalidInputError(_first_line(error), field=field) from None
+    return zenoh.Config()
+
+
+def _insert(config: zenoh.Config, key: str, value: str, flag: str) -> None:
+    try:
+        config.insert_json5(key, value)
+    except zenoh.ZError as error:
+        raise InvalidInputError(f"{key}: {_first_line(error)}", field=flag) from None
+
+
+def _json(value: object) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def _first_line(error: Exception) -> str:
+    """Return zenoh's complaint without where in its source it was made."""
+    return str(error).partition(" at /")[0].partition("\n")[0].strip()
+
+
+def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a click command zenoh's flags, and pass it their ``config``."""
+
+    @click.option("-m", "--mode", type=click.Choice(MODES), help="Zenoh session mode.")
+    @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
+    @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
+    @click.option(
+        "-c", "--config", "file", type=click.Path(path_type=Path), help="Zenoh JSON5 configuration."
+    )
+    @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
+    @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
+    @wraps(command)
+    def with_config(
+        mode: str | None,
+        connect: tuple[str, ...],
+        listen: tuple[str, ...],
+        file: Path | None,
+        settings: tuple[str, ...],
+        no_multicast_scouting: bool,
+        **rest: Any,
+    ) -> Any:
+        config = zenoh_config(
+            mode=mode,
+            connect=connect,
+            listen=listen,
+            file=file,
+            settings=settings,
+            multicast=not no_multicast_scouting,
+        )
+        return command(config=config, **rest)
+
+    return with_config

@@ -1,0 +1,63 @@
+"""What can go wrong between a caller and the service."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from hand_models.base import CruxError, InvalidInputError
+
+__all__ = [
+    "REQUEST_KINDS",
+    "UNREACHABLE",
+    "LostError",
+    "MalformedError",
+    "NoServiceError",
+    "ServiceError",
+    "ServiceTimeout",
+]
+
+UNREACHABLE: Final = "unreachable"
+"""Kind of error where limbs do not reach their holds."""
+
+REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", UNREACHABLE})
+"""Kinds of error that are the request's fault, so that asking again is of no use."""
+
+
+class MalformedError(InvalidInputError):
+    """Bytes that are not the encoding they claim to be, or too many of them."""
+
+    kind = "malformed"
+
+
+class ServiceError(CruxError):
+    """The service's own error reply.
+
+    Parameters
+    ----------
+    kind : str
+        As in the reply.
+    message : str
+    field : str, optional
+    """
+
+    def __init__(self, kind: str, message: str, *, field: str | None = None) -> None:
+        super().__init__(message, field=field)
+        self.kind = kind
+
+
+class LostError(CruxError):
+    """A request of many that no process lived to answer."""
+
+    kind = "lost"
+
+
+class NoServiceError(CruxError):
+    """Nobody answered: no service, or one that died with the question in its hands."""
+
+    kind = "no_service"
+
+
+class ServiceTimeout(CruxError):  # noqa: N818 - a timeout says what it is
+    """The service took the question but did not answer in time."""
+
+    kind = "timeout"

@@ -1,0 +1,50 @@
+"""The JSON Schema of every message."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from hand_models.parameters import Quantity
+from service.replies import (
+    BodySpaceReply,
+    ErrorReply,
+    PlanReply,
+    SetPointsReply,
+    SetPointsRequest,
+    StreamReply,
+    StreamRequest,
+    WrenchSpaceReply,
+)
+from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
+
+__all__ = ["MESSAGES", "schema"]
+
+MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
+    PlanRequest,
+    PlanReply,
+    WrenchSpaceRequest,
+    WrenchSpaceReply,
+    BodySpaceRequest,
+    BodySpaceReply,
+    StreamRequest,
+    StreamReply,
+    SetPointsRequest,
+    SetPointsReply,
+    RouteRequest,
+    ErrorReply,
+)
+
+
+def schema() -> dict[str, Any]:
+    """Return one schema whose ``$defs`` hold every message; a valid document is one of them."""
+    wholes, parts = msgspec.json.schema_components(
+        (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
+    )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Messages of crux, version 1",
+        "anyOf": list(wholes[: len(MESSAGES)]),
+        "$defs": parts,
+    }
