@@ -1,23 +1,27 @@
-from .base import CruxError as CruxError
-from .base import EmptySetError as EmptySetError
-from .base import InvalidInputError as InvalidInputError
-from .base import Pose as Pose
-from .compliance import CompliantHand as CompliantHand
-from .compliance import FloatingWrist as FloatingWrist
-from .fixed_wrist import tension_limits as tension_limits
-from .fixed_wrist import wrench_space as wrench_space
-from .hand import FINGERS as FINGERS
-from .hand import Grasp as Grasp
-from .hand import SettledHand as SettledHand
-from .hand import SpinyHand as SpinyHand
-from .hand import spiny_hand as spiny_hand
-from .rock import Cylinder as Cylinder
-from .rock import Edge as Edge
-from .rock import Ellipsoid as Ellipsoid
-from .rock import Hold as Hold
-from .rock import Mesh as Mesh
-from .rock import Plane as Plane
-from .rock import Profile as Profile
-from .rock import Sphere as Sphere
+from .base import (
+    CruxError as CruxError,
+    EmptySetError as EmptySetError,
+    InvalidInputError as InvalidInputError,
+    Pose as Pose,
+)
+from .compliance import CompliantHand as CompliantHand, FloatingWrist as FloatingWrist
+from .fixed_wrist import tension_limits as tension_limits, wrench_space as wrench_space
+from .hand import (
+    FINGERS as FINGERS,
+    Grasp as Grasp,
+    SettledHand as SettledHand,
+    SpinyHand as SpinyHand,
+    spiny_hand as spiny_hand,
+)
+from .rock import (
+    Cylinder as Cylinder,
+    Edge as Edge,
+    Ellipsoid as Ellipsoid,
+    Hold as Hold,
+    Mesh as Mesh,
+    Plane as Plane,
+    Profile as Profile,
+    Sphere as Sphere,
+)
 from .tile import Surface as Surface
 from .wrench_spaces import WrenchSpace as WrenchSpace

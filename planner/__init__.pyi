@@ -1,10 +1,11 @@
 from .prepare import hand_space as hand_space
-from .question import HandOnHold as HandOnHold
-from .question import Limits as Limits
-from .question import Load as Load
-from .question import Question as Question
-from .question import Stance as Stance
+from .question import (
+    HandOnHold as HandOnHold,
+    Limits as Limits,
+    Load as Load,
+    Question as Question,
+    Stance as Stance,
+)
 from .result import Plan as Plan
-from .solving import KnownStance as KnownStance
-from .solving import plan as plan
+from .solving import KnownStance as KnownStance, plan as plan
 from .streaming import WrenchStream as WrenchStream

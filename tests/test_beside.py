@@ -12,8 +12,7 @@ import pytest
 from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
-from planner.deadline import Beside
-from planner.deadline import overlap as beside
+from planner.deadline import Beside, overlap as beside
 from planner.programs import program
 from planner.solving import KnownStance, solve
 

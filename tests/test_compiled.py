@@ -13,8 +13,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from patience import PATIENCE
 from stances import PLACES, ask, on_wall, program_data
 

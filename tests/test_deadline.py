@@ -24,8 +24,7 @@ from test_service import Served, client_config, free_endpoint, plan_request
 
 from hand_models.base import InvalidInputError
 from hand_models.rock import Plane
-from planner.deadline import Budget, DeadlineError
-from planner.deadline import clock as deadline
+from planner.deadline import Budget, DeadlineError, clock as deadline
 from planner.explanation import certificate as certificates
 from planner.explanation.infeasibility import vertex
 from planner.floating import continuation
@@ -33,9 +32,13 @@ from planner.programs import WRENCH_UNIT, program
 from planner.question import Limits, Question
 from planner.result import Plan
 from planner.robots import pose_search
-from planner.solving import dual_bounds, plan, solve
-from planner.solving import prepared_stance as grounds
-from planner.solving import unique_plan as least_utilisation
+from planner.solving import (
+    dual_bounds,
+    plan,
+    prepared_stance as grounds,
+    solve,
+    unique_plan as least_utilisation,
+)
 from service.answering import dispatch, questions
 from service.commands.cli import run
 from service.commands.stances import read_request

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from asked import wall_request
 from hands import HAND, ROCK
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hand_models import Cylinder, Ellipsoid, Grasp, InvalidInputError, Sphere
 from service.answering import dispatch

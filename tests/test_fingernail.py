@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from asked import HEAVY, JSON, MSGPACK, at, put, wall_request
 from hands import HAND, ROCK, changed_hand, pinch, without_hand_load
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 from stances import PALM_TO_WALL
 

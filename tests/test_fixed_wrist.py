@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at, without_hand_load
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, SpinyHand
 from hand_models.parameters import ParameterTable, Quantity, hand_table
+from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import space as wrench_space
 
 seeds = st.integers(0, 2**32 - 1)
@@ -35,7 +35,7 @@ def without_structure(space):
 def interval(settled, i, surface):
     """Least and largest tension of a finger, from its tiles' own limits one by one."""
     least, most = 0.0, HAND.maximum_tension
-    pieces = surface.pieces()
+    pieces = inner_half_planes(surface)
     for t in own_tiles(settled, i):
         (t0, t1), (n0, n1) = settled.loads[t]
         least = max(least, -t0 / t1)
@@ -142,7 +142,7 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
             shear, normal, side = loads[finger, phalanx]
             expected = max(
                 (p.a_shear * shear + p.a_normal * normal + p.a_lateral * abs(side)) / p.capacity
-                for p in settled.surface.pieces()
+                for p in inner_half_planes(settled.surface)
                 if p.limit == limit
             )
         assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
@@ -178,7 +178,7 @@ def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_she
     # at 37 N: share/3 of Y beside (T, N) on each tile, on the tightest of its half-planes
     reach = min(
         3.0 * (p.capacity - p.a_shear * T - p.a_normal * N) / p.a_lateral
-        for p in ROCK.pieces()
+        for p in inner_half_planes(ROCK)
         for T, N in (tile_load(settled, t, 37.0) for t in own_tiles(settled, i))
     )
     y = np.zeros(len(space.columns))

@@ -23,8 +23,7 @@ from planner.result import Plan
 from planner.solving import plan
 from service.answering.own_robot import ROBOTS
 from service.answering.questions import question
-from service.commands import cli as command
-from service.commands import terminal as screens
+from service.commands import cli as command, terminal as screens
 from service.commands.stances import read_request
 from service.requests import PlanRequest
 

@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from stances import ask, moved, on_wall, random_stance
 
 from hand_models.base import Pose, wrench_transport, wrench_transports

@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 from hands import HAND, PINCH, ROCK, pinch, settled_at
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import in_hand
 
 from hand_models import (

@@ -2,8 +2,7 @@
 
 import numpy as np
 from hands import HAND, pinch, settled_at
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hand_models import FINGERS
 from hand_models.wrench_spaces import space as wrench_space

@@ -7,8 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from hands import HAND
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import (

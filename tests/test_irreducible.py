@@ -7,8 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from barred import barred, explained, few_and_all, have_loads
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
 from planner.explanation.infeasibility import HELD_WRENCH, System

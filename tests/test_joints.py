@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from jointed import at_joints, random_jointed_question, two_link_robot
 from robots import TWO_LINK, limbs_toml
 from scipy.spatial.transform import Rotation

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from hands import HAND, ROCK
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import cylinder_mesh, distance, random_axes, random_mesh, random_profile
 from scipy.spatial.transform import Rotation
 

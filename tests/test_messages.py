@@ -30,8 +30,7 @@ from asked import (
     spoil,
     wall_request,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from jsonschema import Draft202012Validator
 from rocks import cylinder_mesh
 

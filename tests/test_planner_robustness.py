@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import peer
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from stances import PLACES, ask, moved, on_wall, random_question
 
 from hand_models.base import CruxError, InvalidInputError, Pose

@@ -5,8 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from scipy.linalg import block_diag
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection

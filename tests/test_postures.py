@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from fingers import random_section, torques
 from hands import HAND, ROCK, changed_hand, random_surface
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Edge, Ellipsoid, Sphere
-from hand_models.finger import Closing, close_all
-from hand_models.finger import settle as settle_one
+from hand_models.finger import Closing, close_all, settle as settle_one
 from hand_models.finger.contact_states import close
 from hand_models.finger.limit_postures import PATTERNS, at_limits
 from hand_models.finger.posture_loads import Tendons, left_torque, loads

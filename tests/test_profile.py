@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 from hands import HAND, ROCK
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from rocks import distance, random_axes, random_profile
 from scipy.optimize import lsq_linear
 

@@ -10,6 +10,7 @@ from stances import ask, on_wall, random_stance
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Edge
+from hand_models.tile import inner_half_planes
 from planner.prepare import KEPT, Same, gather, settle, stacked
 from planner.result import Carried, Reader
 
@@ -93,7 +94,7 @@ def test_every_number_is_that_of_its_definition(stance):
                 t = next(tiles)
                 shear, normal = hand.loads[t] @ [1.0, tension]
                 lateral = load.get(f"{name}/lateral", 0.0) / holding if hand.touching[t] else 0.0
-                planes = place.surface.pieces()
+                planes = inner_half_planes(place.surface)
                 if hand.nails[t]:
                     shear, planes = load[f"{name}/nail"], hand.nail_limits(t)
                 if tile.phalanx != "nail":

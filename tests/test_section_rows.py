@@ -5,8 +5,7 @@ import math
 import numpy as np
 from fingers import random_section
 from hands import HAND
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import distance, random_axes, random_ellipsoid
 
 from hand_models import Edge

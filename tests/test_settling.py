@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from fingers import torques
 from hands import HAND, PINCH, ROCK
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold, random_mesh, random_profile
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface

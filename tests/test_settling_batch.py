@@ -10,8 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from hands import HAND, PINCH, ROCK, changed_hand
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import random_axes, random_ellipsoid, random_hold, random_mesh, random_profile
 from stances import on_wall
 

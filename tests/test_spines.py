@@ -6,12 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hand_models import InvalidInputError, Surface
-from hand_models.tile import bounds_gap, surface_names
-from hand_models.tile import reach as reach_of
+from hand_models.tile import (
+    bounds_gap,
+    inner_half_planes,
+    outer_half_planes,
+    reach as reach_of,
+    surface_names,
+)
 
 DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
 """Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""
@@ -35,8 +39,8 @@ def law(surface, angles):
 def reach(surface, angles):
     """How far the half-planes let a force without lateral load go in each direction [N]."""
     shear, normal = np.cos(angles), -np.sin(angles)
-    slopes = np.array([p.a_shear * shear + p.a_normal * normal for p in surface.pieces()])
-    capacities = np.array([p.capacity for p in surface.pieces()])[:, None]
+    slopes = np.array([p.a_shear * shear + p.a_normal * normal for p in inner_half_planes(surface)])
+    capacities = np.array([p.capacity for p in inner_half_planes(surface)])[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(slopes > 1e-15, capacities / slopes, np.inf).min(axis=0)
 
@@ -151,7 +155,7 @@ def test_one_half_plane_more_is_needed_only_where_the_last_leaves_the_curve(surf
     """Pure pull-off is capped at f_min: by the last chord, or by one more that closes it off."""
     pull = reach(surface, np.array([math.pi / 2]))[0]
     assert pull <= surface.pull_off_limit * (1.0 + 1e-9)
-    pieces = [p for p in surface.pieces() if p.limit == "pull_off"]
+    pieces = [p for p in inner_half_planes(surface) if p.limit == "pull_off"]
     assert len(pieces) in (surface.half_planes, surface.half_planes + 1)
     last_alone = [p.capacity / -p.a_normal for p in pieces[: surface.half_planes]]
     closes = min(last_alone) > surface.pull_off_limit * (1.0 + 1e-9)
@@ -162,7 +166,7 @@ def test_one_half_plane_more_is_needed_only_where_the_last_leaves_the_curve(surf
 def test_the_closing_chord_by_hand():
     """f_max = f_min = 10 N, φ_max = 45°: the curve is a circle; one chord alone leaves it."""
     surface = Surface(10.0, 10.0, math.pi / 4, 5.0, 0.0)
-    shear, first, closing = surface.pieces()
+    shear, first, closing = inner_half_planes(surface)
     assert shear.limit == "shear"
     assert (first.limit, closing.limit) == ("pull_off", "pull_off")
     assert first.a_shear / -first.a_normal == pytest.approx(
@@ -173,7 +177,7 @@ def test_the_closing_chord_by_hand():
 
 def test_one_half_plane_is_the_papers_straight_line():
     """T + 4 P = T_max through (T_max, 0): the fit to the extents of Fig. 13."""
-    _, line = Surface.named("sandpaper-36").pieces()
+    _, line = inner_half_planes(Surface.named("sandpaper-36"))
     assert -line.a_normal / line.a_shear == pytest.approx(4.0, rel=1e-9)
     assert line.capacity / line.a_shear == pytest.approx(21.0)
     assert math.hypot(line.a_shear, line.a_normal) == pytest.approx(1.0)
@@ -215,8 +219,8 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
     surface = replace(Surface.named(name), half_planes=count)
     directions = random_directions(100_000)
     exact = boat(surface, directions)
-    assert (reach_of(surface.pieces(), directions) <= exact).all()
-    assert (reach_of(surface.outer_pieces(), directions) >= exact).all()
+    assert (reach_of(inner_half_planes(surface), directions) <= exact).all()
+    assert (reach_of(outer_half_planes(surface), directions) >= exact).all()
 
 
 @settings(max_examples=150, deadline=None)
@@ -224,8 +228,8 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
-    assert (reach_of(surface.pieces(), directions) <= exact * (1.0 + 1e-9)).all()
-    assert (reach_of(surface.outer_pieces(), directions) >= exact * (1.0 - 1e-9)).all()
+    assert (reach_of(inner_half_planes(surface), directions) <= exact * (1.0 + 1e-9)).all()
+    assert (reach_of(outer_half_planes(surface), directions) >= exact * (1.0 - 1e-9)).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -235,10 +239,10 @@ def test_no_bound_could_be_nearer_to_the_surface(surface):
     directions = np.concatenate([random_directions(4000), edge_directions(surface)])
     directions = directions[(directions[:, 1] <= 0.0) & (np.abs(directions[:, 2]) > 1e-3)]
     points = boat(surface, directions)[:, None] * np.abs(directions)
-    for piece in surface.outer_pieces():
+    for piece in outer_half_planes(surface):
         loads = points @ [piece.a_shear, -piece.a_normal, piece.a_lateral]
         assert loads.max() >= piece.capacity * 0.97
-    inner = reach_of(surface.pieces(), directions)
+    inner = reach_of(inner_half_planes(surface), directions)
     slack = inner / np.linalg.norm(points, axis=1)
     assert slack.max() >= 0.97
 
@@ -271,7 +275,9 @@ def test_what_one_straight_line_costs_sideways():
     """Straight sideways, rock holds 0.87 of its shear; convex pieces keep 0.23 to 0.87 of it."""
     rock = Surface.named("rock")
     sideways = np.array([[0.0, 0.0, 1.0]])
-    reaches = [reach_of(replace(rock, half_planes=k).pieces(), sideways)[0] for k in (1, 2, 4, 8)]
+    reaches = [
+        reach_of(inner_half_planes(replace(rock, half_planes=k)), sideways)[0] for k in (1, 2, 4, 8)
+    ]
     assert np.array(reaches) / 63.0 == pytest.approx([0.227, 0.363, 0.843, 0.866], abs=2e-3)
     assert rock.strength(0.0, math.pi / 2) == pytest.approx(rock.lateral_limit)
 
@@ -279,12 +285,12 @@ def test_what_one_straight_line_costs_sideways():
 @settings(max_examples=50, deadline=None)
 @given(surfaces())
 def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
-    for piece in surface.pieces():
+    for piece in inner_half_planes(surface):
         assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)
 
 
 def test_pressing_raises_the_shear_limit_by_the_compression_gain():
-    (shear, *_) = replace(Surface.named("rock"), compression_gain=0.2).pieces()
+    (shear, *_) = inner_half_planes(replace(Surface.named("rock"), compression_gain=0.2))
     assert shear.capacity - shear.a_normal * 100.0 == pytest.approx(63.0 + 0.2 * 100.0)
 
 
@@ -351,7 +357,7 @@ def test_impossible_surfaces_are_refused_by_field(values, field):
 @pytest.mark.parametrize("count", [2, 2.0, 64])
 def test_a_whole_number_of_half_planes_is_used(count):
     surface = Surface.from_values({"shear_limit": 60.0, "half_planes": count})
-    assert len([p for p in surface.pieces() if p.limit == "pull_off"]) >= count
+    assert len([p for p in inner_half_planes(surface) if p.limit == "pull_off"]) >= count
 
 
 def test_more_strength_under_pressing_never_costs_strength_under_pull_off():

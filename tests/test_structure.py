@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hands import changed_hand, settled_at
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models import InvalidInputError

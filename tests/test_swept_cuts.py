@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere

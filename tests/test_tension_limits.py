@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 from hands import HAND, ROCK, pinch, settled_at
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from hand_models import FINGERS, Cylinder, Pose, Surface, tension_limits
 from hand_models.wrench_spaces import space as wrench_space

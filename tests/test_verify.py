@@ -19,9 +19,7 @@ from hand_models.rock import Cylinder
 from planner.prepare import settle
 from planner.result import Carried, Plan
 from planner.solving import plan
-from planner.verification import check as verify
-from planner.verification import problems
-from planner.verification import recomputation as recomputing
+from planner.verification import check as verify, problems, recomputation as recomputing
 from planner.verification.equilibrium import equilibrium
 from planner.verification.limit_surface import LimitCurves
 

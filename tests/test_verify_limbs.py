@@ -13,8 +13,7 @@ from planner.prepare import Posture, posture, settle
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
-from planner.verification import limbs as verify_limbs
-from planner.verification import problems
+from planner.verification import limbs as verify_limbs, problems
 
 LIMB = "rear_left"
 INDEX = 2

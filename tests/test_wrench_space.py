@@ -10,8 +10,7 @@ from hands import HAND, ROCK, pinch, settled_at, without_hand_load
 from scipy.optimize import linprog
 
 from hand_models import Cylinder, EmptySetError, Grasp, Plane
-from hand_models.wrench_spaces import SCALE
-from hand_models.wrench_spaces import space as wrench_space
+from hand_models.wrench_spaces import SCALE, space as wrench_space
 
 EXACT = {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9}
 SEEDS = range(240)

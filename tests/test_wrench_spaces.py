@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 from hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import (
     FINGERS,
@@ -30,6 +29,7 @@ from hand_models import (
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.fixed_wrist.space import KEPT
 from hand_models.hand import HELD
+from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import space as wrench_space
 
 Row = tuple[dict[str, float], float, float]
@@ -87,7 +87,7 @@ class ByHand:
             self.columns.setdefault(lateral, np.zeros(6))
             self.columns[lateral] += wrench_of(place, share * axes[2])
         pulls = 0
-        for piece in settled.surface.pieces():
+        for piece in inner_half_planes(settled.surface):
             pulls += piece.limit == "pull_off"
             name = f"{finger}/{phalanx}/{piece.limit}" + (f"_{pulls}" if pulls > 1 else "")
             row = {tension: piece.a_shear * more_shear + piece.a_normal * more_normal}

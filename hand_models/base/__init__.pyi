@@ -1,14 +1,18 @@
-from .errors import CruxError as CruxError
-from .errors import EmptySetError as EmptySetError
-from .errors import InvalidInputError as InvalidInputError
-from .errors import SolverError as SolverError
-from .errors import UnsupportedError as UnsupportedError
-from .frames import SKEW as SKEW
-from .frames import Array as Array
-from .frames import Indices as Indices
-from .frames import Pose as Pose
-from .frames import finite_vector as finite_vector
-from .frames import skew as skew
-from .frames import wrench_transport as wrench_transport
-from .frames import wrench_transports as wrench_transports
+from .errors import (
+    CruxError as CruxError,
+    EmptySetError as EmptySetError,
+    InvalidInputError as InvalidInputError,
+    SolverError as SolverError,
+    UnsupportedError as UnsupportedError,
+)
+from .frames import (
+    SKEW as SKEW,
+    Array as Array,
+    Indices as Indices,
+    Pose as Pose,
+    finite_vector as finite_vector,
+    skew as skew,
+    wrench_transport as wrench_transport,
+    wrench_transports as wrench_transports,
+)
 from .recent import Recent as Recent

@@ -1,26 +1,31 @@
-from .compliant_finger import STEP as STEP
-from .compliant_finger import FingerLoads as FingerLoads
+from .compliant_finger import STEP as STEP, FingerLoads as FingerLoads
 from .compliant_hand import CompliantHand as CompliantHand
-from .directional_limit import Farthest as Farthest
-from .directional_limit import farthest as farthest
-from .directional_limit import linear_extreme as linear_extreme
-from .directional_limit import pose_units as pose_units
-from .floating_wrist import PALM_MODES as PALM_MODES
-from .floating_wrist import WRIST as WRIST
-from .floating_wrist import FloatingWrist as FloatingWrist
-from .floating_wrist import PalmMode as PalmMode
-from .grid_search import PLANAR as PLANAR
-from .grid_search import WristSearch as WristSearch
-from .grid_search import boundary as boundary
-from .grid_search import search as search
-from .gripper import SIDES as SIDES
-from .gripper import Gripper as Gripper
-from .gripper import gripper_table as gripper_table
-from .gripper import pulled_off as pulled_off
-from .gripper import sandpaper as sandpaper
-from .inverse import WristPose as WristPose
-from .inverse import wrist_pose as wrist_pose
+from .directional_limit import (
+    Farthest as Farthest,
+    farthest as farthest,
+    linear_extreme as linear_extreme,
+    pose_units as pose_units,
+)
+from .floating_wrist import (
+    PALM_MODES as PALM_MODES,
+    WRIST as WRIST,
+    FloatingWrist as FloatingWrist,
+    PalmMode as PalmMode,
+)
+from .grid_search import (
+    PLANAR as PLANAR,
+    WristSearch as WristSearch,
+    boundary as boundary,
+    search as search,
+)
+from .gripper import (
+    SIDES as SIDES,
+    Gripper as Gripper,
+    gripper_table as gripper_table,
+    pulled_off as pulled_off,
+    sandpaper as sandpaper,
+)
+from .inverse import WristPose as WristPose, wrist_pose as wrist_pose
 from .linear_pieces import pieces as pieces
-from .pose_box import linear_box as linear_box
-from .pose_box import search_box as search_box
+from .pose_box import linear_box as linear_box, search_box as search_box
 from .rolling import Numbers as Numbers

@@ -26,6 +26,7 @@ from hand_models.compliance.grasp import Evaluation, Verdict, range_rows
 from hand_models.compliance.rolling import Numbers
 from hand_models.fixed_wrist import KEPT, RowLayout, layout_of
 from hand_models.hand import FINGERS, HELD
+from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = ["PALM_MODES", "WRIST", "FloatingWrist", "PalmMode"]
@@ -76,7 +77,7 @@ class FloatingWrist:
     @cached_property
     def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
         """Of `RowLayout.planes`."""
-        return self.layout.planes(self.hand.settled.surface.pieces())
+        return self.layout.planes(inner_half_planes(self.hand.settled.surface))
 
     @property
     def limits(self) -> tuple[Row, ...]:

@@ -24,7 +24,7 @@ from hand_models.fixed_wrist import named_row
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
 from hand_models.sections import RoundSection
 from hand_models.tendon import FingerTendon, MotorScheme
-from hand_models.tile import Surface
+from hand_models.tile import Surface, inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = ["PLANE", "SIDES", "Gripper", "gripper_table"]
@@ -155,7 +155,7 @@ class Gripper:
             tendon.closed(tension, shears),
             scheme,
         )
-        self._pieces = self.surface.pieces()
+        self._pieces = inner_half_planes(self.surface)
 
     @property
     def limits(self) -> tuple[Row, ...]:

@@ -1,38 +1,53 @@
-from .force_limits import PARAMETER_STUDIES as PARAMETER_STUDIES
-from .force_limits import HullPoints as HullPoints
-from .force_limits import Limit as Limit
-from .force_limits import Measure as Measure
-from .force_limits import limit as limit
-from .force_limits import rest_state as rest_state
-from .force_limits import sharpened as sharpened
+from .force_limits import (
+    PARAMETER_STUDIES as PARAMETER_STUDIES,
+    HullPoints as HullPoints,
+    Limit as Limit,
+    Measure as Measure,
+    limit as limit,
+    rest_state as rest_state,
+    sharpened as sharpened,
+)
 from .hard_stop import PalmExperiment as PalmExperiment
-from .pulling import BALANCED as BALANCED
-from .pulling import DRAGGED as DRAGGED
-from .pulling import UNBALANCED as UNBALANCED
-from .pulling import Pulled as Pulled
-from .pulling import even_pulls as even_pulls
-from .pulling import pull as pull
-from .pulling import unloaded as unloaded
-from .pulling import wrist_poses as wrist_poses
-from .sweep import Cell as Cell
-from .sweep import Sweep as Sweep
-from .sweep import failing as failing
-from .sweep import map_data as map_data
-from .sweep import radius_axes as radius_axes
-from .sweep import sweep_cell as sweep_cell
-from .sweep import sweep_grid as sweep_grid
-from .sweep_axis import Axis as Axis
-from .sweep_axis import Conditions as Conditions
-from .sweep_picture import conditions_title as conditions_title
-from .sweep_picture import draw_map as draw_map
-from .sweep_picture import legend as legend
-from .wrench_hull import UNITS as UNITS
-from .wrench_hull import Extents as Extents
-from .wrench_hull import cut as cut
-from .wrench_hull import extents as extents
-from .wrench_hull import in_paper_signs as in_paper_signs
-from .wrench_hull import label_solid as label_solid
-from .wrench_hull import reach as reach
-from .wrench_hull import section as section
-from .wrench_hull import vertices as vertices
-from .wrench_hull import volume as volume
+from .pulling import (
+    BALANCED as BALANCED,
+    DRAGGED as DRAGGED,
+    UNBALANCED as UNBALANCED,
+    Pulled as Pulled,
+    even_pulls as even_pulls,
+    pull as pull,
+    unloaded as unloaded,
+    wrist_poses as wrist_poses,
+)
+from .study_result import (
+    Claim as Claim,
+    Progress as Progress,
+    StudyResult as StudyResult,
+    save_picture as save_picture,
+)
+from .sweep import (
+    Cell as Cell,
+    Sweep as Sweep,
+    failing as failing,
+    map_data as map_data,
+    radius_axes as radius_axes,
+    sweep_cell as sweep_cell,
+    sweep_grid as sweep_grid,
+)
+from .sweep_axis import Axis as Axis, Conditions as Conditions
+from .sweep_picture import (
+    conditions_title as conditions_title,
+    draw_map as draw_map,
+    legend as legend,
+)
+from .wrench_hull import (
+    UNITS as UNITS,
+    Extents as Extents,
+    cut as cut,
+    extents as extents,
+    in_paper_signs as in_paper_signs,
+    label_solid as label_solid,
+    reach as reach,
+    section as section,
+    vertices as vertices,
+    volume as volume,
+)

@@ -1,21 +1,23 @@
-from .closure import intrusion as intrusion
-from .closure import settle as settle
-from .closure_loads import LaidLoads as LaidLoads
-from .closure_loads import TendonLoads as TendonLoads
-from .closure_loads import stays as stays
-from .contact_states import ClosedFinger as ClosedFinger
-from .contact_states import Closing as Closing
-from .contact_states import cling as cling
-from .contact_states import close_all as close_all
+from .closure import intrusion as intrusion, settle as settle
+from .closure_loads import LaidLoads as LaidLoads, TendonLoads as TendonLoads, stays as stays
+from .contact_states import (
+    ClosedFinger as ClosedFinger,
+    Closing as Closing,
+    cling as cling,
+    close_all as close_all,
+)
 from .fingernail import Fingernail as Fingernail
-from .model import PHALANGES as PHALANGES
-from .model import Contact as Contact
-from .model import FingerModel as FingerModel
-from .model import SettledFinger as SettledFinger
-from .postures import FREE as FREE
-from .postures import STOPS as STOPS
-from .sequential_closure import FACE as FACE
-from .sequential_closure import KINDS as KINDS
-from .sequential_closure import NONE as NONE
-from .sequential_closure import Laid as Laid
-from .sequential_closure import Layer as Layer
+from .model import (
+    PHALANGES as PHALANGES,
+    Contact as Contact,
+    FingerModel as FingerModel,
+    SettledFinger as SettledFinger,
+)
+from .postures import FREE as FREE, STOPS as STOPS
+from .sequential_closure import (
+    FACE as FACE,
+    KINDS as KINDS,
+    NONE as NONE,
+    Laid as Laid,
+    Layer as Layer,
+)

@@ -1,12 +1,12 @@
-from .row_layout import HAND_LOAD as HAND_LOAD
-from .row_layout import KEPT as KEPT
-from .row_layout import PALM_PRESSING as PALM_PRESSING
-from .row_layout import PALM_SHEAR as PALM_SHEAR
-from .row_layout import TENDON_TENSION as TENDON_TENSION
-from .row_layout import RowLayout as RowLayout
-from .row_layout import layout_of as layout_of
-from .row_layout import named_row as named_row
-from .space import wrench_space as wrench_space
-from .space import wrench_spaces as wrench_spaces
-from .tension_box import TensionLimit as TensionLimit
-from .tension_box import tension_limits as tension_limits
+from .row_layout import (
+    HAND_LOAD as HAND_LOAD,
+    KEPT as KEPT,
+    PALM_PRESSING as PALM_PRESSING,
+    PALM_SHEAR as PALM_SHEAR,
+    TENDON_TENSION as TENDON_TENSION,
+    RowLayout as RowLayout,
+    layout_of as layout_of,
+    named_row as named_row,
+)
+from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces
+from .tension_box import TensionLimit as TensionLimit, tension_limits as tension_limits

@@ -34,7 +34,7 @@ from hand_models.fixed_wrist.row_entries import (
     surface_sources,
 )
 from hand_models.fixed_wrist.row_layout import RowLayout
-from hand_models.hand import FINGERS, SpinyHand
+from hand_models.hand import FINGERS, HandModel
 from hand_models.tile import Surface
 
 __all__ = ["ManyEntries", "many_entries"]
@@ -79,7 +79,7 @@ class ManyEntries:
 @lru_cache(maxsize=KEPT)
 def many_entries(
     layouts: tuple[RowLayout, ...],
-    models: tuple[SpinyHand, ...],
+    models: tuple[HandModel, ...],
     surfaces: tuple[Surface, ...],
 ) -> ManyEntries:
     """Return where the numbers of hands come from, with these row layouts, on these surfaces."""

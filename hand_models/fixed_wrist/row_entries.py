@@ -18,8 +18,8 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist.row_layout import KEPT, RowLayout
-from hand_models.hand import FINGERS, HELD, SpinyHand
-from hand_models.tile import Surface
+from hand_models.hand import FINGERS, HELD, HandModel
+from hand_models.tile import Surface, inner_half_planes
 
 __all__ = [
     "GIVEN",
@@ -67,7 +67,7 @@ class SurfaceSources(NamedTuple):
 @lru_cache(maxsize=256)
 def surface_sources(surface: Surface) -> SurfaceSources:
     """Return what a surface gives the rows of the tiles on it."""
-    pieces = surface.pieces()
+    pieces = inner_half_planes(surface)
     lateral = np.array([piece.a_lateral for piece in pieces])
     shared = lateral / np.arange(1, TILES + 1)[:, None]
     return SurfaceSources(
@@ -77,11 +77,11 @@ def surface_sources(surface: Surface) -> SurfaceSources:
     )
 
 
-_kept: WeakKeyDictionary[SpinyHand, Array] = WeakKeyDictionary()
+_kept: WeakKeyDictionary[HandModel, Array] = WeakKeyDictionary()
 """Sources of hands that somebody still has."""
 
 
-def hand_sources(hand: SpinyHand) -> Array:
+def hand_sources(hand: HandModel) -> Array:
     """Return what is the same for every hold of a hand: constants, and strengths of its parts."""
     found = _kept.get(hand)
     if found is None:
@@ -89,7 +89,7 @@ def hand_sources(hand: SpinyHand) -> Array:
     return found
 
 
-def _hand_sources(hand: SpinyHand) -> Array:
+def _hand_sources(hand: HandModel) -> Array:
     drive, structure = hand.drive, hand.structure
     numbers = (
         *(0.0, 1.0, -1.0, drive.torque_per_newton, drive.current_per_newton, drive.no_load_current),

@@ -16,7 +16,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FINGERTIP_FORCE, HELD, NAIL, NAIL_SHEAR, SettledHand, Tile
-from hand_models.tile import HalfPlane, Surface
+from hand_models.tile import HalfPlane, Surface, inner_half_planes
 from hand_models.wrench_spaces import Row
 
 __all__ = [
@@ -141,7 +141,7 @@ def _layout_on(
     alike = tuple(
         tile if tile.contact != "edge" else tile._replace(contact="face") for tile in tiles
     )
-    names = tuple(piece.limit for piece in surface.pieces())
+    names = tuple(piece.limit for piece in inner_half_planes(surface))
     return row_layout(alike, lateral, names, stops, palm, sticking)
 
 

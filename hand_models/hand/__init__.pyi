@@ -1,14 +1,15 @@
 from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp
+from .model import HandModel as HandModel
+from .names import (
+    FINGERS as FINGERS,
+    FINGERTIP_FORCE as FINGERTIP_FORCE,
+    NAIL as NAIL,
+    NAIL_SHEAR as NAIL_SHEAR,
+)
 from .placement import Placement as Placement
 from .seating import Seating as Seating
-from .settled_hand import FINGERS as FINGERS
-from .settled_hand import FINGERTIP_FORCE as FINGERTIP_FORCE
-from .settled_hand import NAIL as NAIL
-from .settled_hand import NAIL_SHEAR as NAIL_SHEAR
-from .settled_hand import SettledHand as SettledHand
-from .settled_hand import Tile as Tile
-from .spinyhand import SpinyHand as SpinyHand
-from .spinyhand import spiny_hand as spiny_hand
+from .settled_hand import SettledHand as SettledHand, Tile as Tile
+from .spinyhand import SpinyHand as SpinyHand, spiny_hand as spiny_hand
 from .structure import HELD as HELD
 from .tightening import closing_sequence as closing_sequence

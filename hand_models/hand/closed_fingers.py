@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Hashable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -29,11 +29,10 @@ from hand_models.finger import (
     intrusion,
     stays,
 )
+from hand_models.hand.model import HandModel
+from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
-from hand_models.hand.settled_hand import FINGERS, HandPostures
-
-if TYPE_CHECKING:
-    from hand_models.hand.spinyhand import SpinyHand
+from hand_models.hand.settled_hand import HandPostures
 
 __all__ = ["ClosedFingers", "close_fingers"]
 
@@ -162,7 +161,7 @@ def close_fingers(
 
 
 def _row_laid(
-    hand: SpinyHand, placement: Placement, laid: list[Laid], tension: float, base_tile: bool
+    hand: HandModel, placement: Placement, laid: list[Laid], tension: float, base_tile: bool
 ) -> Row | None:
     """Return the numbers of a finger that can be left as it is laid."""
     if len(laid) < len(PHALANGES) or placement.grasp.fingernail:

@@ -6,18 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Pose
 from hand_models.finger import NONE, PHALANGES
-from hand_models.hand.settled_hand import FINGERS
+from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
 from hand_models.sections import Section
-
-if TYPE_CHECKING:
-    from hand_models.hand.spinyhand import SpinyHand
 
 __all__ = [
     "ALONG",
@@ -36,6 +33,7 @@ __all__ = [
     "FingerFrame",
     "FingerFrames",
     "FrameStack",
+    "Layout",
 ]
 
 OUTER: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
@@ -67,6 +65,33 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 """z of H."""
 
 UP.setflags(write=False)
+
+
+class Layout(NamedTuple):
+    """Where fingers and flat tiles are attached to the palm, in H [m].
+
+    Attributes
+    ----------
+    inner_joint : ndarray, shape (3,)
+        Proximal joint of the inner left finger; the right one's is its mirror image.
+    outer_axis : ndarray, shape (3,)
+        Where the outer left finger turns on its base; the right one's is its mirror image.
+    outer_reach : float
+        From there to the proximal joint.
+    base_tile_reach : float
+        From there to the base tile.
+    base_tile_surface : float
+        Height of the base tiles, z of H.
+    palm : ndarray, shape (t, 3)
+        The palm's tiles.
+    """
+
+    inner_joint: Array
+    outer_axis: Array
+    outer_reach: float
+    base_tile_reach: float
+    base_tile_surface: float
+    palm: Array
 
 
 @dataclass(frozen=True)
@@ -103,22 +128,22 @@ class FingerFrames:
     palm: Array
 
     @classmethod
-    def of(cls, hand: SpinyHand, outer_rotation: float) -> FingerFrames:
+    def of(cls, layout: Layout, outer_rotation: float) -> FingerFrames:
         """Return the frames of a hand whose outer fingers are turned outward by an angle [rad]."""
         fingers, bases = [], []
         for name in FINGERS:
             side = 1.0 if name.endswith("left") else -1.0
             mirror = np.array([1.0, side, 1.0])
             if name.startswith("inner"):
-                joint, along = hand.inner_joint * mirror, np.array([1.0, 0.0, 0.0])
+                joint, along = layout.inner_joint * mirror, np.array([1.0, 0.0, 0.0])
             else:
                 along = np.array([math.cos(outer_rotation), side * math.sin(outer_rotation), 0.0])
-                joint = hand.outer_axis * mirror + hand.outer_reach * along
-                place = joint + along * (hand.base_tile_reach - hand.outer_reach)
-                bases.append([place[0], place[1], hand.base_tile_surface])
+                joint = layout.outer_axis * mirror + layout.outer_reach * along
+                place = joint + along * (layout.base_tile_reach - layout.outer_reach)
+                bases.append([place[0], place[1], layout.base_tile_surface])
             across = np.array([-along[1], along[0], 0.0])
             fingers.append(FingerFrame(joint, along, across))
-        made = cls(tuple(fingers), np.array(bases), hand.palm_tiles)
+        made = cls(tuple(fingers), np.array(bases), layout.palm)
         for array in (made.bases, *(v for f in fingers for v in (f.joint, f.along, f.across))):
             array.setflags(write=False)
         return made

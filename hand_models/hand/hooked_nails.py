@@ -11,8 +11,8 @@ from hand_models.base import Array, InvalidInputError
 from hand_models.finger import NONE, Fingernail
 from hand_models.hand.closed_fingers import ClosedFingers
 from hand_models.hand.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
+from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import CONTACTS, FINGERS, NAIL
 
 __all__ = ["Nails", "hook_nails", "no_nails"]
 

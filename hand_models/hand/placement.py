@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Pose
 from hand_models.hand.finger_frames import ALONG, INTO, JOINTS, TILES
 from hand_models.hand.grasp import Grasp
+from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.sections import Plane, Section, Swept, entries
 from hand_models.tile import Surface
-
-if TYPE_CHECKING:
-    from hand_models.hand.spinyhand import SpinyHand
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
@@ -75,7 +73,7 @@ class PlacedHands:
 
     Parameters
     ----------
-    hand : SpinyHand
+    hand : HandModel
     placements : sequence of Placement, length n
     seatings : sequence of Seating, length n
         Where their holds are.
@@ -90,7 +88,7 @@ class PlacedHands:
 
     def __init__(
         self,
-        hand: SpinyHand,
+        hand: HandModel,
         placements: Sequence[Placement],
         seatings: Sequence[Seating],
         shapes: Sequence[Swept | None],

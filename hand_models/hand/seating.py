@@ -20,19 +20,17 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 
 from hand_models.base import Array, Pose
 from hand_models.finger import settle
+from hand_models.hand.grasp import Grasp
+from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
 from hand_models.sections import PolylineSection
-
-if TYPE_CHECKING:
-    from hand_models.hand.grasp import Grasp
-    from hand_models.hand.spinyhand import SpinyHand
 
 __all__ = ["CENTRED", "Seating", "propose", "seat", "seating_given", "touches_seat"]
 
@@ -92,12 +90,12 @@ CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
 CENTRED.pose.position.setflags(write=False)
 
 
-def seat(hand: SpinyHand, hold: Hold, grasp: Grasp) -> Seating:
+def seat(hand: HandModel, hold: Hold, grasp: Grasp) -> Seating:
     """Seat a hand on a hold that was given no place; see the module's text.
 
     Parameters
     ----------
-    hand : SpinyHand
+    hand : HandModel
     hold : Hold
     grasp : Grasp
     """
@@ -105,7 +103,7 @@ def seat(hand: SpinyHand, hold: Hold, grasp: Grasp) -> Seating:
     return seating if not meant or _holds(hand, hold, seating) else CENTRED
 
 
-def propose(hand: SpinyHand, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
+def propose(hand: HandModel, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
     """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
 
     If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
@@ -129,7 +127,7 @@ def propose(hand: SpinyHand, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
     return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
 
 
-def touches_seat(hand: SpinyHand, kind: str, along: float) -> bool:
+def touches_seat(hand: HandModel, kind: str, along: float) -> bool:
     """Whether an inner finger's proximal contact is where a seat meant it to be."""
     return kind == "face" and abs(along - hand.seated_contact) < PLACED
 
@@ -140,7 +138,7 @@ def _shifted(x: float, z: float) -> Pose:
     return Pose(position, LIKE_HAND)
 
 
-def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) -> Place | None:
+def _round(hand: HandModel, depth: float, radius: float, crest: float | None) -> Place | None:
     """Return (x, z) of a round hold's crest, whose x may be given and whose z is else zero."""
     x, _, z = hand.inner_place
     reach = (radius + hand.finger.tile_height) ** 2 + hand.seated_contact**2
@@ -151,7 +149,7 @@ def _round(hand: SpinyHand, depth: float, radius: float, crest: float | None) ->
     return None if run <= 0.0 else (x - math.sqrt(run), 0.0)
 
 
-def _smooth(hand: SpinyHand, hold: Hold, crest: float | None) -> Place | None:
+def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
     """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
     x, y, z = hand.inner_joint.tolist()
 
@@ -181,7 +179,7 @@ def _smooth(hand: SpinyHand, hold: Hold, crest: float | None) -> Place | None:
     return place(float(root))
 
 
-def _holds(hand: SpinyHand, hold: Hold, seating: Seating) -> bool:
+def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
     """Whether an inner finger's proximal tile does touch where seating meant it to."""
     hand_in_hold = seating.pose.inverse()
     section = hold.section(
@@ -199,7 +197,7 @@ def _holds(hand: SpinyHand, hold: Hold, seating: Seating) -> bool:
 class _Top:
     """How high the rock stands under a palm, on a few lines along it."""
 
-    def __init__(self, hand: SpinyHand, hold: Hold) -> None:
+    def __init__(self, hand: HandModel, hold: Hold) -> None:
         self._half = 0.5 * hand.palm_length
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
         sections = (
@@ -215,7 +213,7 @@ class _Top:
 
 
 def _on_outline(
-    hand: SpinyHand, section: PolylineSection, top: _Top, crest: float | None
+    hand: HandModel, section: PolylineSection, top: _Top, crest: float | None
 ) -> Seating:
     """Seat a hand on a hold whose section under ``inner_left`` is a polyline."""
     x, _, z = hand.inner_joint.tolist()

@@ -4,50 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
-from hand_models.finger import KINDS, STOPS, Contact, FingerModel, SettledFinger
+from hand_models.finger import STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
+from hand_models.hand.model import HandModel
+from hand_models.hand.names import CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
+from hand_models.wrench_spaces import WrenchSpace
 
-if TYPE_CHECKING:
-    from hand_models.hand.spinyhand import SpinyHand
-    from hand_models.wrench_spaces import WrenchSpace
-
-__all__ = [
-    "CONTACTS",
-    "FINGERS",
-    "FINGERTIP_FORCE",
-    "NAIL",
-    "NAIL_SHEAR",
-    "STOPS",
-    "HandPostures",
-    "Palm",
-    "SettledHand",
-    "Tile",
-]
-
-FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
-"""Order of every list of four tensions; left is +y of H."""
-
-NAIL: Final = "nail"
-"""The ultrashort phalanx at a fingertip, by name, and the contact of one that hooks."""
-
-NAIL_SHEAR: Final = "nail_shear"
-"""Name of the limit of a nail that pulls toward its finger's base."""
-
-FINGERTIP_FORCE: Final = "fingertip_force"
-"""Name of the limit of a distal phalanx, or a nail, that presses into the rock."""
-
-
-CONTACTS: Final = (*KINDS, NAIL)
-"""What of a tile touches the rock, by code."""
+__all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
 
 
 class HandPostures(NamedTuple):
@@ -132,7 +104,7 @@ class SettledHand:
 
     Attributes
     ----------
-    hand : SpinyHand
+    hand : HandModel
     hold : Hold
     grasp : Grasp
     surface : Surface
@@ -166,7 +138,7 @@ class SettledHand:
         What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
     """
 
-    hand: SpinyHand
+    hand: HandModel
     hold: Hold
     grasp: Grasp
     surface: Surface

@@ -8,7 +8,7 @@ their holds, the places and axes of their tiles. How each finger rests is found 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,16 +16,14 @@ from hand_models.base import InvalidInputError
 from hand_models.finger import KINDS, Laid
 from hand_models.hand.closed_fingers import close_fingers
 from hand_models.hand.finger_frames import BASES
-from hand_models.hand.hooked_nails import hook_nails
-from hand_models.hand.palms_on_rock import palms_on_rock
+from hand_models.hand.hooked_nails import hook_nails, no_nails
+from hand_models.hand.model import HandModel
+from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.seating import CENTRED, propose, seat, seating_given, touches_seat
-from hand_models.hand.settled_hand import FINGERS, SettledHand
-from hand_models.hand.tiles_on_rock import hand_tiles, tiles_on_rock
+from hand_models.hand.settled_hand import SettledHand
+from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_rock
 from hand_models.sections import Plane, cut_of
-
-if TYPE_CHECKING:
-    from hand_models.hand.spinyhand import SpinyHand
 
 __all__ = ["settle_hands"]
 
@@ -37,13 +35,13 @@ SEATED: Final = FINGERS.index("inner_left")
 
 
 def settle_hands(
-    hand: SpinyHand, placements: Sequence[Placement]
+    hand: HandModel, placements: Sequence[Placement]
 ) -> list[SettledHand | InvalidInputError]:
     """Close hands on their holds.
 
     Parameters
     ----------
-    hand : SpinyHand
+    hand : HandModel
         Which all of them are.
     placements : sequence of Placement
 
@@ -74,7 +72,7 @@ def settle_hands(
 
 @np.errstate(divide="ignore", invalid="ignore")
 def _settle(
-    hand: SpinyHand, placements: Sequence[Placement], tensions: list[float]
+    hand: HandModel, placements: Sequence[Placement], tensions: list[float]
 ) -> list[SettledHand | InvalidInputError]:
     placed, laid = _placed(hand, placements)
     errors = {
@@ -84,7 +82,7 @@ def _settle(
     }
     closed = close_fingers(placed, laid, tensions, errors)
     tiles = tiles_on_rock(placed, closed, tensions)
-    nails = [hand.no_nails] * len(placements)
+    nails = [no_nails(hand.nail)] * len(placements)
     for i, each in enumerate(placements):
         if each.grasp.fingernail and i not in errors:
             try:
@@ -122,7 +120,7 @@ def _settle(
     return outcomes
 
 
-def _in_palm(hand: SpinyHand, depth: float) -> InvalidInputError:
+def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
     return InvalidInputError(
         f"the hold stands {-1e3 * depth:.1f} mm inside the palm; "
         f"at most {1e3 * hand.spine_travel:g} mm (the spines' travel) is possible",
@@ -131,7 +129,7 @@ def _in_palm(hand: SpinyHand, depth: float) -> InvalidInputError:
 
 
 def _placed(
-    hand: SpinyHand, placements: Sequence[Placement]
+    hand: HandModel, placements: Sequence[Placement]
 ) -> tuple[PlacedHands, list[list[list[Laid]]]]:
     """Return hands at their holds, seated where these have no place, and their fingers laid."""
     shapes = [each.hold.swept for each in placements]
@@ -181,6 +179,6 @@ def _laid(placed: PlacedHands, known: Known) -> list[list[list[Laid]]]:
     return laid
 
 
-def _on_seat(hand: SpinyHand, laid: list[Laid]) -> bool:
+def _on_seat(hand: HandModel, laid: list[Laid]) -> bool:
     """Whether a finger's proximal contact is where a seat meant it to be."""
     return bool(laid) and touches_seat(hand, KINDS[laid[0].kind], laid[0].along)

@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.finger import PHALANGES
-from hand_models.hand.settled_hand import FINGERS, NAIL, SettledHand
+from hand_models.hand.names import FINGERS, NAIL
+from hand_models.hand.settled_hand import SettledHand
 
 __all__ = ["TILES", "Closing", "Stage", "closing_sequence"]
 

@@ -1,4 +1,7 @@
-"""Where the tiles of closed hands are in H, along which axes they load the rock, and with what."""
+"""Where the tiles of closed hands are in H, along which axes they load the rock, and with what.
+
+Of palms: which of their tiles are engaged, and what these bear together.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +25,11 @@ from hand_models.hand.finger_frames import (
     SHEAR,
 )
 from hand_models.hand.hooked_nails import Nails
+from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import CONTACTS, FINGERS, NAIL, Tile
+from hand_models.hand.settled_hand import Palm, Tile
 
-__all__ = ["HandTiles", "hand_tiles", "tiles_on_rock"]
+__all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
 
 
 def _names() -> list[tuple[str, str]]:
@@ -144,3 +148,25 @@ def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
         Tile(finger, part, CONTACTS[kind])
         for (finger, part), kind in zip(names, kinds, strict=True)
     )
+
+
+def palms_on_rock(placed: PlacedHands) -> list[Palm]:
+    """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
+    hand, travel = placed.hand, placed.hand.spine_travel
+    gaps = np.array(placed.gaps)[:, BASES:]
+    gaps.setflags(write=False)
+    engaged, centres, limits = [], [], []
+    for placement, depths in zip(placed.placements, placed.gaps, strict=True):
+        near = [i for i, depth in enumerate(depths[BASES:]) if depth <= travel]
+        tiles = tuple(near) if placement.grasp.palm else ()
+        x, y, shear = hand.palm_share(tiles, placement.surface.shear_limit)
+        depth = sum([depths[BASES + i] for i in tiles]) / max(len(tiles), 1)
+        engaged.append(tiles)
+        centres.append((x, y, depth))
+        limits.append((shear, hand.palm_pressing * len(tiles)))
+    places = np.array(centres)
+    places.setflags(write=False)
+    return [
+        Palm(own, tiles, centre, *most)
+        for own, tiles, centre, most in zip(gaps, engaged, places, limits, strict=True)
+    ]

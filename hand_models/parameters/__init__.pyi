@@ -1,11 +1,11 @@
-from .own import LARGEST as LARGEST
-from .own import load_own_hand as load_own_hand
-from .own import own_hand as own_hand
-from .tables import LONGEST_QUOTE as LONGEST_QUOTE
-from .tables import ParameterTable as ParameterTable
-from .tables import Quantity as Quantity
-from .tables import experiment_table as experiment_table
-from .tables import hand_table as hand_table
-from .tables import scan_table as scan_table
-from .tables import spine_table as spine_table
-from .tables import surface_table as surface_table
+from .own import LARGEST as LARGEST, load_own_hand as load_own_hand, own_hand as own_hand
+from .tables import (
+    LONGEST_QUOTE as LONGEST_QUOTE,
+    ParameterTable as ParameterTable,
+    Quantity as Quantity,
+    experiment_table as experiment_table,
+    hand_table as hand_table,
+    scan_table as scan_table,
+    spine_table as spine_table,
+    surface_table as surface_table,
+)

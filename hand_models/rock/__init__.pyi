@@ -1,12 +1,11 @@
-from .holds import PARALLEL as PARALLEL
-from .holds import Cylinder as Cylinder
-from .holds import Edge as Edge
-from .holds import Ellipsoid as Ellipsoid
-from .holds import Hold as Hold
-from .holds import Plane as Plane
-from .holds import Sphere as Sphere
-from .mesh import Mesh as Mesh
-from .mesh import read_mesh as read_mesh
+from .holds import (
+    Cylinder as Cylinder,
+    Edge as Edge,
+    Ellipsoid as Ellipsoid,
+    Hold as Hold,
+    Plane as Plane,
+    Sphere as Sphere,
+)
+from .mesh import Mesh as Mesh, read_mesh as read_mesh
 from .profile import Profile as Profile
-from .triangles import Triangles as Triangles
-from .triangles import weld as weld
+from .triangles import Triangles as Triangles, weld as weld

@@ -15,14 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.sections import FlatSection, ProfileSection, RoundSection, Section, Swept, Vector2
+from hand_models.sections import (
+    PARALLEL,
+    FlatSection,
+    ProfileSection,
+    RoundSection,
+    Section,
+    Swept,
+    Vector2,
+)
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
 
 Angle = TypeVar("Angle", float, Array)
-
-PARALLEL: Final = 1e-3
-"""Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
 
 LARGEST: Final = 1e6
 """Size of a hold above which its curve is lost in rounding [m]."""

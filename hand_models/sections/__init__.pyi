@@ -1,19 +1,15 @@
 from .mixed_rows import section_rows as section_rows
 from .polyline import PolylineSection as PolylineSection
 from .profile_section import ProfileSection as ProfileSection
-from .rows import Complexes as Complexes
-from .rows import Flags as Flags
-from .rows import SectionRows as SectionRows
-from .rows import Span as Span
-from .section import LEVEL as LEVEL
-from .section import FlatSection as FlatSection
-from .section import Rest as Rest
-from .section import RoundSection as RoundSection
-from .section import Section as Section
-from .section import Vector2 as Vector2
-from .smooth_cuts import Cut as Cut
-from .smooth_cuts import Face as Face
-from .swept_ball import Swept as Swept
-from .swept_ball import entries as entries
-from .swept_cuts import Plane as Plane
-from .swept_cuts import cut_of as cut_of
+from .rows import Complexes as Complexes, Flags as Flags, SectionRows as SectionRows, Span as Span
+from .section import (
+    LEVEL as LEVEL,
+    FlatSection as FlatSection,
+    Rest as Rest,
+    RoundSection as RoundSection,
+    Section as Section,
+    Vector2 as Vector2,
+)
+from .smooth_cuts import Cut as Cut, Face as Face
+from .swept_ball import PARALLEL as PARALLEL, Swept as Swept, entries as entries
+from .swept_cuts import Plane as Plane, cut_of as cut_of

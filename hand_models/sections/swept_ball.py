@@ -16,9 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-__all__ = ["Swept", "Vector3", "entries"]
+__all__ = ["PARALLEL", "Swept", "Vector3", "entries"]
+
+PARALLEL: Final = 1e-3
+"""Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
 
 Vector3 = Sequence[float]
 """Three numbers."""

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from hand_models.rock import PARALLEL
 from hand_models.sections.ellipses import Oval
 from hand_models.sections.smooth_cuts import Cut, Disc, Face, Tangent, Wall
-from hand_models.sections.swept_ball import Swept
+from hand_models.sections.swept_ball import PARALLEL, Swept
 
 __all__ = ["Plane", "cut_of"]
 

@@ -1,9 +1,7 @@
-from .study import STUDIES as STUDIES
-from .study import Claim as Claim
-from .study import Progress as Progress
-from .study import Study as Study
-from .study import StudyResult as StudyResult
-from .study import as_json as as_json
-from .study import load_study as load_study
-from .study import run_study as run_study
-from .study import save_picture as save_picture
+from .study import (
+    STUDIES as STUDIES,
+    Study as Study,
+    as_json as as_json,
+    load_study as load_study,
+    run_study as run_study,
+)

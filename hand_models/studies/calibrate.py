@@ -24,10 +24,17 @@ from scipy.optimize import brentq, least_squares
 
 from hand_models.base import Array, CruxError, SolverError
 from hand_models.compliance import Gripper, boundary, gripper_table, linear_box
-from hand_models.experiments import cut, extents, in_paper_signs
+from hand_models.experiments import (
+    Claim,
+    Progress,
+    StudyResult,
+    cut,
+    extents,
+    in_paper_signs,
+    save_picture,
+)
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 from hand_models.tile import Surface
 
 __all__ = ["plot", "run"]

@@ -10,9 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from hand_models.experiments import PalmExperiment
+from hand_models.experiments import Claim, PalmExperiment, Progress, StudyResult, save_picture
 from hand_models.parameters import ParameterTable
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 from hand_models.tendon import share_load
 
 __all__ = ["plot", "run"]

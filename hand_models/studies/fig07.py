@@ -10,9 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
-from hand_models.experiments import PalmExperiment
+from hand_models.experiments import Claim, PalmExperiment, Progress, StudyResult, save_picture
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from hand_models.base import Array
+from hand_models.experiments import Claim, Progress, StudyResult, save_picture
 from hand_models.parameters import ParameterTable
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 from hand_models.tile import (
     LEAST_SPINES,
     LineFit,
@@ -30,6 +30,7 @@ from hand_models.tile import (
     bounds_gap,
     fit_lateral,
     fit_line,
+    inner_half_planes,
     measured_tile_shear,
     reach,
     statistics,
@@ -135,7 +136,7 @@ def _trials(array: SpineArray) -> Array:
 def _half_plane_reach(surface: Surface, angles: Array) -> Array:
     """Return how far the planner's half-planes let a load in the finger plane go [N]."""
     directions = np.column_stack([np.cos(angles), -np.sin(angles), np.zeros(len(angles))])
-    return reach(surface.pieces(), directions)
+    return reach(inner_half_planes(surface), directions)
 
 
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
@@ -184,7 +185,7 @@ def _gaps(surface: Surface) -> list[dict[str, float]]:
     gaps = []
     for count in COUNTS:
         pieces = replace(surface, half_planes=count)
-        lateral = float(reach(pieces.pieces(), sideways)[0]) / surface.shear_limit
+        lateral = float(reach(inner_half_planes(pieces), sideways)[0]) / surface.shear_limit
         gap = bounds_gap(pieces, directions)
         gaps.append({"half_planes": count, "lateral_reach": lateral, **gap._asdict()})
     return gaps
@@ -426,7 +427,7 @@ def _draw_surface() -> Figure:
             (surface.strength(angle, azimuth), "k", "-", "planner's surface"),
         ]
         for count, style in ((1, ":"), (4, "--")):
-            pieces = replace(surface, half_planes=count).pieces()
+            pieces = inner_half_planes(replace(surface, half_planes=count))
             radii.append((reach(pieces, directions), "k", style, f"half-planes: {count}"))
         for radius, colour, style, label in radii:
             axes.plot(radius * along, radius * aside, style, color=colour, label=label)

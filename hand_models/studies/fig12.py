@@ -16,10 +16,19 @@ from matplotlib.figure import Figure
 
 from hand_models.base import Array
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
-from hand_models.experiments import BALANCED, pull, unloaded, wrist_poses
+from hand_models.experiments import (
+    BALANCED,
+    Claim,
+    Progress,
+    StudyResult,
+    pull,
+    save_picture,
+    unloaded,
+    wrist_poses,
+)
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
+from hand_models.tile import inner_half_planes
 
 __all__ = ["balance_matrix", "plot", "run"]
 
@@ -123,7 +132,7 @@ def _read_off(table: ParameterTable) -> dict[str, list[float]]:
 
 def _utilisations(gripper: Gripper, loads: FingerLoads) -> list[float]:
     """Return the largest utilisation of each phalanx's limits, at one pose."""
-    pieces = gripper.surface.pieces()
+    pieces = inner_half_planes(gripper.surface)
     shears, normals = loads.shears[0], loads.normals[0]
     return [
         float(max((p.a_shear * t + p.a_normal * n) / p.capacity for p in pieces))

@@ -20,7 +20,10 @@ from hand_models.base import Array
 from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
 from hand_models.experiments import (
     UNITS,
+    Claim,
     Extents,
+    Progress,
+    StudyResult,
     cut,
     even_pulls,
     extents,
@@ -28,12 +31,12 @@ from hand_models.experiments import (
     label_solid,
     pull,
     reach,
+    save_picture,
     section,
     unloaded,
     vertices,
 )
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 from hand_models.wrench_spaces import hull
 
 __all__ = ["plot", "run"]

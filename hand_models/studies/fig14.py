@@ -22,20 +22,23 @@ from hand_models.compliance import Gripper, gripper_table, search
 from hand_models.experiments import (
     DRAGGED,
     UNBALANCED,
+    Claim,
+    Progress,
     Pulled,
+    StudyResult,
     cut,
     even_pulls,
     extents,
     in_paper_signs,
     label_solid,
     pull,
+    save_picture,
     section,
     unloaded,
     volume,
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 from hand_models.wrench_spaces import TOLERANCE
 
 __all__ = ["loading_planes", "plot", "run"]

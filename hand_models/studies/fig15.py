@@ -19,18 +19,21 @@ from hand_models.base import Array, EmptySetError, InvalidInputError
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     PARAMETER_STUDIES,
+    Claim,
     Conditions,
     HullPoints,
     Limit,
+    Progress,
+    StudyResult,
     cut,
     limit,
     reach,
     rest_state,
+    save_picture,
     sharpened,
     volume,
 )
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

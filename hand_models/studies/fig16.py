@@ -20,19 +20,22 @@ from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     Axis,
     Cell,
+    Claim,
     Conditions,
     Measure,
+    Progress,
+    StudyResult,
     conditions_title,
     draw_map,
     failing,
     legend,
     map_data,
     radius_axes,
+    save_picture,
     sweep_cell,
     sweep_grid,
 )
 from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.studies.study import Claim, Progress, StudyResult, save_picture
 
 __all__ = ["plot", "run"]
 

@@ -8,30 +8,24 @@ one with entries of the caller's. What the model misses stays among the claims a
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, cast
+from typing import Any, Final, Protocol, cast
 
 import msgspec
 
 from hand_models.base import InvalidInputError
+from hand_models.experiments import Progress, StudyResult
 from hand_models.parameters import ParameterTable, hand_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = [
     "STUDIES",
-    "Claim",
-    "Progress",
     "Study",
-    "StudyResult",
     "as_json",
     "load_study",
     "run_study",
-    "save_picture",
 ]
 
 STUDIES: Final[Mapping[str, str]] = {
@@ -45,56 +39,6 @@ STUDIES: Final[Mapping[str, str]] = {
     "sweep": "hand_models.experiments.sweep",
 }
 """Modules of the studies by the name of their figure; loaded when asked for."""
-
-Progress = Callable[[int, int], None]
-"""Told how many steps are done, of how many."""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A claim of the paper, and what the model gives.
-
-    Attributes
-    ----------
-    claim : str
-        In the paper's words, or close to them, with the place.
-    claimed, got : str or float
-        The paper's figure and ours.
-    holds : bool
-    role : {'test', 'calibration'}
-        Whether a parameter was fitted to the claim, so that it proves nothing.
-    """
-
-    claim: str
-    claimed: str | float
-    got: str | float
-    holds: bool
-    role: Literal["test", "calibration"] = "test"
-
-
-@dataclass(frozen=True)
-class StudyResult:
-    """What a study found.
-
-    Attributes
-    ----------
-    name, title : str
-        Its name, such as ``fig06``, and what it is about.
-    data : dict
-        The figure's data, as JSON can write it, SI units. ``not_tested``, if there, lists in words
-        what the paper says and nothing published can decide; ``summary`` what else a person
-        should read.
-    claims : tuple of Claim
-    hand : dict
-        By section and name, the entries in which the hand is not the bundled one; filled in by
-        `run_study`.
-    """
-
-    name: str
-    title: str
-    data: dict[str, Any]
-    claims: tuple[Claim, ...]
-    hand: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 class Study(Protocol):
@@ -162,9 +106,3 @@ def run_study(
     text = json.dumps(as_json(result), indent=2, ensure_ascii=False, allow_nan=False)
     file.write_text(text + "\n", encoding="utf-8")
     return result, [file, *study.plot(result, folder)]
-
-
-def save_picture(figure: Figure, path: Path) -> Path:
-    """Write a figure of a study as PNG."""
-    figure.savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
-    return path

@@ -1,14 +1,21 @@
-from .half_planes import HalfPlane as HalfPlane
-from .half_planes import bounds_gap as bounds_gap
-from .half_planes import reach as reach
-from .spine_array import SpineArray as SpineArray
-from .spine_array import statistics as statistics
-from .spine_calibration import LEAST_SPINES as LEAST_SPINES
-from .spine_calibration import LineFit as LineFit
-from .spine_calibration import fit_lateral as fit_lateral
-from .spine_calibration import fit_line as fit_line
-from .spine_calibration import measured_tile_shear as measured_tile_shear
-from .spine_calibration import within_law as within_law
-from .surface import Surface as Surface
-from .surface import pull_strength as pull_strength
-from .surface import surface_names as surface_names
+from .half_planes import (
+    HalfPlane as HalfPlane,
+    bounds_gap as bounds_gap,
+    inner_half_planes as inner_half_planes,
+    outer_half_planes as outer_half_planes,
+    reach as reach,
+)
+from .spine_array import SpineArray as SpineArray, statistics as statistics
+from .spine_calibration import (
+    LEAST_SPINES as LEAST_SPINES,
+    LineFit as LineFit,
+    fit_lateral as fit_lateral,
+    fit_line as fit_line,
+    measured_tile_shear as measured_tile_shear,
+    within_law as within_law,
+)
+from .surface import (
+    Surface as Surface,
+    pull_strength as pull_strength,
+    surface_names as surface_names,
+)

@@ -21,16 +21,21 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
+from hand_models.tile.surface import Surface
 
-if TYPE_CHECKING:
-    from hand_models.tile.surface import Surface
-
-__all__ = ["BoundsGap", "HalfPlane", "bounds_gap", "inner_pieces", "outer_pieces", "reach"]
+__all__ = [
+    "BoundsGap",
+    "HalfPlane",
+    "bounds_gap",
+    "inner_half_planes",
+    "outer_half_planes",
+    "reach",
+]
 
 GRID: Final = (129, 33)
 """Samples of φ and of θ in a search for a largest value."""
@@ -91,7 +96,7 @@ class BoundsGap(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def inner_pieces(surface: Surface) -> tuple[HalfPlane, ...]:
+def inner_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
     """Return half-planes whose intersection lies inside the limit surface, for shear T ≥ 0.
 
     Returns
@@ -121,13 +126,13 @@ def inner_pieces(surface: Surface) -> tuple[HalfPlane, ...]:
 
 
 @lru_cache(maxsize=256)
-def outer_pieces(surface: Surface) -> tuple[HalfPlane, ...]:
+def outer_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
     """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
 
     Where pressing raises the strength faster than a normal allows, it is tilted as far as needed.
     """
     pieces = []
-    for piece in inner_pieces(surface):
+    for piece in inner_half_planes(surface):
         a, y = piece.a_shear, piece.a_lateral
         pull = max(-piece.a_normal, surface.compression_gain * math.hypot(a, y))
         capacity = _support(surface, (a, pull, y))
@@ -172,7 +177,7 @@ def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
     angle = np.arctan2(-directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
     azimuth = np.arctan2(np.abs(directions[:, 2]), directions[:, 0])
     exact = surface.strength(angle, azimuth)
-    inner, outer = (reach(p(surface), directions) for p in (inner_pieces, outer_pieces))
+    inner, outer = (reach(p(surface), directions) for p in (inner_half_planes, outer_half_planes))
     volume = float(np.sum(exact**3))
     return BoundsGap(
         inner_volume=float(np.sum(inner**3)) / volume,

@@ -13,7 +13,8 @@ a fit to the spine array (``spine_array.py``): channels lean along the drag, so 
 less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
 times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
 pull-off, where it has no meaning. Pressed into the rock, a tile holds F(0, θ) + γ N in its plane,
-with γ the compression gain. Half-planes inside and outside the surface are in ``limit_pieces.py``.
+with γ the compression gain. Half-planes inside and outside the surface are in
+`hand_models.tile.half_planes`.
 """
 
 from __future__ import annotations
@@ -28,9 +29,8 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import surface_table
-from hand_models.tile.half_planes import HalfPlane, inner_pieces, outer_pieces
 
-__all__ = ["HalfPlane", "Surface", "pull_strength", "surface_names"]
+__all__ = ["Surface", "pull_strength", "surface_names"]
 
 
 @dataclass(frozen=True)
@@ -181,14 +181,6 @@ class Surface:
         """Return f_s(φ) of Eq. 21 under pull-off, φ ≥ 0 [N]."""
         ratio = min(angle / self.pull_off_angle, 1.0)
         return self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
-
-    def pieces(self) -> tuple[HalfPlane, ...]:
-        """Return half-planes inside the limit surface, for shear T ≥ 0."""
-        return inner_pieces(self)
-
-    def outer_pieces(self) -> tuple[HalfPlane, ...]:
-        """Return half-planes around the limit surface, for shear T ≥ 0."""
-        return outer_pieces(self)
 
 
 def pull_strength(

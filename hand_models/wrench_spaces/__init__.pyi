@@ -1,6 +1,2 @@
-from .polytopes import TOLERANCE as TOLERANCE
-from .polytopes import hull as hull
-from .polytopes import hull_facets as hull_facets
-from .space import SCALE as SCALE
-from .space import Row as Row
-from .space import WrenchSpace as WrenchSpace
+from .polytopes import TOLERANCE as TOLERANCE, hull as hull, hull_facets as hull_facets
+from .space import SCALE as SCALE, Row as Row, WrenchSpace as WrenchSpace

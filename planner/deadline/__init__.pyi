@@ -1,12 +1,12 @@
 from .budget import Budget as Budget
-from .clock import DeadlineError as DeadlineError
-from .clock import check as check
-from .clock import expired as expired
-from .clock import left as left
-from .clock import possible as possible
-from .clock import seconds as seconds
-from .clock import within as within
-from .overlap import Beside as Beside
-from .overlap import begin as begin
-from .unfinished import Unfinished as Unfinished
-from .unfinished import late_sentence as late_sentence
+from .clock import (
+    DeadlineError as DeadlineError,
+    check as check,
+    expired as expired,
+    left as left,
+    possible as possible,
+    seconds as seconds,
+    within as within,
+)
+from .overlap import Beside as Beside, begin as begin
+from .unfinished import Unfinished as Unfinished, late_sentence as late_sentence

@@ -1,24 +1,30 @@
-from .active_limits import ALIKE as ALIKE
-from .active_limits import BINDING as BINDING
-from .active_limits import Binding as Binding
-from .active_limits import Used as Used
-from .active_limits import joint_name as joint_name
-from .active_limits import limit_name as limit_name
-from .active_limits import unit_of as unit_of
-from .certificate import Hindered as Hindered
-from .certificate import certify as certify
-from .certificate import certify_idle as certify_idle
-from .floating_warnings import far_wrists as far_wrists
-from .floating_warnings import idle_preloads as idle_preloads
-from .floating_warnings import strained_preloads as strained_preloads
-from .path_safety import UNKNOWN as UNKNOWN
-from .path_safety import tension_path as tension_path
-from .path_safety import unsafe_sentence as unsafe_sentence
-from .sentences import LEAST_FACTOR as LEAST_FACTOR
-from .sentences import NO_FACTOR as NO_FACTOR
-from .sentences import UNPROVEN as UNPROVEN
-from .sentences import barrier_words as barrier_words
-from .sentences import limit_sentence as limit_sentence
-from .sentences import overload_sentence as overload_sentence
-from .sentences import shortfall_sentence as shortfall_sentence
-from .sentences import warnings as warnings
+from .active_limits import (
+    ALIKE as ALIKE,
+    BINDING as BINDING,
+    Binding as Binding,
+    Used as Used,
+    joint_name as joint_name,
+    limit_name as limit_name,
+    unit_of as unit_of,
+)
+from .certificate import Hindered as Hindered, certify as certify, certify_idle as certify_idle
+from .floating_warnings import (
+    far_wrists as far_wrists,
+    idle_preloads as idle_preloads,
+    strained_preloads as strained_preloads,
+)
+from .path_safety import (
+    UNKNOWN as UNKNOWN,
+    tension_path as tension_path,
+    unsafe_sentence as unsafe_sentence,
+)
+from .sentences import (
+    LEAST_FACTOR as LEAST_FACTOR,
+    NO_FACTOR as NO_FACTOR,
+    UNPROVEN as UNPROVEN,
+    barrier_words as barrier_words,
+    limit_sentence as limit_sentence,
+    overload_sentence as overload_sentence,
+    shortfall_sentence as shortfall_sentence,
+    warnings as warnings,
+)

@@ -1,30 +1,40 @@
 from .assembly import gather as gather
-from .hand_batch import CONTACTS as CONTACTS
-from .hand_batch import KEPT as KEPT
-from .hand_batch import KEPT_NAMES as KEPT_NAMES
-from .hand_batch import NONE as NONE
-from .hand_batch import NOTHING as NOTHING
-from .hand_batch import TOUCHING as TOUCHING
-from .hand_batch import Places as Places
-from .hand_batch import Same as Same
-from .hand_batch import Stacked as Stacked
-from .hand_batch import joined as joined
-from .hand_batch import places_of as places_of
-from .hand_batch import stacked as stacked
-from .hand_batch import touch_of as touch_of
-from .hand_sets import Hands as Hands
-from .hand_sets import Measure as Measure
-from .hand_sets import Point as Point
-from .hand_sets import Sets as Sets
-from .hand_sets import widest_at_rest as widest_at_rest
-from .joint_posture import Posture as Posture
-from .joint_posture import posture as posture
-from .joint_posture import posture_at as posture_at
-from .joint_posture import torque_limits as torque_limits
-from .settled_stance import floating_wrist as floating_wrist
-from .settled_stance import hand_space as hand_space
-from .settled_stance import resting_hand as resting_hand
-from .settled_stance import settle as settle
-from .stance_constraints import BALL as BALL
-from .stance_constraints import FORCE_CAP as FORCE_CAP
-from .stance_constraints import TENSION_CHANGE as TENSION_CHANGE
+from .hand_batch import (
+    CONTACTS as CONTACTS,
+    KEPT as KEPT,
+    KEPT_NAMES as KEPT_NAMES,
+    NONE as NONE,
+    NOTHING as NOTHING,
+    TOUCHING as TOUCHING,
+    Places as Places,
+    Same as Same,
+    Stacked as Stacked,
+    joined as joined,
+    places_of as places_of,
+    stacked as stacked,
+    touch_of as touch_of,
+)
+from .hand_sets import (
+    Hands as Hands,
+    Measure as Measure,
+    Point as Point,
+    Sets as Sets,
+    widest_at_rest as widest_at_rest,
+)
+from .joint_posture import (
+    Posture as Posture,
+    posture as posture,
+    posture_at as posture_at,
+    torque_limits as torque_limits,
+)
+from .settled_stance import (
+    floating_wrist as floating_wrist,
+    hand_space as hand_space,
+    resting_hand as resting_hand,
+    settle as settle,
+)
+from .stance_constraints import (
+    BALL as BALL,
+    FORCE_CAP as FORCE_CAP,
+    TENSION_CHANGE as TENSION_CHANGE,
+)

@@ -1,34 +1,40 @@
-from .program import SLACK as SLACK
-from .program import SOLVER as SOLVER
-from .program import TIE as TIE
-from .program import UNLIMITED as UNLIMITED
-from .program import Outcome as Outcome
-from .program import Reached as Reached
-from .program import build_ahead as build_ahead
-from .program import curved as curved
-from .program import effort as effort
-from .program import least_tensions as least_tensions
-from .program import load_factor as load_factor
-from .program import margin as margin
-from .program import nearest as nearest
-from .program import nearest_body as nearest_body
-from .program import reach as reach
-from .program import tie_break as tie_break
-from .program import tie_weight as tie_weight
-from .program import unique as unique
-from .row_scaling import JOINT_TORQUE as JOINT_TORQUE
-from .row_scaling import LOAD_UNIT as LOAD_UNIT
-from .row_scaling import TWIST_UNIT as TWIST_UNIT
-from .row_scaling import WRIST_RANGE as WRIST_RANGE
-from .row_scaling import Names as Names
-from .row_scaling import is_effort as is_effort
-from .row_scaling import scaled_rows as scaled_rows
-from .stance_data import WRENCH_UNIT as WRENCH_UNIT
-from .stance_data import HandData as HandData
-from .stance_data import StanceData as StanceData
-from .stance_data import beyond as beyond
-from .stance_data import body_wrench as body_wrench
-from .stance_data import scaled_transports as scaled_transports
-from .stance_data import used as used
-from .stance_data import used_effort as used_effort
-from .stance_data import with_held as with_held
+from .program import (
+    SLACK as SLACK,
+    SOLVER as SOLVER,
+    TIE as TIE,
+    UNLIMITED as UNLIMITED,
+    Outcome as Outcome,
+    Reached as Reached,
+    build_ahead as build_ahead,
+    curved as curved,
+    effort as effort,
+    least_tensions as least_tensions,
+    load_factor as load_factor,
+    margin as margin,
+    nearest as nearest,
+    nearest_body as nearest_body,
+    reach as reach,
+    tie_break as tie_break,
+    tie_weight as tie_weight,
+    unique as unique,
+)
+from .row_scaling import (
+    JOINT_TORQUE as JOINT_TORQUE,
+    LOAD_UNIT as LOAD_UNIT,
+    TWIST_UNIT as TWIST_UNIT,
+    WRIST_RANGE as WRIST_RANGE,
+    Names as Names,
+    is_effort as is_effort,
+    scaled_rows as scaled_rows,
+)
+from .stance_data import (
+    WRENCH_UNIT as WRENCH_UNIT,
+    HandData as HandData,
+    StanceData as StanceData,
+    beyond as beyond,
+    body_wrench as body_wrench,
+    scaled_transports as scaled_transports,
+    used as used,
+    used_effort as used_effort,
+    with_held as with_held,
+)

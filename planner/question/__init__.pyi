@@ -1,10 +1,14 @@
-from .question import ForceCap as ForceCap
-from .question import Limits as Limits
-from .question import Load as Load
-from .question import Objective as Objective
-from .question import Question as Question
-from .stance import EARTH as EARTH
-from .stance import SOLVE as SOLVE
-from .stance import HandOnHold as HandOnHold
-from .stance import Stance as Stance
-from .stance import moderate as moderate
+from .question import (
+    ForceCap as ForceCap,
+    Limits as Limits,
+    Load as Load,
+    Objective as Objective,
+    Question as Question,
+)
+from .stance import (
+    EARTH as EARTH,
+    SOLVE as SOLVE,
+    HandOnHold as HandOnHold,
+    Stance as Stance,
+    moderate as moderate,
+)

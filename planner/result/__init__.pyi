@@ -1,17 +1,15 @@
 from .floating_load_recovery import read_floating_hand as read_floating_hand
-from .hand_plan import HandPlan as HandPlan
-from .hand_plan import WristPlan as WristPlan
-from .load_recovery import Reader as Reader
-from .load_recovery import reader_of as reader_of
-from .plan import Certificate as Certificate
-from .plan import LimitName as LimitName
-from .plan import Plan as Plan
-from .plan import Price as Price
-from .plan import SolverInfo as SolverInfo
-from .plan import Status as Status
-from .plan import TensionPath as TensionPath
-from .plan import Times as Times
+from .hand_plan import HandPlan as HandPlan, WristPlan as WristPlan
+from .load_recovery import Reader as Reader, reader_of as reader_of
+from .plan import (
+    Certificate as Certificate,
+    LimitName as LimitName,
+    Plan as Plan,
+    Price as Price,
+    SolverInfo as SolverInfo,
+    Status as Status,
+    TensionPath as TensionPath,
+    Times as Times,
+)
 from .plan_arrays import Carried as Carried
-from .set_points import SetPoints as SetPoints
-from .set_points import Source as Source
-from .set_points import no_set_points as no_set_points
+from .set_points import SetPoints as SetPoints, Source as Source, no_set_points as no_set_points

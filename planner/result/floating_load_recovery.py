@@ -6,6 +6,7 @@ import numpy as np
 
 from hand_models.compliance import CompliantHand
 from hand_models.hand import SettledHand
+from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import stacked
 from planner.result.hand_plan import HandPlan, PalmPlan, WristPlan
@@ -33,7 +34,7 @@ def read_floating_hand(
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
     tensions = found.tensions[0]
     forces = np.einsum("tk,tkx->tx", loads, axes)
-    pieces = settled.surface.pieces()
+    pieces = inner_half_planes(settled.surface)
     planes = np.array([(p.a_shear, p.a_normal, p.a_lateral) for p in pieces])
     capacities = np.array([p.capacity for p in pieces])
     magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])

@@ -12,8 +12,8 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
-from hand_models.hand import FINGERS, NAIL, SettledHand, SpinyHand, Tile
-from hand_models.tile import HalfPlane, Surface
+from hand_models.hand import FINGERS, NAIL, HandModel, SettledHand, Tile
+from hand_models.tile import HalfPlane, Surface, inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import (
     CONTACTS,
@@ -251,7 +251,7 @@ def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
         Of the winches' angles, per newton of the shears of a tendon's tiles [rad/N].
     """
     (hand,) = key.each
-    assert isinstance(hand, SpinyHand)
+    assert isinstance(hand, HandModel)
     drive, (_, losses) = hand.drive, _losses(places, key)
     none, one = np.zeros_like(losses), np.ones_like(losses)
     at_zero, at_one = (
@@ -265,14 +265,14 @@ def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
 def _pieces_of(key: Same) -> tuple[tuple[HalfPlane, ...], ...]:
     """Return the half-planes of tiles on these surfaces."""
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
-    return tuple([surface.pieces() for surface in surfaces])
+    return tuple([inner_half_planes(surface) for surface in surfaces])
 
 
 @lru_cache(maxsize=KEPT)
 def _losses(places: Places, key: Same) -> tuple[Array, Array]:
     """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
     (hand,) = key.each
-    assert isinstance(hand, SpinyHand)
+    assert isinstance(hand, HandModel)
     sums = np.add.accumulate((1.0 - hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0))
     losses = np.full(len(places.phalanges), sums[-2])
     losses[places.base_fingers] = sums[-1]

@@ -1,10 +1,13 @@
-from .inverse_kinematics import UnreachableError as UnreachableError
-from .inverse_kinematics import solve_limbs as solve_limbs
-from .inverse_kinematics import unreachable as unreachable
-from .link_tree import LimbTorques as LimbTorques
-from .link_tree import LinkTree as LinkTree
-from .robot import Robot as Robot
-from .robot import load_robot as load_robot
-from .robot import robosimian as robosimian
-from .robot import robot_of as robot_of
+from .inverse_kinematics import (
+    UnreachableError as UnreachableError,
+    solve_limbs as solve_limbs,
+    unreachable as unreachable,
+)
+from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
+from .robot import (
+    Robot as Robot,
+    load_robot as load_robot,
+    robosimian as robosimian,
+    robot_of as robot_of,
+)
 from .robot_file import RobotFile as RobotFile

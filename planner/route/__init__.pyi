@@ -1,6 +1,8 @@
-from .climb import Move as Move
-from .climb import OutOfReach as OutOfReach
-from .climb import Route as Route
-from .climb import RouteResult as RouteResult
-from .climb import Stage as Stage
-from .climb import evaluate as evaluate
+from .climb import (
+    Move as Move,
+    OutOfReach as OutOfReach,
+    Route as Route,
+    RouteResult as RouteResult,
+    Stage as Stage,
+    evaluate as evaluate,
+)

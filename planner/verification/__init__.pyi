@@ -1,3 +1,2 @@
-from .check import Check as Check
-from .check import problems as problems
+from .check import Check as Check, problems as problems
 from .loads_check import LoadsCheck as LoadsCheck

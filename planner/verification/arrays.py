@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import SKEW, Array, Indices
-from hand_models.hand import FINGERS, SpinyHand
-from hand_models.tile import HalfPlane, Surface
+from hand_models.hand import FINGERS, HandModel
+from hand_models.tile import HalfPlane, Surface, inner_half_planes
 from planner.prepare import KEPT, Places, Same, Stacked
 from planner.verification.equilibrium import tendons_of
 from planner.verification.limit_surface import LimitCurves
@@ -120,7 +120,7 @@ def limits_of(surfaces: Same, known: Stacked) -> Limits:
 def _limits_of(key: Same, places: Places) -> Limits:
     """Return the limits of tiles that all touch; ``key``: the surfaces."""
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
-    pieces = tuple(surface.pieces() for surface in surfaces)
+    pieces = tuple(inner_half_planes(surface) for surface in surfaces)
     return Limits(pieces, _planes(pieces, places), LimitCurves(surfaces, places.hand))
 
 
@@ -191,12 +191,12 @@ def uses_of(places: Places, key: Same, strength: float) -> Uses:
     ----------
     places : Places
     key : Same
-        The `SpinyHand` that all hands are.
+        The `HandModel` that all hands are.
     strength : float
         What every tendon may hold [N].
     """
     (hand,) = key.each
-    assert isinstance(hand, SpinyHand)
+    assert isinstance(hand, HandModel)
     drive, tendons, structure = hand.drive, tendons_of(places, key), hand.structure
     torque = drive.winch_radius / drive.gear_ratio / drive.efficiency
     current, idle = torque / drive.torque_constant, drive.no_load_current

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES, STOPS
-from hand_models.hand import FINGERS, SettledHand, SpinyHand
+from hand_models.hand import FINGERS, HandModel, SettledHand
 from planner.prepare import KEPT, NONE, NOTHING, TOUCHING, Places, Same, Stacked, joined, stacked
 
 __all__ = ["JOINTS", "SIDES", "Equilibrium", "Tendons", "equilibrium", "tendons_of"]
@@ -144,9 +144,9 @@ class Tendons(NamedTuple):
 
 @lru_cache(maxsize=KEPT)
 def tendons_of(places: Places, key: Same) -> Tendons:
-    """Return what the tendons of hands do; ``key``: the `SpinyHand` that all of them are."""
+    """Return what the tendons of hands do; ``key``: the `HandModel` that all of them are."""
     (hand,) = key.each
-    assert isinstance(hand, SpinyHand)
+    assert isinstance(hand, HandModel)
     model, drive = hand.finger, hand.drive
     loss = 1.0 - model.friction
     # what is left of the tension at each phalanx's tile; a base tile comes first

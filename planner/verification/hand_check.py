@@ -16,6 +16,7 @@ import numpy as np
 from hand_models.base import Array, skew
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS, HELD, NAIL, SettledHand
+from hand_models.tile import inner_half_planes
 from planner.prepare import BALL
 from planner.question import HandOnHold, Question
 from planner.verification.arrays import LOAD
@@ -214,7 +215,7 @@ def _planes(hand: SettledHand, along: Array, into: Array, aside: Array) -> Array
         [
             (piece.a_shear * along + piece.a_normal * into + sign * piece.a_lateral * aside)
             / piece.capacity
-            for piece in hand.surface.pieces()
+            for piece in inner_half_planes(hand.surface)
             for sign in (1.0, -1.0)
         ]
     )

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.hand import SpinyHand
+from hand_models.hand import HandModel
 from planner.prepare import KEPT, NONE, NOTHING, Same, Stacked
 from planner.verification.equilibrium import JOINTS, SIDES, tendons_of
 
@@ -130,9 +130,9 @@ class _Planes(NamedTuple):
 
 @lru_cache(maxsize=KEPT)
 def _planes_of(key: Same, rotations: tuple[float, ...]) -> _Planes:
-    """Return the planes of hands turned so far; ``key``: the `SpinyHand` that all of them are."""
+    """Return the planes of hands turned so far; ``key``: the `HandModel` that all of them are."""
     (hand,) = key.each
-    assert isinstance(hand, SpinyHand)
+    assert isinstance(hand, HandModel)
     frames = [frame for rotation in rotations for frame in hand.frames(rotation)]
     axes, turns = np.zeros((len(frames), 1, 6)), np.zeros((len(frames), 2, 6))
     for axis, turn, frame in zip(axes[:, 0], turns, frames, strict=True):

@@ -1,20 +1,19 @@
 from .body_space import explore as explore
-from .body_space import print_body_space as print_body_space
-from .dispatch import SERVICES as SERVICES
-from .dispatch import Planned as Planned
-from .dispatch import handle as handle
-from .dispatch import plan as plan
-from .dispatch import planned as planned
-from .dispatch import wrench_space as wrench_space
-from .own_hand import read_hand as read_hand
-from .own_hand import with_hand as with_hand
-from .own_robot import Robots as Robots
-from .own_robot import builder_of as builder_of
-from .own_robot import read_robot as read_robot
-from .own_robot import robots_of as robots_of
-from .own_robot import with_robot as with_robot
-from .questions import route as route
-from .questions import stance as stance
-from .streams import Streams as Streams
-from .streams import opened as opened
-from .streams import set_points_reply as set_points_reply
+from .dispatch import (
+    SERVICES as SERVICES,
+    Planned as Planned,
+    handle as handle,
+    plan as plan,
+    planned as planned,
+    wrench_space as wrench_space,
+)
+from .own_hand import read_hand as read_hand, with_hand as with_hand
+from .own_robot import (
+    Robots as Robots,
+    builder_of as builder_of,
+    read_robot as read_robot,
+    robots_of as robots_of,
+    with_robot as with_robot,
+)
+from .questions import route as route, stance as stance
+from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

@@ -1,4 +1,4 @@
-"""What a stance can hold, on its way from a request to a reply and a table."""
+"""What a stance can hold, on its way from a request to a reply."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
 
 from hand_models.base import Array, InvalidInputError
 from planner.capability import COMPONENTS, BodySpace, End, Section
@@ -17,11 +15,10 @@ from service import replies
 from service.answering.answers import limit_reply, vector
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
-from service.commands import table_of
 from service.replies import BodySpaceReply
 from service.requests import BodySpaceRequest, PlanRequest
 
-__all__ = ["Explored", "explore", "print_body_space"]
+__all__ = ["Explored", "explore"]
 
 APPROXIMATE: Final = (
     "floating wrists: what their hands hold is linearised where the plan puts them; at the extents "
@@ -32,15 +29,6 @@ NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
 
 NONE: Final = 1e-6
 """How far below zero a reach is still zero but for rounding [N, N·m]."""
-
-FINEST: Final = 1e-3
-"""A gap below this is told as this [N]."""
-
-OTHERS: Final = {
-    "needed": "the others as asked for",
-    "zero": "the others zero",
-    "free": "whatever the others",
-}
 
 
 class Explored(NamedTuple):
@@ -187,85 +175,3 @@ def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
 
 def _limit(name: LimitName | None) -> replies.LimitName | None:
     return None if name is None else limit_reply(name)
-
-
-# For a person -----------------------------------------------------------------------------------
-
-
-def print_body_space(reply: BodySpaceReply, out: Console) -> None:
-    """Print what a stance can hold."""
-    used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
-    out.print(f"[bold]{reply.status.upper()}[/bold]{used}   {1e3 * reply.time.total:.0f} ms")
-    out.print(reply.reason, markup=False)
-    for warning in reply.warnings:
-        out.print(f"[bold]warning:[/bold] {escape(warning)}")
-    asked = ", ".join(
-        f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
-    )
-    out.print(f"body wrench asked for (in B): {asked} [N, N·m]", markup=False)
-    _print_capability(reply, out)
-    _print_section(reply.section, out)
-    _print_accelerations(reply, out)
-
-
-def _print_capability(reply: BodySpaceReply, out: Console) -> None:
-    table = table_of("axis")
-    for name in ("more", "pure", "extent"):
-        table.add_column(name, justify="right")
-    table.add_column("first to let go")
-    for name, end in reply.capability.items():
-        cells = [
-            "-" if cell is None else f"{cell:z.1f}" for cell in (end.more, end.pure, end.extent)
-        ]
-        table.add_row(f"{name} {_unit_of(name[1:])}", *cells, _words(end.limiting))
-    out.print("\n[bold]how far body wrenches that are held go along the axes of B[/bold]")
-    out.print(table)
-    out.print("more: beyond the body wrench asked for, and what lets go there first")
-    out.print("pure: with every other component zero; extent: with whatever else; -: none")
-
-
-def _print_section(section: replies.BodySection, out: Console) -> None:
-    plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
-    if not section.inner or section.gap is None:
-        out.print(f"{plane}: nothing is held", markup=False)
-        return
-    corners = np.array(section.inner)
-    ranges = ", ".join(
-        f"{axis} {low:z.1f} to {high:z.1f} {_unit_of(axis)}"
-        for axis, low, high in zip(
-            section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
-        )
-    )
-    over = " (moments over 0.1 m)" if any(axis.startswith("m") for axis in section.axes) else ""
-    shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
-    out.print(
-        f"{plane}: {shape}, {ranges}; known to {max(section.gap, FINEST):.2g} N{over}", markup=False
-    )
-
-
-def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
-    if reply.acceleration is None:
-        return
-    table = table_of("along")
-    table.add_column("largest", justify="right")
-    table.add_column("first to let go")
-    turning = reply.angular_acceleration or {}
-    for unit, found in (("m/s²", reply.acceleration), ("rad/s²", turning)):
-        for name, one in found.items():
-            table.add_row(f"{name} {unit}", f"{one.acceleration:z.2f}", _words(one.limiting))
-    for one in reply.along or ():
-        where = ", ".join(f"{value:.3g}" for value in one.direction)
-        table.add_row(f"({where}) m/s²", f"{one.acceleration:z.2f}", _words(one.limiting))
-    out.print("\n[bold]largest accelerations of the body from rest, in W[/bold]")
-    out.print(table)
-
-
-def _unit_of(axis: str) -> str:
-    return "N" if axis.startswith("f") else "N·m"
-
-
-def _words(name: replies.LimitName | None) -> str:
-    if name is None:
-        return "-"
-    parts = (name.limb, name.joint, name.finger, name.phalanx, name.limit)
-    return " ".join(part for part in parts if part is not None)

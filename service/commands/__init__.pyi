@@ -1,1 +1,0 @@
-from .tables import table_of as table_of

@@ -48,8 +48,7 @@ from service.commands.terminal import (
 from service.commands.zenoh import demo, query, serve
 from service.replies import PlanReply
 from service.requests import PlanRequest
-from service.wire import REQUEST_KINDS
-from service.wire import schema as message_schema
+from service.wire import REQUEST_KINDS, schema as message_schema
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile

@@ -9,6 +9,7 @@ import click
 import msgspec
 
 from hand_models.parameters import ParameterTable
+from service.commands.body_space_table import print_body_space
 from service.commands.options import (
     asked,
     hand_option,
@@ -139,7 +140,7 @@ def body_space(
     """Show what the body can bear: which wrenches, and which accelerations."""
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
-    from service.answering import explore, print_body_space, robots_of
+    from service.answering import explore, robots_of
 
     plan = asked(read_request(stance), hand, robot)
     request = BodySpaceRequest(

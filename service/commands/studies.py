@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from hand_models.base import InvalidInputError
-from hand_models.studies import Claim, Study, StudyResult, load_study
+from hand_models.experiments import Claim, StudyResult
+from hand_models.studies import Study, load_study
 from hand_models.tile import surface_names
 from service.commands.tables import table_of
 

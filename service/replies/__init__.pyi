@@ -1,39 +1,43 @@
-from .messages import AXES as AXES
-from .messages import Acceleration as Acceleration
-from .messages import AxisCapability as AxisCapability
-from .messages import BodyCapability as BodyCapability
-from .messages import BodySection as BodySection
-from .messages import BodySpaceReply as BodySpaceReply
-from .messages import Certificate as Certificate
-from .messages import Closing as Closing
-from .messages import Contact as Contact
-from .messages import ErrorDetail as ErrorDetail
-from .messages import ErrorReply as ErrorReply
-from .messages import Finger as Finger
-from .messages import Generator as Generator
-from .messages import HalfSpaceEquations as HalfSpaceEquations
-from .messages import HalfSpaces as HalfSpaces
-from .messages import Hand as Hand
-from .messages import LimitName as LimitName
-from .messages import Palm as Palm
-from .messages import PlacedFrame as PlacedFrame
-from .messages import PlanReply as PlanReply
-from .messages import Price as Price
-from .messages import Reply as Reply
-from .messages import Row as Row
-from .messages import Seating as Seating
-from .messages import Solver as Solver
-from .messages import Stage as Stage
-from .messages import TensionLimit as TensionLimit
-from .messages import TensionPath as TensionPath
-from .messages import Tile as Tile
-from .messages import Time as Time
-from .messages import WrenchSet as WrenchSet
-from .messages import WrenchSpaceReply as WrenchSpaceReply
-from .messages import Wrist as Wrist
-from .stream import HandColumns as HandColumns
-from .stream import HandSetPoints as HandSetPoints
-from .stream import SetPointsReply as SetPointsReply
-from .stream import SetPointsRequest as SetPointsRequest
-from .stream import StreamReply as StreamReply
-from .stream import StreamRequest as StreamRequest
+from .messages import (
+    AXES as AXES,
+    Acceleration as Acceleration,
+    AxisCapability as AxisCapability,
+    BodyCapability as BodyCapability,
+    BodySection as BodySection,
+    BodySpaceReply as BodySpaceReply,
+    Certificate as Certificate,
+    Closing as Closing,
+    Contact as Contact,
+    ErrorDetail as ErrorDetail,
+    ErrorReply as ErrorReply,
+    Finger as Finger,
+    Generator as Generator,
+    HalfSpaceEquations as HalfSpaceEquations,
+    HalfSpaces as HalfSpaces,
+    Hand as Hand,
+    LimitName as LimitName,
+    Palm as Palm,
+    PlacedFrame as PlacedFrame,
+    PlanReply as PlanReply,
+    Price as Price,
+    Reply as Reply,
+    Row as Row,
+    Seating as Seating,
+    Solver as Solver,
+    Stage as Stage,
+    TensionLimit as TensionLimit,
+    TensionPath as TensionPath,
+    Tile as Tile,
+    Time as Time,
+    WrenchSet as WrenchSet,
+    WrenchSpaceReply as WrenchSpaceReply,
+    Wrist as Wrist,
+)
+from .stream import (
+    HandColumns as HandColumns,
+    HandSetPoints as HandSetPoints,
+    SetPointsReply as SetPointsReply,
+    SetPointsRequest as SetPointsRequest,
+    StreamReply as StreamReply,
+    StreamRequest as StreamRequest,
+)

@@ -1,27 +1,29 @@
-from .messages import Axis as Axis
-from .messages import AxisForce as AxisForce
-from .messages import BodySpaceRequest as BodySpaceRequest
-from .messages import Cylinder as Cylinder
-from .messages import Edge as Edge
-from .messages import Ellipsoid as Ellipsoid
-from .messages import ForceCap as ForceCap
-from .messages import Grasp as Grasp
-from .messages import Hand as Hand
-from .messages import Hold as Hold
-from .messages import Identifier as Identifier
-from .messages import Limits as Limits
-from .messages import Load as Load
-from .messages import Mesh as Mesh
-from .messages import Name as Name
-from .messages import Plane as Plane
-from .messages import PlanRequest as PlanRequest
-from .messages import Pose as Pose
-from .messages import Profile as Profile
-from .messages import Request as Request
-from .messages import RouteRequest as RouteRequest
-from .messages import Sphere as Sphere
-from .messages import Stance as Stance
-from .messages import Surface as Surface
-from .messages import Want as Want
-from .messages import Wrench as Wrench
-from .messages import WrenchSpaceRequest as WrenchSpaceRequest
+from .messages import (
+    Axis as Axis,
+    AxisForce as AxisForce,
+    BodySpaceRequest as BodySpaceRequest,
+    Cylinder as Cylinder,
+    Edge as Edge,
+    Ellipsoid as Ellipsoid,
+    ForceCap as ForceCap,
+    Grasp as Grasp,
+    Hand as Hand,
+    Hold as Hold,
+    Identifier as Identifier,
+    Limits as Limits,
+    Load as Load,
+    Mesh as Mesh,
+    Name as Name,
+    Plane as Plane,
+    PlanRequest as PlanRequest,
+    Pose as Pose,
+    Profile as Profile,
+    Request as Request,
+    RouteRequest as RouteRequest,
+    Sphere as Sphere,
+    Stance as Stance,
+    Surface as Surface,
+    Want as Want,
+    Wrench as Wrench,
+    WrenchSpaceRequest as WrenchSpaceRequest,
+)

@@ -1,9 +1,9 @@
-from .client import TIMEOUT as TIMEOUT
-from .client import CruxClient as CruxClient
-from .config import listening as listening
-from .config import open_session as open_session
-from .config import start_zenoh_log as start_zenoh_log
-from .config import zenoh_config as zenoh_config
-from .config import zenoh_options as zenoh_options
-from .server import PlanService as PlanService
-from .server import prepare_zenoh as prepare_zenoh
+from .client import TIMEOUT as TIMEOUT, CruxClient as CruxClient
+from .config import (
+    listening as listening,
+    open_session as open_session,
+    start_zenoh_log as start_zenoh_log,
+    zenoh_config as zenoh_config,
+    zenoh_options as zenoh_options,
+)
+from .server import PlanService as PlanService, prepare_zenoh as prepare_zenoh

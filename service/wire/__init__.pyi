@@ -1,20 +1,26 @@
-from .codec import Format as Format
-from .codec import decode_request as decode_request
-from .codec import encode_error as encode_error
-from .codec import identifier as identifier
-from .errors import REQUEST_KINDS as REQUEST_KINDS
-from .errors import UNREACHABLE as UNREACHABLE
-from .errors import LostError as LostError
-from .errors import MalformedError as MalformedError
-from .errors import NoServiceError as NoServiceError
-from .errors import ServiceError as ServiceError
-from .errors import ServiceTimeout as ServiceTimeout
+from .codec import (
+    Format as Format,
+    decode_request as decode_request,
+    encode_error as encode_error,
+    identifier as identifier,
+)
+from .errors import (
+    REQUEST_KINDS as REQUEST_KINDS,
+    UNREACHABLE as UNREACHABLE,
+    LostError as LostError,
+    MalformedError as MalformedError,
+    NoServiceError as NoServiceError,
+    ServiceError as ServiceError,
+    ServiceTimeout as ServiceTimeout,
+)
 from .json_schema import schema as schema
-from .keys import ALIVE as ALIVE
-from .keys import BODY_SPACE as BODY_SPACE
-from .keys import DEFAULT_ROBOT as DEFAULT_ROBOT
-from .keys import PLAN as PLAN
-from .keys import SET_POINTS as SET_POINTS
-from .keys import STREAM as STREAM
-from .keys import WRENCH_SPACE as WRENCH_SPACE
-from .keys import service_key as service_key
+from .keys import (
+    ALIVE as ALIVE,
+    BODY_SPACE as BODY_SPACE,
+    DEFAULT_ROBOT as DEFAULT_ROBOT,
+    PLAN as PLAN,
+    SET_POINTS as SET_POINTS,
+    STREAM as STREAM,
+    WRENCH_SPACE as WRENCH_SPACE,
+    service_key as service_key,
+)

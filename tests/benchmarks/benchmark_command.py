@@ -17,8 +17,7 @@ from typing import NamedTuple
 import click
 from batch_table import batch_tables, batches, rates
 from centroidal_table import CASES, centroidal_tables
-from growth import draw, growth
-from growth import steps as growth_steps
+from growth import draw, growth, steps as growth_steps
 from known_table import known_tables
 from plan_table import plan_tables
 from race import Race

@@ -16,8 +16,7 @@ from matplotlib.ticker import LogLocator
 from measured_stances import question_of, twin_of
 from plain_programs import Clarabel, scaled, unique
 from race import TURN, WARM, Way, race
-from test_many_hands import crawler_in
-from test_many_hands import question as crawler_question
+from test_many_hands import crawler_in, question as crawler_question
 
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import Hands, Sets, gather

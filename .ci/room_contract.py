@@ -1,0 +1,31 @@
+"""A contract for import-linter: from outside a room only its index is imported."""
+
+from grimp import ImportGraph
+from importlinter import Contract, ContractCheck, fields, output
+
+
+class RoomContract(Contract):
+    """Modules of ``package.room`` are imported by modules of that room only.
+
+    What others need of a room they import from ``package.room`` itself, its ``__init__``.
+    """
+
+    type_name = "rooms"
+
+    packages = fields.ListField(subfield=fields.StringField())
+
+    def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
+        """Return the imports that reach past an index."""
+        found = []
+        for importer in sorted(graph.modules):
+            for imported in sorted(graph.find_modules_directly_imported_by(importer)):
+                room = ".".join(imported.split(".")[:2])
+                inside = f"{importer}.".startswith(f"{room}.")
+                if imported != room and imported.split(".")[0] in self.packages and not inside:
+                    found.append(f"{importer} imports {imported}: import it from {room}")
+        return ContractCheck(kept=not found, metadata={"found": found})
+
+    def render_broken_contract(self, check: ContractCheck) -> None:
+        """Print those imports."""
+        for line in check.metadata["found"]:
+            output.print_error(line)

@@ -1,0 +1,165 @@
+"""SpinyHand in numbers: four fingers and a palm, placed in the hand frame H.
+
+H has its origin at the centre of the palm's tile grid, on the tiles' surface: x along the two inner
+fingers, z out of the palm into the rock, y = z × x. The two outer fingers turn on their bases by
+``outer_rotation``, outward through ±y: 0 puts all four alike, π opposes them (a pinch).
+
+A *base tile* sits on the rotating base of each outer finger, under the same tendon. It cannot turn
+toward the rock, so like a palm tile it engages where rock is within the spines' travel of it; then
+the tendon drags it as it drags the others, and it carries shear and its share of the lateral
+reaction, but no normal load (``assumed``).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.finger import FingerModel, Fingernail, Layer, TendonLoads
+from hand_models.hand.finger_frames import FingerFrame, FingerFrames, FrameStack, Layout
+from hand_models.hand.grasp import Grasp
+from hand_models.hand.names import FINGERS
+from hand_models.hand.structure import Structure
+from hand_models.parameters import ParameterTable, hand_table
+from hand_models.rock import Hold
+from hand_models.sections import Section
+from hand_models.tendon import PalmTendon, TendonDrive, shear_capacity
+
+__all__ = ["HandModel"]
+
+SHARES: Final = 512
+"""Choices of palm tiles, and of what one holds, whose shares are kept."""
+
+ROTATIONS: Final = 64
+"""Choices of outer rotations for which frames are kept, at most."""
+
+
+class HandModel:
+    """The hand's geometry and mechanics: what is known of it before it takes a hold.
+
+    Parameters
+    ----------
+    table : ParameterTable, optional
+        The numbers; ``parameters/hand.toml`` by default.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is missing or impossible.
+    """
+
+    def __init__(self, table: ParameterTable | None = None) -> None:
+        self.table = table = table or hand_table()
+        self._frames: dict[tuple[float, ...], FrameStack] = {}
+        self.palm_share = lru_cache(maxsize=SHARES)(self._palm_share)
+        self.finger = FingerModel.from_table(table)
+        self.drive = TendonDrive.from_table(table)
+        self.structure = Structure.from_table(table)
+        self.nail = Fingernail.from_table(table)
+        self.layer = Layer(self.finger)
+        self.tendon_loads = TendonLoads(self.finger)
+        # a tile on a finger's base only shifts the others on a tendon that rubs
+        self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]
+        self.mass = table.scalar("hand", "mass")
+        self.maximum_tension = table.positive("tendon", "maximum_tension")
+        self.closing_tension = table.positive("tendon", "closing_tension")
+        if self.closing_tension > self.maximum_tension:
+            raise InvalidInputError(
+                f"must be at most the tendon's {self.maximum_tension:g} N, "
+                f"got {self.closing_tension:g}",
+                field="tendon.closing_tension",
+            )
+        for name in ("holding_friction", "entry_friction"):
+            mu = table.scalar("tendon", name)
+            if not 0.0 <= mu < 1.0:
+                raise InvalidInputError(f"must be in [0, 1), got {mu:g}", field=f"tendon.{name}")
+        self.tendon_friction = table.scalar("tendon", "holding_friction")
+        self.spine_travel = table.scalar("tile", "spine_travel")
+        self.lateral_stiffness = table.positive("tile", "lateral_stiffness")
+        self.bending_stiffness = table.positive("beam", "bending_stiffness")
+        self.torsional_stiffness = table.positive("beam", "torsional_stiffness")
+        self.seated_contact = table.scalar("finger", "seated_contact")
+        self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
+        self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")
+        self.outer_axis = np.array(table.vector("fingers", "outer_axis"))
+        self.outer_reach = table.scalar("fingers", "outer_reach")
+        self.pinch_crest = 0.5 * (x + self.outer_axis.item(0) - self.outer_reach)
+        self.base_tile_reach = table.scalar("fingers", "base_tile_reach")
+        self.base_tile_surface = table.scalar("fingers", "base_tile_surface")
+        self.palm_tiles = np.array(
+            [
+                (x, y, 0.0)
+                for x in table.vector("palm", "tile_x")
+                for y in table.vector("palm", "tile_y")
+            ]
+        )
+        self.layout = Layout(
+            self.inner_joint,
+            self.outer_axis,
+            self.outer_reach,
+            self.base_tile_reach,
+            self.base_tile_surface,
+            self.palm_tiles,
+        )
+        self.palm_tile_size = np.array(table.vector("palm", "tile_size"))
+        self.palm_length = table.positive("palm", "length")
+        self.palm_friction = table.scalar("palm", "pulley_friction")
+        self.palm_own_friction = table.scalar("palm", "own_pulley_friction")
+        self.palm_spring = table.scalar("palm", "spring_stiffness")
+        self.palm_contact = table.vector("palm", "contact_stiffness")
+        self.palm_pressing = table.positive("palm", "pressing_limit")
+        self.palm_pressing_stiffness = table.positive("palm", "pressing_stiffness")
+        if len(self.palm_contact) != len(self.palm_tiles):
+            raise InvalidInputError(
+                f"one number for each of the {len(self.palm_tiles)} tiles",
+                field="palm.contact_stiffness",
+            )
+        try:
+            PalmTendon(
+                self.palm_contact, self.palm_spring, self.palm_friction, self.palm_own_friction
+            )
+        except InvalidInputError as error:
+            entry = str(error.field).replace("friction", "pulley_friction")
+            raise InvalidInputError(error.message, field=f"palm.{entry}") from None
+
+    def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
+        """Return the four fingers' frames in H, in the order of `FINGERS`."""
+        return self.finger_frames(outer_rotation).fingers
+
+    def finger_frames(self, outer_rotation: float) -> FingerFrames:
+        """Return the frames with the tiles that do not turn; up to `ROTATIONS` are kept."""
+        return self.frame_stack((outer_rotation,)).hands[0]
+
+    def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
+        """Return the frames of hands with these rotations; up to `ROTATIONS` stacks are kept."""
+        found = self._frames.get(outer_rotations)
+        if found is None:
+            if len(self._frames) >= ROTATIONS:
+                self._frames.clear()
+            found = FrameStack.of(
+                [FingerFrames.of(self.layout, angle) for angle in outer_rotations]
+            )
+            self._frames[outer_rotations] = found
+        return found
+
+    def _palm_share(
+        self, engaged: tuple[int, ...], tile_limit: float
+    ) -> tuple[float, float, float]:
+        """Return x and y of the centre of palm tiles [m], and what shear they share [N].
+
+        Zeros for no tiles. ``tile_limit`` is what one holds [N].
+        """
+        if not engaged:
+            return 0.0, 0.0, 0.0
+        x, y, _ = self.palm_tiles[list(engaged)].mean(axis=0).tolist()
+        stiffness = tuple([self.palm_contact[i] for i in engaged])
+        friction = self.palm_friction, tile_limit, self.palm_own_friction
+        return x, y, shear_capacity(stiffness, self.palm_spring, *friction)
+
+    def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
+        """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""
+        frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
+        return frame.cut(hold, hold_in_hand.inverse(), raw=grasp.fingernail)
