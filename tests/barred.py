@@ -16,7 +16,7 @@ from random_requests import random_request
 from stances import random_question
 
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import gather, posture
+from planner.prepare import assemble, posture
 from planner.programs import WRENCH_UNIT
 from planner.question import Question
 from planner.result import LimitName, Plan
@@ -46,7 +46,7 @@ class Barred(NamedTuple):
     spaces: dict[str, WrenchSpace]
 
     @property
-    def barriers(self) -> set[LimitName]:
+    def constraints(self) -> set[LimitName]:
         return {*self.names, *self.owners}
 
 
@@ -54,7 +54,7 @@ def barred(question: Question, cap: float | None) -> Barred:
     """The rows of a question; what joints, caps and present tensions say is in the hands' sets."""
     where = posture(question)
     wrench = question.needed_wrench(None if where is None else where.body_wrench)
-    _, hands = gather(question, where, wrench)
+    _, hands = assemble(question, where, wrench)
     spaces = list(hands.spaces)
     rows = peer.rows(question, spaces)
     limbs = [hand.limb for hand in question.stance.hands]
@@ -96,10 +96,10 @@ def barred(question: Question, cap: float | None) -> Barred:
     )
 
 
-def have_loads(parts: Barred, barriers: Collection[LimitName]) -> bool:
-    """Whether HiGHS finds loads up to `peer.HUGE` that balance and keep to these barriers."""
-    rows = [name in barriers for name in parts.names]
-    tied = [name in barriers for name in parts.owners]
+def have_loads(parts: Barred, constraints: Collection[LimitName]) -> bool:
+    """Whether HiGHS finds loads up to `peer.HUGE` that balance and keep to these constraints."""
+    rows = [name in constraints for name in parts.names]
+    tied = [name in constraints for name in parts.owners]
     result = peer.solve(
         np.zeros(parts.A.shape[1]),
         parts.A[rows],
@@ -113,9 +113,9 @@ def have_loads(parts: Barred, barriers: Collection[LimitName]) -> bool:
 
 
 def most_given(parts: Barred, direction: np.ndarray, held: dict[str, np.ndarray]) -> float | None:
-    """Max of direction · w + Σ held · v that the barriers allow: w the body's, v hands' wrenches.
+    """Max of direction · w + Σ held · v within the constraints: w the body's, v hands' wrenches.
 
-    None where the barriers contradict each other.
+    None where the constraints contradict each other.
     """
     row, rest = direction @ parts.B, float(direction @ parts.o)
     start = 0
@@ -131,7 +131,7 @@ def most_given(parts: Barred, direction: np.ndarray, held: dict[str, np.ndarray]
 
 
 def distance(parts: Barred) -> float:
-    """How far the body wrenches that the barriers and given components allow are, by SCS.
+    """How far the body wrenches that the constraints and given components allow are, by SCS.
 
     In `WRENCH_UNIT`, as a quadratic program without a box on the loads.
     """
@@ -148,7 +148,7 @@ def distance(parts: Barred) -> float:
 
 
 def miss(parts: Barred, wrench: np.ndarray) -> float:
-    """How far the body wrenches that the barriers allow stay from one: the largest component."""
+    """How far the body wrenches that the constraints allow stay from one: the largest component."""
     unit = np.ones((6, 1))
     none = np.zeros((len(parts.A), 1))
     target = wrench - parts.o

@@ -8,7 +8,7 @@ from hands import HAND, changed_hand, pinch, random_hand
 from stances import ask, on_wall, random_answer
 
 from hand_models import FINGERS, InvalidInputError
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.solving import plan
 
 DRIVE = HAND.drive
@@ -91,7 +91,7 @@ def test_a_plan_tells_torque_current_and_angle_of_every_motor():
     question = ask(on_wall())
     answer = plan(question)
     for place, hand in zip(question.stance.hands, answer.hands, strict=True):
-        settled = settle(place, question.stance)
+        settled = settle_hand(place, question.stance)
         for i, finger in enumerate(hand.fingers):
             torque = finger.tendon_tension * 0.0067 / 236.0 / 0.7
             assert finger.motor_torque == pytest.approx(torque, rel=1e-12)

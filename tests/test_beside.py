@@ -12,7 +12,7 @@ import pytest
 from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
-from planner.deadline import Beside, overlap as beside
+from planner.deadline import Overlap, overlap as beside
 from planner.programs import program
 from planner.solving import KnownStance, solve
 
@@ -24,7 +24,7 @@ def me() -> str:
 def test_a_solver_that_runs_has_the_work_done_by_another_thread():
     data = program_data(ask(on_wall()))
     program.unique(data)
-    with Beside(me) as work:
+    with Overlap(me) as work:
         assert work._begun is None
         program.unique(data)
         begun = work._begun
@@ -35,20 +35,20 @@ def test_a_solver_that_runs_has_the_work_done_by_another_thread():
 
 
 def test_without_a_solver_the_caller_does_it():
-    with Beside(me) as work:
+    with Overlap(me) as work:
         pass
     # it is over: no later solver begins it
-    beside.begin()
+    beside.begin_overlap()
     assert work._begun is None
     assert work.result() == me()
 
 
 def test_who_finds_the_other_thread_busy_does_it_alone():
     free = threading.Event()
-    with Beside(free.wait) as long:
-        beside.begin()
-    with Beside(me) as work:
-        beside.begin()
+    with Overlap(free.wait) as long:
+        beside.begin_overlap()
+    with Overlap(me) as work:
+        beside.begin_overlap()
     assert work.result() == me()
     free.set()
     assert long.result()
@@ -58,13 +58,13 @@ def test_what_the_work_raises_is_raised_to_its_caller():
     def fails() -> None:
         raise ZeroDivisionError
 
-    with Beside(fails) as work:
-        beside.begin()
+    with Overlap(fails) as work:
+        beside.begin_overlap()
     with pytest.raises(ZeroDivisionError):
         work.result()
     # the thread goes on
-    with Beside(me) as after:
-        beside.begin()
+    with Overlap(me) as after:
+        beside.begin_overlap()
     after._begun.result()
 
 
@@ -119,5 +119,5 @@ def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monke
     assert threads[0] != me()
     # of a stance that is known, it is known, too
     known = KnownStance(question)
-    assert known.plan(known.ground.wrench).utilisation == answer.utilisation
+    assert known.plan(known.prepared.wrench).utilisation == answer.utilisation
     assert len(threads) == 1

@@ -9,7 +9,7 @@ from stances import ask, on_wall, program_data, random_question
 
 from hand_models.rock import Cylinder
 from planner.programs import WRENCH_UNIT, program
-from planner.streaming.affine_bounds import cut
+from planner.streaming.affine_bounds import affine_bound
 
 QUESTIONS = {
     "wall": ask(on_wall()),
@@ -23,7 +23,7 @@ QUESTIONS = {
 def test_a_cut_is_the_least_utilisation_at_its_wrench_and_below_it_elsewhere(question, solve):
     data = program_data(question)
     outcome = solve(data)
-    found = cut(data, outcome)
+    found = affine_bound(data, outcome)
     least = peer.least_utilisation(question).fun
     assert found.slope @ question.needed_wrench() + found.constant == pytest.approx(least, rel=1e-6)
     rng = np.random.default_rng(5)
@@ -44,7 +44,7 @@ def test_a_cut_of_spoilt_multipliers_is_still_none_too_many(noise):
     def spoilt(parts):
         return tuple(part * (1.0 + noise * rng.normal(size=part.shape)) for part in parts)
 
-    found = cut(
+    found = affine_bound(
         data,
         replace(
             outcome,
@@ -63,4 +63,4 @@ def test_multipliers_that_prove_nothing_give_no_cut():
     # the limits of one hand alone cannot keep the balance from being had otherwise
     limits = (outcome.limit_duals[0], *(0.0 * part for part in outcome.limit_duals[1:]))
     hard = tuple(0.0 * part for part in outcome.hard_duals)
-    assert cut(data, replace(outcome, limit_duals=limits, hard_duals=hard)) is None
+    assert affine_bound(data, replace(outcome, limit_duals=limits, hard_duals=hard)) is None

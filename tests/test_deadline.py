@@ -439,7 +439,7 @@ def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock
 
 
 def ground_shape():
-    ground = grounds.ground_of(QUESTION)
+    ground = grounds.prepare_stance(QUESTION)
     return ground.hands.sets(ground.hands.at_rest(ground.hands.idle)).data.shape
 
 

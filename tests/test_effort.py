@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from stances import ask, on_wall, random_question
 
-from planner.prepare import gather, hand_space, posture
+from planner.prepare import assemble, hand_space, posture
 from planner.programs import HandData, StanceData, program, stance_data
 from planner.question import ForceCap, Limits, Question
 from planner.result import Price
@@ -46,7 +46,7 @@ class Quadratic:
     def __init__(self, question: Question) -> None:
         where = posture(question)
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
-        _, self.hands = gather(question, where, wrench)
+        _, self.hands = assemble(question, where, wrench)
         sets = list(self.hands.spaces)
         self.rows = peer.rows(question, sets)
         size = self.rows.L.shape[1]

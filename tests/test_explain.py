@@ -12,7 +12,7 @@ from stances import CALIBRATION_LOAD, ask, on_wall
 from hand_models.base import Pose
 from hand_models.rock import Cylinder, Plane
 from planner.explanation import overload_sentence, shortfall_sentence
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.programs import WRENCH_UNIT
 from planner.question import Limits, Question
 from planner.solving import plan
@@ -134,7 +134,7 @@ def test_no_tile_of_a_bundled_hand_is_inside_its_rock():
     for name in ("wall", "wall-300", "wall-700", "overhang", "slab"):
         stance = bundled(name).stance
         for place in stance.hands:
-            hand = settle(place, stance)
+            hand = settle_hand(place, stance)
             into_rock = hand.seating.pose.inverse()
             for point in hand.positions:
                 depth = hand.hold.entry(into_rock.apply(point), into_rock.rotation[:, 2])

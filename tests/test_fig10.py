@@ -8,7 +8,7 @@ import pytest
 
 from hand_models import Surface
 from hand_models.studies import fig10, run_study
-from hand_models.tile import SpineArray, inner_half_planes, reach
+from hand_models.tile import SpineArray, directional_strength, inner_half_planes
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_the_gap_of_each_number_of_half_planes_is_told(study):
     assert inner == sorted(inner)
     assert outer == sorted(outer, reverse=True)
     surface = Surface.named("sandpaper-36")
-    sideways = reach(inner_half_planes(surface), np.array([[0.0, 0.0, 1.0]]))[0]
+    sideways = directional_strength(inner_half_planes(surface), np.array([[0.0, 0.0, 1.0]]))[0]
     assert rows[0]["lateral_reach"] == pytest.approx(sideways / 21.0)
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hand_models.experiments import reach
+from hand_models.experiments import distance_along
 from hand_models.studies import fig14, run_study
 from hand_models.studies.fig14 import loading_planes
 
@@ -75,6 +75,6 @@ def test_no_plane_holds_more_than_the_best(study):
             assert best["arm"] * best["ratio"] == pytest.approx(1.0)
         # pure pull-off is in every plane, shear in the plane's own direction
         arms = np.array(planes["arm"])
-        down = reach(points, np.array([[0.0, -1.0, 0.0]]))[0]
-        along = reach(points, np.column_stack([np.ones(len(arms)), 0.0 * arms, arms]))
+        down = distance_along(points, np.array([[0.0, -1.0, 0.0]]))[0]
+        along = distance_along(points, np.column_stack([np.ones(len(arms)), 0.0 * arms, arms]))
         assert (np.array(planes["force"]) >= np.maximum(down, along) - 1e-9).all()

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 from rocks import distance, random_axes, random_hold
 
 from hand_models import Plane, spiny_hand
-from hand_models.finger import Contact, SettledFinger, settle
+from hand_models.finger import Contact, SettledFinger, settle_finger
 from hand_models.sections import LEVEL, FlatSection, RoundSection
 
 MODEL = spiny_hand().finger
@@ -28,7 +28,9 @@ def on_circle(radius, first_contact=0.0247, first_angle=0.25):
     u = np.array([math.cos(first_angle), math.sin(first_angle)])
     n = np.array([-u[1], u[0]])
     centre = first_contact * u + (radius + H) * n
-    return settle(MODEL, RoundSection((float(centre[0]), float(centre[1])), radius), (0.0, 0.0))
+    return settle_finger(
+        MODEL, RoundSection((float(centre[0]), float(centre[1])), radius), (0.0, 0.0)
+    )
 
 
 def random_finger(seed):
@@ -40,7 +42,7 @@ def random_finger(seed):
         # a joint from which a tile can lie tangent to rock of little curvature
         below = hold.entry(origin, np.array([0.0, 0.0, 1.0]))
         origin[2] += (below if math.isfinite(below) else 0.0) - H - rng.uniform(0.0, 0.005)
-    finger = settle(MODEL, hold.section(origin, axes[:, 0], axes[:, 2]), (0.0, 0.0))
+    finger = settle_finger(MODEL, hold.section(origin, axes[:, 0], axes[:, 2]), (0.0, 0.0))
 
     def clearance(points):
         return distance(hold, origin + points[..., :1] * axes[:, 0] + points[..., 1:] * axes[:, 2])
@@ -93,7 +95,7 @@ def test_contacts_lie_on_the_rock_and_tangent_faces_do_not_cut_it(seed):
 def off_disc(stand_off, radius=0.3):
     """A finger whose joint is off the crest of a disc."""
     centre = np.array([0.0, stand_off + radius])
-    return settle(MODEL, RoundSection((0.0, float(centre[1])), radius), (0.0, 0.0)), centre
+    return settle_finger(MODEL, RoundSection((0.0, float(centre[1])), radius), (0.0, 0.0)), centre
 
 
 def test_a_phalanx_that_touches_beyond_its_tile_holds_by_its_edge_if_spines_reach():
@@ -123,7 +125,9 @@ def test_a_bare_frame_presses_where_spines_cannot_reach():
     u = np.array([math.cos(angle), math.sin(angle)])
     n = np.array([-u[1], u[0]])
     centre = 0.042 * u + (H + 0.003) * n
-    contact = settle(MODEL, RoundSection((centre[0], centre[1]), 0.003), (0.0, 0.0)).contacts[0]
+    contact = settle_finger(
+        MODEL, RoundSection((centre[0], centre[1]), 0.003), (0.0, 0.0)
+    ).contacts[0]
     assert (contact.kind, contact.stop) == ("frame", None)
     assert contact.angle == pytest.approx(angle, abs=1e-9)
     assert contact.along == pytest.approx(0.042, abs=1e-9)
@@ -131,7 +135,7 @@ def test_a_bare_frame_presses_where_spines_cannot_reach():
 
 def test_from_a_joint_close_to_the_rock_a_tile_touches_with_its_near_edge():
     section = RoundSection((0.0, 0.303), 0.3)
-    contact = settle(MODEL, section, (0.0, 0.0)).contacts[0]
+    contact = settle_finger(MODEL, section, (0.0, 0.0)).contacts[0]
     assert (contact.kind, contact.along) == ("edge", MODEL.tile_range[0])
     assert np.hypot(*(contact.point(H) - np.array([0.0, 0.303]))) == pytest.approx(0.3, abs=1e-9)
 
@@ -153,14 +157,14 @@ def test_phalanges_form_a_chain_within_their_joints_limits(seed):
 
 
 def test_on_flat_rock_at_tile_height_every_tile_lies_flat_at_its_centre():
-    finger = settle(MODEL, FlatSection((0.0, 1.0), H), (0.0, 0.0))
+    finger = settle_finger(MODEL, FlatSection((0.0, 1.0), H), (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, 0.0, atol=1e-12)
     assert [c.along for c in finger.contacts] == [MODEL.tile_centre] * 3
     assert all(finger.touching)
 
 
 def test_without_rock_a_finger_closes_fully_and_carries_nothing():
-    finger = settle(MODEL, None, (0.0, 0.0))
+    finger = settle_finger(MODEL, None, (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, MODEL.joint_upper)
     shears = finger.shears(37.0)
     np.testing.assert_array_equal(shears, 0.0)
@@ -272,5 +276,5 @@ def test_a_wall_turned_away_from_the_finger_is_not_touched():
     tilt = 0.9  # rad: steeper than the hyperextension of the first joint allows
     s = np.array([math.cos(tilt), 0.0, -math.sin(tilt)])
     t = np.array([math.sin(tilt), 0.0, math.cos(tilt)])
-    finger = settle(MODEL, plane.section([0.0, 0.0, -0.05], s, t), (0.0, 0.0))
+    finger = settle_finger(MODEL, plane.section([0.0, 0.0, -0.05], s, t), (0.0, 0.0))
     assert not finger.touching[0]

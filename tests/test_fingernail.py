@@ -32,7 +32,7 @@ from hand_models.rock import Hold
 from hand_models.wrench_spaces import space as wrench_space
 from planner.explanation import warnings
 from planner.pictures import plot_plan, plot_wrench_space
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
 from planner.result import Plan
 from planner.solving import plan
@@ -393,7 +393,7 @@ def one_hand(hand=HAND, hold: Hold | None = None, place: float = 0.001) -> Stanc
 
 def hung(stance: Stance, pull: float) -> Question:
     """Ask the hand to pull with so much along −x and half a tenth of it into the rock."""
-    settled = settle(stance.hands[0], stance)
+    settled = settle_hand(stance.hands[0], stance)
     places = settled.positions[nail_rows(settled)]
     force = pull / 4.0 * np.array([-1.0, 0.0, 0.05])
     wrench = np.concatenate([4.0 * force, np.cross(places, force).sum(axis=0)])
@@ -462,7 +462,7 @@ def spoilt(answer: Plan, finger: str = "inner_left", **changes) -> Plan:
 
 
 def complaints(answer: Plan, question: Question) -> str:
-    hands = [settle(hand, question.stance) for hand in question.stance.hands]
+    hands = [settle_hand(hand, question.stance) for hand in question.stance.hands]
     return "; ".join(
         problems(question, hands, answer.hands, answer.utilisation, answer.body_wrench)
     )
@@ -498,7 +498,7 @@ def test_a_nail_that_touches_nothing_may_carry_nothing():
     near, far = ([[-0.3, z], [0.0, z], [0.0, 0.03], [0.3, 0.03]] for z in (0.0, 0.015))
     sides = {name: near if name.endswith("left") else far for name in FINGERS}
     stance = one_hand(hold=Profile(sides))
-    settled = settle(stance.hands[0], stance)
+    settled = settle_hand(stance.hands[0], stance)
     assert contacts(settled) == ["nail", "nail", "none", "none"]
     assert "front_left: 2 of 4 nails hook" in warnings(stance, [settled])
     force = np.array([-100.0, 0.0, 5.0])
@@ -520,7 +520,7 @@ def test_a_nail_that_touches_nothing_may_carry_nothing():
 
 def test_a_winch_draws_in_its_nail_too():
     question = hung(one_hand(), 400.0)
-    settled = settle(question.stance.hands[0], question.stance)
+    settled = settle_hand(question.stance.hands[0], question.stance)
     for i, finger in enumerate(plan(question).hands[0].fingers):
         tiles = 4 if finger.name.startswith("outer") else 3
         # free tiles slide on their springs: 2 · 2 f / 11.5 N/mm each; the joints stay straight

@@ -13,7 +13,7 @@ from stances import on_wall
 from test_floating_plan import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 
 from hand_models.base import wrench_transport
-from planner.prepare import gather, posture
+from planner.prepare import assemble, posture
 from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
 from planner.question import ForceCap, Limits, Question
 from planner.result import HandPlan, Plan
@@ -90,7 +90,7 @@ def promised(question: Question, answer: Plan, cap: float) -> float:
 
     Effort is convex on them, so that it lies above its tangent at the plan.
     """
-    _, hands = gather(question, posture(question), answer.body_wrench)
+    _, hands = assemble(question, posture(question), answer.body_wrench)
     data = hands.sets(hands.at_rest(hands.idle)).data.hands
     spaces = [hand.space for hand in answer.hands]
     loads = [loads_of(hand) for hand in answer.hands]

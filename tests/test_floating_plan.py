@@ -13,8 +13,8 @@ from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models.base import InvalidInputError, UnsupportedError, wrench_transport
 from hand_models.compliance import CompliantHand, FloatingWrist
-from hand_models.finger import settle as settle_finger
-from planner.prepare import settle
+from hand_models.finger import settle_hand as settle_finger
+from planner.prepare import settle_hand
 from planner.programs import TWIST_UNIT
 from planner.question import HandOnHold, Question, Stance
 from planner.result import Plan
@@ -39,7 +39,7 @@ def floating(stance: Stance, *limbs: str, preload=None) -> Stance:
 
 
 def wrist_of(hand: HandOnHold, stance: Stance) -> FloatingWrist:
-    return FloatingWrist(CompliantHand(settle(hand, stance), hand.tendon_preload))
+    return FloatingWrist(CompliantHand(settle_hand(hand, stance), hand.tendon_preload))
 
 
 def body_wrench(stance: Stance, twists) -> np.ndarray:
@@ -118,7 +118,7 @@ def test_fingers_are_where_they_settle_from_the_displaced_base():
     """Contacts on a cylinder, found by the search that closes a finger on any rock."""
     question, answer = mixed()
     place, hand = question.stance.hands[1], answer.hands[1]
-    settled = settle(place, question.stance)
+    settled = settle_hand(place, question.stance)
     turn = np.cross(np.eye(3), hand.wrist.twist[3:])
     for name, frame, finger in zip(
         ("outer_left", "inner_left"),
@@ -173,7 +173,7 @@ def test_hand_asked_for_its_wrench_at_rest_stays_there():
     answer = plan(Question(stance, body_wrench=body_wrench(stance, [np.zeros(6)])))
     assert answer.status == "optimal"
     np.testing.assert_allclose(answer.hands[0].wrist.twist, 0.0, atol=1e-9)
-    settled = settle(stance.hands[0], stance)
+    settled = settle_hand(stance.hands[0], stance)
     told = [t.shear for f in answer.hands[0].fingers for t in f.tiles]
     at_rest = settled.loads[:, 0] @ [1.0, settled.closing_tension]
     np.testing.assert_allclose(told, at_rest, atol=1e-6)
@@ -254,7 +254,7 @@ def test_check_finds_what_is_wrong(spoilt):
         numbers = getattr(hand, name).copy()
         numbers[index] += 0.01
         hand = replace(hand, **{name: numbers})
-    settled = [settle(place, question.stance) for place in question.stance.hands]
+    settled = [settle_hand(place, question.stance) for place in question.stance.hands]
     hands = (answer.hands[0], hand, *answer.hands[2:])
     assert problems(question, settled, hands, answer.utilisation, answer.body_wrench)
     assert not problems(question, settled, answer.hands, answer.utilisation, answer.body_wrench)

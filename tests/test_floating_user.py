@@ -16,7 +16,7 @@ from hand_models.compliance import CompliantHand, FloatingWrist
 from planner.deadline import Budget
 from planner.explanation import far_wrists
 from planner.floating import continuation
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.programs import program
 from planner.question import Question
 from planner.result import Plan
@@ -122,7 +122,7 @@ def test_tension_that_a_slack_hand_needs_holds_its_tiles():
         assert told[0] in answer.reason
     need = float(told[0].split("it needs about ")[1].split(" N")[0])
     place = asked.stance.hands[1]
-    hand = settle(place, asked.stance)
+    hand = settle_hand(place, asked.stance)
     for tension, holds in ((need + 1.0, True), (need - 1.0, False)):
         loads = CompliantHand(hand, np.full(4, tension)).loads(np.zeros((1, 6)))
         assert bool((loads.shears[0][hand.touching] >= -1e-6).all()) == holds
@@ -133,7 +133,7 @@ def test_preload_that_alone_overloads_is_named():
     answer = plan(asked)
     told = [text for text in answer.warnings if "tendon_preload alone" in text]
     place = asked.stance.hands[1]
-    wrist = FloatingWrist(CompliantHand(settle(place, asked.stance), place.tendon_preload))
+    wrist = FloatingWrist(CompliantHand(settle_hand(place, asked.stance), place.tendon_preload))
     used = wrist.judge(np.zeros((1, 6))).utilisation[0]
     assert used > 1.0
     assert f"utilisation {used:.3g} at rest" in told[0]

@@ -15,7 +15,7 @@ from stances import ask, moved, on_wall, random_stance
 from hand_models.base import Pose, wrench_transport, wrench_transports
 from hand_models.hand import FINGERS
 from hand_models.rock import Cylinder
-from planner.prepare import Hands, gather, posture
+from planner.prepare import HandSets, assemble, posture
 from planner.programs import HandData, StanceData, scaled_rows
 from planner.question import ForceCap, Limits, Question
 
@@ -28,10 +28,10 @@ LOAD = 100.0
 SEEDS = st.integers(0, 40)
 
 
-def gathered(question: Question) -> tuple[Hands, StanceData]:
+def gathered(question: Question) -> tuple[HandSets, StanceData]:
     where = posture(question)
     wrench = question.needed_wrench(None if where is None else where.body_wrench)
-    _, hands = gather(question, where, wrench)
+    _, hands = assemble(question, where, wrench)
     return hands, hands.sets(hands.at_rest(hands.idle)).data
 
 
@@ -43,7 +43,9 @@ def on_body(stance, i: int, wrench: np.ndarray) -> np.ndarray:
     return np.concatenate([force, moment + np.cross(place, force)])
 
 
-def check_hand(question: Question, hands: Hands, data: StanceData, i: int, y: np.ndarray) -> None:
+def check_hand(
+    question: Question, hands: HandSets, data: StanceData, i: int, y: np.ndarray
+) -> None:
     """A hand's data at loads y [N], against its set's own numbers."""
     space, hand, z = hands.spaces[i], data.hands[i], y / LOAD
     np.testing.assert_array_equal(hand.unit, LOAD)

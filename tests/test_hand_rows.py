@@ -13,7 +13,7 @@ from stances import on_wall
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import BALL, FORCE_CAP, TENSION_CHANGE, hand_space
-from planner.prepare.stance_constraints import AddedRows, JointLoads
+from planner.prepare.stance_constraints import JointLoads, StanceConstraints
 from planner.programs import JOINT_TORQUE
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -53,7 +53,7 @@ def broken(made: WrenchSpace, y: np.ndarray) -> dict[str, float]:
 def test_joint_rows_are_the_joints_torques_with_both_signs(seed):
     rng = np.random.default_rng(seed)
     joints, y = random_joints(rng), random_loads(rng)
-    made = AddedRows(joints=joints).on(space())
+    made = StanceConstraints(joints=joints).on(space())
     wrench = space().origin + space().generators @ y
     found = used(made, y)
     for i, name in enumerate(joints.names):
@@ -69,7 +69,7 @@ def test_joint_rows_are_the_joints_torques_with_both_signs(seed):
 def test_rows_that_are_added_leave_the_others_as_they_are(seed):
     rng = np.random.default_rng(seed)
     y = random_loads(rng)
-    added = AddedRows(random_joints(rng), 100.0, np.eye(3), rng.uniform(0.0, 90.0, 4), 5.0)
+    added = StanceConstraints(random_joints(rng), 100.0, np.eye(3), rng.uniform(0.0, 90.0, 4), 5.0)
     made, before = added.on(space()), space()
     plain, all_of_them = used(before, y), used(made, y)
     assert {label: all_of_them[label] for label in plain} == plain
@@ -85,9 +85,9 @@ def test_rows_that_are_added_leave_the_others_as_they_are(seed):
 
 
 def test_nothing_asked_adds_nothing():
-    assert AddedRows().on(space()) is space()
-    assert AddedRows(present=np.zeros(4)).on(space()) is space()
-    assert AddedRows(change=5.0).on(space()) is space()
+    assert StanceConstraints().on(space()) is space()
+    assert StanceConstraints(present=np.zeros(4)).on(space()) is space()
+    assert StanceConstraints(change=5.0).on(space()) is space()
 
 
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 1e-3))
@@ -111,7 +111,7 @@ def test_26_directions_enclose_the_ball_and_no_more():
 @given(SEEDS, st.one_of(st.floats(1.0, 1e3), st.integers(1, 1000)))
 def test_a_cap_whatever_the_direction(seed, most):
     y = random_loads(np.random.default_rng(seed))
-    found = used(AddedRows(cap=most).on(space()), y)
+    found = used(StanceConstraints(cap=most).on(space()), y)
     told = max(share for label, share in found.items() if label.startswith(FORCE_CAP))
     size = float(np.linalg.norm(space().wrench(y)[:3]))
     assert size * (1.0 - 1e-9) <= told * most <= 1.12 * size + 1e-9
@@ -123,7 +123,7 @@ def test_a_cap_along_axes_of_a_frame(seed):
     frame = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
     y = random_loads(rng)
     cap = ((-30.0, 50.0), (-math.inf, 20.0), (0.0, math.inf))
-    made = AddedRows(cap=cap, frame=frame).on(space())
+    made = StanceConstraints(cap=cap, frame=frame).on(space())
     found, hard = used(made, y), broken(made, y)
     along = [float(frame[:, i] @ space().wrench(y)[:3]) for i in range(3)]
     assert {label for label in found if label.startswith(FORCE_CAP)} == {
@@ -140,7 +140,7 @@ def test_a_cap_along_axes_of_a_frame(seed):
 def test_changes_of_tension_are_hard(seed, most):
     rng = np.random.default_rng(seed)
     y, present = random_loads(rng), rng.uniform(0.0, 100.0, 4)
-    hard = broken(AddedRows(present=present, change=most).on(space()), y)
+    hard = broken(StanceConstraints(present=present, change=most).on(space()), y)
     for i, finger in enumerate(FINGERS):
         tension = y[space().columns.index(f"{finger}/tension")]
         up, down = (hard[f"{finger}/{TENSION_CHANGE}/{way}"] for way in ("up", "down"))

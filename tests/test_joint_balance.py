@@ -9,9 +9,9 @@ from stances import ask, on_wall, random_stance
 
 from hand_models.base import wrench_transport
 from hand_models.rock import Cylinder
-from planner.prepare import NOTHING, Stacked, settle, stacked
-from planner.result import Carried
-from planner.solving.prepared_stance import ground_of
+from planner.prepare import NOTHING, HandBatch, batch_of, settle_hand
+from planner.result import PlanArrays
+from planner.solving.prepared_stance import prepare_stance
 from planner.solving.solve import plan_on
 from planner.verification import Check
 from planner.verification.equilibrium import equilibrium
@@ -27,11 +27,11 @@ STANCES = {
 }
 
 
-def of_stance(stance) -> Stacked:
-    return stacked(tuple(settle(hand, stance) for hand in stance.hands))
+def of_stance(stance) -> HandBatch:
+    return batch_of(tuple(settle_hand(hand, stance) for hand in stance.hands))
 
 
-def wrenches(known: Stacked, loads: np.ndarray) -> np.ndarray:
+def wrenches(known: HandBatch, loads: np.ndarray) -> np.ndarray:
     """What tiles with these loads (T, 3) do about the origin of H."""
     forces = np.einsum("tk,tkx->tx", loads, known.axes)
     return np.hstack([forces, np.cross(known.points[: len(loads)], forces)])
@@ -107,10 +107,10 @@ def test_a_balance_off_by_little_tells_loads_that_are_off_by_little(stance):
 def test_tiles_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agree(what):
     """A distal tile 10 mm off, or turned, and normals, forces, wrench and shares that fit it."""
     question = ask(on_wall())
-    ground = ground_of(question)
+    ground = prepare_stance(question)
     answer = plan_on(ground, time.perf_counter())
     check = Check(question, ground.settled, None)
-    honest = Carried.of(answer.hands)
+    honest = PlanArrays.of(answer.hands)
     tiles = [
         t
         for t, tile in enumerate(answer.hands[0].tiles)

@@ -11,7 +11,7 @@ from jointed import at_joints
 from stances import ask, on_wall
 
 from hand_models.base import Pose
-from planner.prepare import gather, posture
+from planner.prepare import assemble, posture
 from planner.question import ForceCap, Limits, Question
 from planner.result import Price
 from planner.robots import robosimian
@@ -33,7 +33,7 @@ def jointed(limbs: tuple[str, ...], torque: dict) -> Question:
 def least(question: Question) -> float:
     """The least utilisation, with limbs that hold nothing."""
     where = posture(question)
-    _, hands = gather(question, where, question.needed_wrench())
+    _, hands = assemble(question, where, question.needed_wrench())
     result = peer.least_utilisation(question, list(hands.spaces))
     assert result.status == 0, result.message
     limbs = [hand.limb for hand in question.stance.hands]

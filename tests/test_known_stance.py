@@ -54,4 +54,4 @@ def test_a_wrench_that_is_none_is_refused_and_costs_nothing(wrench, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
         known.plan(wrench)
     assert caught.value.field == "body_wrench"
-    assert known.plan(known.ground.wrench).status == "optimal"
+    assert known.plan(known.prepared.wrench).status == "optimal"

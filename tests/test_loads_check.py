@@ -131,7 +131,7 @@ def test_a_tendon_with_friction_must_not_be_slackened():
     robot = replace(WALL.stance.robot, hand=hand)
     known = StreamStance(replace(WALL, stance=replace(WALL.stance, robot=robot)))
     loads = known.solve(known.first).loads
-    closing = known._known.ground.settled[0].closing_tension
+    closing = known._known.prepared.settled[0].closing_tension
     for slack, expected in ((0.0, None), (0.01, "a load of the wrong sign")):
         loads[0, 0] = closing - slack
         assert fault(known, loads, given_by(known, loads)) == expected
@@ -140,7 +140,7 @@ def test_a_tendon_with_friction_must_not_be_slackened():
 def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes():
     known = StreamStance(WALL)
     loads, _ = honest()
-    weak = replace(known._known.ground.settled[0].surface, shear_limit=20.0, pull_off_limit=2.0)
+    weak = replace(known._known.prepared.settled[0].surface, shear_limit=20.0, pull_off_limit=2.0)
     count = len(known.check._curves._numbers.gain)
     known.check._curves = LimitCurves([weak], np.zeros(count, dtype=int))
     assert fault(known, loads, known.first) == "a tile's limit curve"

@@ -64,7 +64,7 @@ def test_the_nearest_body_wrench_can_be_held_and_no_nearer_one(status, seeds):
         parts = barred(question, proof.utilisation)
         if proof.nearest is None:
             assert proof.shortfall is None
-            assert not have_loads(replaced(parts), parts.barriers), label
+            assert not have_loads(replaced(parts), parts.constraints), label
             continue
         seen += 1
         np.testing.assert_allclose(proof.nearest + proof.shortfall, answer.body_wrench, atol=1e-6)
@@ -159,9 +159,9 @@ def test_a_wrench_that_a_hand_cannot_exert_is_a_barrier():
     answer = plan(ask(replace(stance, hands=(first, *stance.hands[1:]))))
     proof = answer.certificate
     assert answer.status == "infeasible"
-    barrier = LimitName(first.limb, None, None, HELD_WRENCH)
-    assert barrier in proof.irreducible
-    assert barrier not in proof.blocking
+    constraint = LimitName(first.limb, None, None, HELD_WRENCH)
+    assert constraint in proof.irreducible
+    assert constraint not in proof.blocking
     assert proof.held[first.limb][2] > 0.0
     assert "must exert the wrench that it is given" in answer.reason
 
@@ -197,7 +197,7 @@ def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way
     assert answer.status == "overloaded"
     assert proof.irreducible[0] == proof.blocking[0] == own
     parts = barred(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})), 1.0)
-    alone = {n for n in proof.irreducible if have_loads(parts, parts.barriers - {n})}
+    alone = {n for n in proof.irreducible if have_loads(parts, parts.constraints - {n})}
     assert own in alone
     assert set(proof.sufficient) == alone
     assert f"would let it be held: {limb} force_cap" in printed(answer)

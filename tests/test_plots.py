@@ -27,7 +27,7 @@ from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.base import Pose
 from hand_models.rock import Mesh, Profile
 from hand_models.rock.profile import STRIPS
-from planner.explanation import barrier_words
+from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
 from planner.pictures.plan_scene import scene_of, sights
 from planner.pictures.plan_views import COLOURS, LIMB
@@ -35,7 +35,7 @@ from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
 from planner.pictures.route_plots import draw_route
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
-from planner.route import Stage
+from planner.route import RouteStage
 from planner.solving import solve
 from service.answering import questions
 from service.commands.cli import run
@@ -273,7 +273,7 @@ def test_where_nothing_balances_the_picture_says_what_is_missing_and_what_leaves
     text = words(panel)[-1]
     assert proof.irreducible
     first = proof.irreducible[0]
-    assert f"{first.limb.replace('_', ' ')}:\n    {barrier_words(first)}" in text
+    assert f"{first.limb.replace('_', ' ')}:\n    {constraint_words(first)}" in text
     for name in proof.irreducible:
         assert f"{name.limb.replace('_', ' ')}:" in text
 
@@ -292,7 +292,7 @@ def test_where_loads_of_any_sign_give_nothing_the_picture_says_so():
 )
 def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, crux):
     question, plan = answered("plain")
-    stages = [Stage(i, i, "lift", "front_left", question) for i in range(len(used))]
+    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(len(used))]
     plans = [replace(plan, utilisation=u, load_factor=None) for u in used]
     route = SimpleNamespace(name="up", limits=Limits())
     result = SimpleNamespace(plans=plans, stages=stages, route=route, crux=crux)

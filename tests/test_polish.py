@@ -10,7 +10,7 @@ from hand_models.base import InvalidInputError
 from planner.programs import program, stance_data
 from planner.question import Load
 from planner.solving import KnownStance
-from planner.solving.active_set import polished
+from planner.solving.active_set import active_set_optimum
 
 
 def problems():
@@ -39,7 +39,7 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
     count = 0
     for data in data_of_all:
         outcome = program.unique(data)
-        exact = polished(data, outcome)
+        exact = active_set_optimum(data, outcome)
         if exact is None:
             continue
         count += 1
@@ -64,7 +64,7 @@ def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
         hard_duals=tuple(np.zeros_like(dual) for dual in outcome.hard_duals),
         loads=tuple(np.full_like(y, 1e3) for y in outcome.loads),
     )
-    found = polished(data, lost)
+    found = active_set_optimum(data, lost)
     assert found is None or found.utilisation == pytest.approx(outcome.value, abs=1e-6)
 
 
@@ -73,7 +73,7 @@ def test_tensions_change_continuously_where_plans_become_overloaded():
     known = KnownStance(ask(on_wall(overhang=0.5)))
     before = None
     for share in np.linspace(0.95, 1.1, 60):
-        answer = known.plan(share * known.ground.wrench)
+        answer = known.plan(share * known.prepared.wrench)
         tensions = np.array([[f.tendon_tension for f in hand.fingers] for hand in answer.hands])
         if before is not None:
             assert np.abs(tensions - before).max() < 2.0

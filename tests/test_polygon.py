@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from hand_models.base import SolverError
 from planner.capability import Polygon
-from planner.capability.polygon import Touch, enclose
+from planner.capability.polygon import SupportPoint, enclose
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -24,14 +24,14 @@ def hull_of(points, calls=None):
         along = points @ normal
         most = along.max()
         far = points[along >= most - 1e-9 * (1.0 + abs(most))]
-        return Touch(far.mean(axis=0), float(most))
+        return SupportPoint(far.mean(axis=0), float(most))
 
     return touching
 
 
 def disc(radius, centre=(0.0, 0.0)):
     centre = np.array(centre)
-    return lambda n: Touch(centre + radius * n, float(centre @ n) + radius)
+    return lambda n: SupportPoint(centre + radius * n, float(centre @ n) + radius)
 
 
 def area(points):

@@ -10,11 +10,11 @@ from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Edge, Ellipsoid, Sphere
-from hand_models.finger import Closing, close_all, settle as settle_one
+from hand_models.finger import OpenFinger, close_all, settle_finger as settle_one
 from hand_models.finger.contact_states import close
 from hand_models.finger.limit_postures import PATTERNS, at_limits
-from hand_models.finger.posture_loads import Tendons, left_torque, loads
-from hand_models.finger.postures import settle, swing
+from hand_models.finger.posture_loads import TendonBatch, left_torque, loads
+from hand_models.finger.postures import settle_fingers, swing
 from hand_models.sections import section_rows
 
 MODEL = HAND.finger
@@ -24,7 +24,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 def random_closings(rng, count):
     return [
-        Closing(
+        OpenFinger(
             random_section(rng),
             random_surface(rng),
             float(rng.uniform(15.0, 60.0)),
@@ -35,7 +35,7 @@ def random_closings(rng, count):
 
 
 def tendons_of(model, closings):
-    return Tendons.of(
+    return TendonBatch.of(
         model,
         [closing.tension for closing in closings],
         [closing.base_tile for closing in closings],
@@ -61,7 +61,7 @@ def test_many_fingers_settle_as_each_does(seed):
     rng = np.random.default_rng(seed)
     sections = [random_section(rng) for _ in range(6)]
     with np.errstate(invalid="ignore", divide="ignore"):
-        fingers = settle(MODEL, section_rows(sections), len(sections))
+        fingers = settle_fingers(MODEL, section_rows(sections), len(sections))
     for i, section in enumerate(sections):
         assert_alike(fingers.finger(MODEL, i), settle_one(MODEL, section, (0.0, 0.0)))
 
@@ -98,7 +98,7 @@ def test_what_is_left_at_a_joint_that_swings_is_as_its_geometry_says(seed):
     rock = section_rows([closing.section for closing in closings])
     tendons = tendons_of(MODEL, closings).take(of)
     with np.errstate(invalid="ignore", divide="ignore"):
-        laid = settle(MODEL, rock, 3).take(of)
+        laid = settle_fingers(MODEL, rock, 3).take(of)
         angle = laid.angles[held, np.arange(6)] - rng.uniform(0.0, 0.3, 6)
         fingers = swing(MODEL, rock.take(of), laid, proximal, angle)
         left = left_torque(MODEL, fingers, tendons, proximal)
@@ -170,7 +170,7 @@ def test_on_rock_thin_or_huge_they_still_close_together_as_alone():
         for origin in ([0.0, 0.0, 0.0], middle, *(0.01 * rng.normal(size=(8, 3)))):
             axes = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
             section = hold.section(np.array(origin), axes[:, 0], axes[:, 1])
-            closings.append(Closing(section, ROCK, float(rng.choice([0.1, 37.0, 500.0]))))
+            closings.append(OpenFinger(section, ROCK, float(rng.choice([0.1, 37.0, 500.0]))))
     for closing, closed in zip(closings, close_all(MODEL, closings), strict=True):
         alone = close(MODEL, *closing)
         assert (closed is None) == (alone is None)

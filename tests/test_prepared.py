@@ -7,17 +7,17 @@ import numpy as np
 from stances import ask, on_wall
 
 from hand_models.rock import Cylinder, Plane
-from planner.prepare import settle
-from planner.result import Carried
+from planner.prepare import settle_hand
+from planner.result import PlanArrays
 from planner.solving import plan
-from planner.solving.prepared_checks import prepare
+from planner.solving.prepared_checks import prepare_checks
 
 HOLDS = [*(Cylinder(0.28 + 0.011 * k) for k in range(5)), Plane()]
 
 
 def prepared(question):
-    settled = [settle(hand, question.stance) for hand in question.stance.hands]
-    return prepare(question, None, settled, None)
+    settled = [settle_hand(hand, question.stance) for hand in question.stance.hands]
+    return prepare_checks(question, None, settled, None)
 
 
 def test_what_threads_prepare_for_new_hands_checks_their_plans_and_no_others():
@@ -28,7 +28,7 @@ def test_what_threads_prepare_for_new_hands_checks_their_plans_and_no_others():
     for i, ready in enumerate(found):
         for j, answer in enumerate(plans):
             if answer.hands is not None:
-                numbers = Carried.of(answer.hands), answer.utilisation, answer.body_wrench
+                numbers = PlanArrays.of(answer.hands), answer.utilisation, answer.body_wrench
                 wrong = ready.check.problems(*numbers, answer.effort)
                 assert (wrong == []) == (i == j)
 

@@ -11,8 +11,8 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Edge
 from hand_models.tile import inner_half_planes
-from planner.prepare import KEPT, Same, gather, settle, stacked
-from planner.result import Carried, Reader
+from planner.prepare import KEPT, IdentityKey, assemble, batch_of, settle_hand
+from planner.result import LoadRecovery, PlanArrays
 
 
 def hooked():
@@ -45,10 +45,10 @@ def cases():
 def read(stance, seed=0):
     """Settled hands, their sets, random loads, and what is read of these."""
     rng = np.random.default_rng(seed)
-    settled, hands = gather(ask(stance), None, np.zeros(6))
+    settled, hands = assemble(ask(stance), None, np.zeros(6))
     spaces, data = hands.sets(hands.at_rest(hands.idle))
     loads = [random_loads(rng, space) for space in spaces]
-    reader = Reader(settled, spaces)
+    reader = LoadRecovery(settled, spaces)
     return settled, spaces, data, loads, reader
 
 
@@ -130,9 +130,9 @@ def test_hands_are_read_alone_as_together(stance):
     carried = reader.read(loads).carried
     alone = []
     for limb, hand, space, y in zip(limbs, settled, spaces, loads, strict=True):
-        one = Reader([hand], [space])
+        one = LoadRecovery([hand], [space])
         alone += one.hands([limb], one.read([y]).carried)
-    for got in (Carried.of(alone), Carried.of(reader.hands(limbs, carried))):
+    for got in (PlanArrays.of(alone), PlanArrays.of(reader.hands(limbs, carried))):
         for name, mine, expected in zip(carried._fields, got, carried, strict=True):
             if isinstance(expected, np.ndarray):
                 np.testing.assert_allclose(mine, expected, rtol=1e-12, atol=1e-12, err_msg=name)
@@ -169,9 +169,9 @@ def test_a_reading_of_other_loads_leaves_the_first_as_it_was():
 def test_the_same_holds_give_the_same_arrays_for_hands_that_are_settled_anew():
     stance = on_wall()
     settled, spaces, _, loads, reader = read(stance)
-    again = [replace(settle(hand, stance)) for hand in stance.hands]
+    again = [replace(settle_hand(hand, stance)) for hand in stance.hands]
     assert all(a is not b for a, b in zip(settled, again, strict=True))
-    one, other = (r.read(loads).carried for r in (reader, Reader(again, spaces)))
+    one, other = (r.read(loads).carried for r in (reader, LoadRecovery(again, spaces)))
     np.testing.assert_array_equal(one.forces, other.forces)
     np.testing.assert_array_equal(one.drives, other.drives)
 
@@ -188,15 +188,15 @@ def test_what_is_kept_of_hands_cannot_be_written_to():
 def test_what_is_kept_is_found_by_the_hands_themselves_and_has_an_end():
     """Two hands that are equal are two; the arrays of a stance go when many others came."""
     stance = on_wall()
-    hands = [settle(hand, stance) for hand in stance.hands[:1]]
-    known = stacked((hands[0],))
-    assert stacked((hands[0],)) is known
+    hands = [settle_hand(hand, stance) for hand in stance.hands[:1]]
+    known = batch_of((hands[0],))
+    assert batch_of((hands[0],)) is known
     copies = [replace(hands[0]) for _ in range(KEPT)]
-    assert all(stacked((copy,)) is not known for copy in copies)
-    assert stacked.cache_info().currsize == KEPT
-    assert stacked((hands[0],)) is not known
-    one, other = settle(stance.hands[0], stance).grasp, replace(stance.hands[0].grasp)
+    assert all(batch_of((copy,)) is not known for copy in copies)
+    assert batch_of.cache_info().currsize == KEPT
+    assert batch_of((hands[0],)) is not known
+    one, other = settle_hand(stance.hands[0], stance).grasp, replace(stance.hands[0].grasp)
     assert one == other
-    assert Same(one) == Same(one)
-    assert Same(one) != Same(other)
-    assert len({Same(one), Same(other), Same(one)}) == 2
+    assert IdentityKey(one) == IdentityKey(one)
+    assert IdentityKey(one) != IdentityKey(other)
+    assert len({IdentityKey(one), IdentityKey(other), IdentityKey(one)}) == 2

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from hand_models.compliance import STEP
-from hand_models.compliance.rolling import Resettling, bearing_angle
-from hand_models.finger import settle
+from hand_models.compliance.rolling import RollingContact, bearing_angle
+from hand_models.finger import settle_finger
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.tile import Surface
@@ -23,7 +23,7 @@ PINCH = Grasp(outer_rotation=math.pi)
 def moving(hold, grasp=PINCH, finger="inner_left"):
     settled = HAND.settle(hold, Surface.named("rock"), grasp)
     section = HAND.section(finger, hold, grasp, settled.seating.pose)
-    return Resettling(settled.fingers[FINGERS.index(finger)], section), section
+    return RollingContact(settled.fingers[FINGERS.index(finger)], section), section
 
 
 def move(resettling, x, z, turn):
@@ -35,7 +35,7 @@ def move(resettling, x, z, turn):
 def test_on_a_cylinder_it_is_exactly_where_it_would_close(diameter, x, z, turn):
     resettling, section = moving(Cylinder(diameter))
     posture = move(resettling, x, z, turn)
-    closed = settle(replace(HAND.finger, joint_lower=(-1.5,) * 3), section, (x, z))
+    closed = settle_finger(replace(HAND.finger, joint_lower=(-1.5,) * 3), section, (x, z))
     np.testing.assert_allclose(posture.angles[0], [c.angle for c in closed.contacts], atol=1e-9)
     np.testing.assert_allclose(posture.points[0], closed.points, atol=1e-10)
 
@@ -45,7 +45,7 @@ def test_on_other_round_rock_it_is_where_it_would_close_but_for_the_circle(hold)
     resettling, section = moving(hold)
     for x, z, turn in ((3e-4, -5e-4, 0.004), (-4e-4, 2e-4, -0.006)):
         posture = move(resettling, x, z, turn)
-        closed = settle(replace(HAND.finger, joint_lower=(-1.5,) * 3), section, (x, z))
+        closed = settle_finger(replace(HAND.finger, joint_lower=(-1.5,) * 3), section, (x, z))
         angles = [c.angle for c in closed.contacts]
         np.testing.assert_allclose(posture.angles[0], angles, atol=2e-3)
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from rocks import distance, random_axes, random_ellipsoid, random_hold, random_mesh, random_profile
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface
-from hand_models.finger import settle
+from hand_models.finger import settle_finger
 from hand_models.finger.contact_states import close
 from hand_models.finger.limit_postures import PATTERNS, at_limits
 from hand_models.rock import Profile
@@ -129,7 +129,7 @@ def test_a_pinch_whose_palm_is_far_from_the_rock_holds_without_its_proximal_cont
         assert (proximal, held) == ("none", "balance")
         assert middle[0] in ("face", "edge")
         assert distal[0] in ("face", "edge")
-    plain = settle(
+    plain = settle_finger(
         MODEL,
         RoundSection((0.03226 - 0.06615, stand_off + 0.15 + 0.0006), 0.15),
         (0.0, 0.0),

@@ -16,7 +16,7 @@ from stances import on_wall
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
 from hand_models.base import Recent
-from hand_models.finger import settle
+from hand_models.finger import settle_finger
 from hand_models.finger.contact_states import close
 from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
 from hand_models.rock import Mesh, Profile
@@ -396,7 +396,7 @@ def test_a_finger_is_laid_as_on_its_section(seed):
         if len(finger.free) < 3:
             continue
         section = HAND.section(name, placement.hold, placement.grasp, settled.seating.pose)
-        first = settle(HAND.finger, section, (0.0, 0.0))
+        first = settle_finger(HAND.finger, section, (0.0, 0.0))
         angles = [contact.angle for contact in first.contacts]
         if not np.allclose([contact.angle for contact in finger.contacts], angles, atol=1e-6):
             continue  # it has given way

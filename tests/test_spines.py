@@ -11,9 +11,9 @@ from hypothesis import given, settings, strategies as st
 from hand_models import InvalidInputError, Surface
 from hand_models.tile import (
     bounds_gap,
+    directional_strength as reach_of,
     inner_half_planes,
     outer_half_planes,
-    reach as reach_of,
     surface_names,
 )
 

@@ -9,7 +9,7 @@ from stances import PALM_TO_WALL, ROCK, ask, on_wall, wall
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.rock import Cylinder
-from planner.prepare import hand_space, settle
+from planner.prepare import hand_space, settle_hand
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.solving import plan
 
@@ -100,7 +100,7 @@ def test_a_hold_may_be_placed_in_w_or_in_h():
     for placed in (by_hand.placed_hold(), by_world.placed_hold()):
         np.testing.assert_allclose(placed.position, in_hand.position, atol=1e-12)
         np.testing.assert_allclose(placed.rotation, np.eye(3), atol=1e-12)
-    settled = [settle(each, on_wall()) for each in (by_hand, by_world)]
+    settled = [settle_hand(each, on_wall()) for each in (by_hand, by_world)]
     assert [each.seating.rule for each in settled] == ["given", "given"]
     np.testing.assert_allclose(settled[0].loads, settled[1].loads, atol=1e-6)
 
@@ -108,7 +108,7 @@ def test_a_hold_may_be_placed_in_w_or_in_h():
 def test_a_hold_that_is_not_placed_is_seated():
     hand = on_wall().hands[0]
     assert hand.placed_hold() is None
-    assert settle(hand, on_wall()).seating.rule == "pinch"
+    assert settle_hand(hand, on_wall()).seating.rule == "pinch"
 
 
 def test_hand_space_is_the_set_that_the_plan_used():

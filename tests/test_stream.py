@@ -18,7 +18,7 @@ from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.rock import Cylinder
 from planner.programs import used_effort
 from planner.question import Limits, Question
-from planner.result import Reader, SetPoints
+from planner.result import LoadRecovery, SetPoints
 from planner.solving import plan
 from planner.streaming import WrenchStream
 from planner.streaming.interpolation import PER_RADIUS, Interpolation
@@ -56,10 +56,10 @@ def size(wrench: np.ndarray) -> float:
 def checked_by(question: Question):
     """The check that plans pass, and what reads loads for it."""
     known = StreamStance(question)
-    ground = known._known.ground
+    ground = known._known.prepared
     spaces, data = ground.hands.sets(ground.hands.at_rest(ground.hands.idle))
     check = Check(ground.question, ground.settled, ground.where)
-    return known, data, Reader(ground.settled, spaces), check
+    return known, data, LoadRecovery(ground.settled, spaces), check
 
 
 def complaints(question: Question, points: SetPoints) -> list[str]:

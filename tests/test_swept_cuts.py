@@ -12,7 +12,7 @@ from rocks import distance, random_axes, random_ellipsoid, random_hold
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.rock import Hold
-from hand_models.sections import Cut, Face, cut_of
+from hand_models.sections import Face, SmoothCut, cut_of
 from hand_models.sections.ellipses import Oval
 
 seeds = st.integers(0, 2**32 - 1)
@@ -20,7 +20,7 @@ seeds = st.integers(0, 2**32 - 1)
 FACE = Face(0.0085, 0.0431, 0.0047)
 
 
-def cut_through(hold: Hold, origin: np.ndarray, axes: np.ndarray) -> Cut | None:
+def cut_through(hold: Hold, origin: np.ndarray, axes: np.ndarray) -> SmoothCut | None:
     """The rock in the plane of the first and the third axis."""
     shape = hold.swept
     scale = np.array(shape[:3])

@@ -13,7 +13,7 @@ from stances import ask, on_wall, random_question
 
 from planner.explanation import limit_name, unsafe_sentence
 from planner.explanation.path_safety import GIVE
-from planner.prepare import gather, posture
+from planner.prepare import assemble, posture
 from planner.question import Limits, Question
 from planner.result import LimitName, Plan, TensionPath
 from planner.solving import plan
@@ -37,7 +37,7 @@ class Peer:
         where = posture(question)
         self.question = question
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
-        _, hands = gather(question, where, wrench)
+        _, hands = assemble(question, where, wrench)
         self.sets = list(hands.spaces)
         rows = peer.rows(question, self.sets)
         n = rows.L.shape[1]
@@ -347,7 +347,7 @@ def test_the_largest_change_is_that_of_the_peer():
     question = ask(on_wall(off=0.2))
     present = {limb: values + 20.0 for limb, values in tensions(plan(question)).items()}
     question = replace(question, limits=Limits(tension_change=12.0), present=present)
-    _, hands = gather(question, None, question.needed_wrench())
+    _, hands = assemble(question, None, question.needed_wrench())
     found = peer.least_utilisation(question, list(hands.spaces))
     answer = plan(question)
     assert found.status == 0

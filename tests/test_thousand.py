@@ -18,7 +18,7 @@ from random_requests import random_request
 
 from hand_models.base import InvalidInputError
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import gather, posture
+from planner.prepare import assemble, posture
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
@@ -50,7 +50,7 @@ def gathered(question: Question) -> tuple[list[WrenchSpace], np.ndarray]:
     """Each hand's set with all its rows, and the body wrench that is needed."""
     where = posture(question)
     wrench = question.needed_wrench(None if where is None else where.body_wrench)
-    _, hands = gather(question, where, wrench)
+    _, hands = assemble(question, where, wrench)
     return list(hands.spaces), wrench
 
 

@@ -16,8 +16,8 @@ from stances import (
 )
 
 from hand_models.rock import Cylinder
-from planner.prepare import settle
-from planner.result import Carried, Plan
+from planner.prepare import settle_hand
+from planner.result import Plan, PlanArrays
 from planner.solving import plan
 from planner.verification import check as verify, problems, recomputation as recomputing
 from planner.verification.equilibrium import equilibrium
@@ -54,7 +54,7 @@ def spoilt(thing, path, change):
 def complaints(answer: Plan, question=QUESTION, wrench=None) -> list[str]:
     return problems(
         question,
-        [settle(hand, question.stance) for hand in question.stance.hands],
+        [settle_hand(hand, question.stance) for hand in question.stance.hands],
         answer.hands,
         answer.utilisation,
         answer.body_wrench if wrench is None else wrench,
@@ -183,7 +183,9 @@ def test_rows_that_promise_more_than_a_hand_holds_are_found(monkeypatch):
 def test_a_limit_that_the_planner_does_not_know_of_is_found(section, name, weaker):
     """The same plan, checked for a hand that bears less."""
     weak = changed_hand(section, name, weaker)
-    settled = [replace(settle(hand, QUESTION.stance), hand=weak) for hand in QUESTION.stance.hands]
+    settled = [
+        replace(settle_hand(hand, QUESTION.stance), hand=weak) for hand in QUESTION.stance.hands
+    ]
     answer = honest()
     found = problems(QUESTION, settled, answer.hands, answer.utilisation, answer.body_wrench)
     assert any("plan: utilisation is" in each for each in found)
@@ -211,7 +213,7 @@ def test_equilibrium_is_the_affine_map_of_tension():
     """Eq. 6 solved in full against Eq. 14, on many holds."""
     stances = [random_stance(np.random.default_rng(seed)) for seed in range(12)]
     for stance in (on_wall(), on_wall(Cylinder(0.7), closing_tension=50.0), *stances):
-        hands = tuple(settle(hand, stance) for hand in stance.hands)
+        hands = tuple(settle_hand(hand, stance) for hand in stance.hands)
         found = equilibrium(hands)
         laws = np.concatenate([hand.loads for hand in hands])
         np.testing.assert_allclose(found.shear, laws[:, 0].T, rtol=1e-9, atol=1e-9)
@@ -224,11 +226,11 @@ def test_equilibrium_is_the_affine_map_of_tension():
 
 def test_the_check_of_known_hands_is_made_once():
     """Another body wrench on the same settled hands: one `Check` finds what a new one does."""
-    settled = tuple(settle(hand, QUESTION.stance) for hand in QUESTION.stance.hands)
+    settled = tuple(settle_hand(hand, QUESTION.stance) for hand in QUESTION.stance.hands)
     check = verify.Check(QUESTION, settled)
     for lateral in (0.0, 0.1, -0.1):
         answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, lateral, 0.0))))
-        numbers = Carried.of(answer.hands), answer.utilisation, answer.body_wrench
+        numbers = PlanArrays.of(answer.hands), answer.utilisation, answer.body_wrench
         assert check.problems(*numbers, answer.effort) == []
         assert check.problems(*numbers, 1.01 * answer.effort) != []
         assert check.problems(*numbers[:2], 1.01 * answer.body_wrench) != []

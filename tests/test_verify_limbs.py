@@ -9,7 +9,7 @@ import pytest
 from jointed import random_jointed_question
 from stances import on_wall
 
-from planner.prepare import Posture, posture, settle
+from planner.prepare import Posture, posture, settle_hand
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
@@ -50,7 +50,7 @@ def complaints(
     answer = replace(answer, **changes)
     return problems(
         question,
-        [settle(hand, question.stance) for hand in question.stance.hands],
+        [settle_hand(hand, question.stance) for hand in question.stance.hands],
         answer.hands,
         answer.utilisation,
         answer.body_wrench,
@@ -109,7 +109,7 @@ def test_joints_that_are_tampered_with_are_found(where, words):
 
 def test_joints_that_are_left_out_are_found():
     answer, _ = honest()
-    settled = [settle(hand, asked().stance) for hand in asked().stance.hands]
+    settled = [settle_hand(hand, asked().stance) for hand in asked().stance.hands]
     found = problems(asked(), settled, answer.hands, answer.utilisation, answer.body_wrench)
     assert any("the joints are not what" in each for each in found)
 

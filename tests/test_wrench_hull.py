@@ -7,10 +7,10 @@ from scipy.optimize import linprog
 
 from hand_models.experiments import (
     UNITS,
-    cut,
+    clipped,
+    distance_along,
     extents,
     in_paper_signs,
-    reach,
     section,
     vertices,
     volume,
@@ -50,14 +50,14 @@ def test_the_papers_moment_is_minus_the_contracts():
 
 
 def test_a_box_cut_at_no_pull_keeps_its_lower_part():
-    below = cut(np.vstack([BOX, BOX.mean(axis=0)]))
+    below = clipped(np.vstack([BOX, BOX.mean(axis=0)]))
     assert {tuple(v) for v in below} == {
         (x, z, m) for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)
     }
     assert extents(below) == (40.0, -20.0, 1.0)
     assert volume(below) == pytest.approx(80.0 * 20.0 * 2.0)
-    assert cut(BOX, offset=50.0).shape == (8, 3)
-    assert cut(BOX, offset=-21.0).shape == (0, 3)
+    assert clipped(BOX, offset=50.0).shape == (8, 3)
+    assert clipped(BOX, offset=-21.0).shape == (0, 3)
 
 
 def test_a_box_in_the_plane_of_a_cable():
@@ -71,10 +71,12 @@ def test_a_box_in_the_plane_of_a_cable():
 
 def test_reaches_of_a_box():
     directions = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [80.0, 0.0, 1.0]])
-    np.testing.assert_allclose(reach(BOX, directions), [40.0, 20.0, 0.5])
-    np.testing.assert_allclose(reach(BOX, directions, (10.0, 0.0, 0.0)), [30.0, 20.0, 0.375])
+    np.testing.assert_allclose(distance_along(BOX, directions), [40.0, 20.0, 0.5])
+    np.testing.assert_allclose(
+        distance_along(BOX, directions, (10.0, 0.0, 0.0)), [30.0, 20.0, 0.375]
+    )
     # from beyond the box: toward it, away from it, past it
-    away = reach(BOX, np.array([[-1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]), (50.0, 0.0, 0.0))
+    away = distance_along(BOX, np.array([[-1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]), (50.0, 0.0, 0.0))
     np.testing.assert_allclose(away, [90.0, np.nan, np.nan])
 
 
@@ -160,7 +162,7 @@ def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hul
 def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=3) * UNITS
-    below = cut(points, normal, offset)
+    below = clipped(points, normal, offset)
     assert (below @ normal <= offset + 1e-9).all()
     assert all(inside(points, vertex) for vertex in below)
     for wrench in rng.dirichlet(np.ones(len(points)), 10) @ points:
@@ -174,7 +176,9 @@ def test_reach_is_that_of_a_linear_program(points, seed):
     starts = 1.5 * rng.normal(size=(10, 3)) / UNITS
     directions = rng.normal(size=(10, 3)) / UNITS
     expected = [farthest(points, s, d) for s, d in zip(starts, directions, strict=True)]
-    np.testing.assert_allclose(reach(points, directions, starts), expected, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(
+        distance_along(points, directions, starts), expected, rtol=1e-6, atol=1e-8
+    )
 
 
 @settings(max_examples=20, deadline=None)
@@ -184,7 +188,7 @@ def test_a_section_is_bounded_by_reaches_in_its_plane(points, seed):
     normal = np.cross(direction, (0.0, 1.0, 0.0))
     corners = section(points, normal)
     assert np.abs(corners @ normal).max() < 1e-9
-    far = reach(points, direction[None])[0]
+    far = distance_along(points, direction[None])[0]
     assert inside(vertices(points), 0.999 * far * direction)
     # the point on the hull is a combination of the section's corners
     assert inside(np.vstack([corners, 0.0 * corners]), 0.999 * far * direction)

@@ -22,7 +22,7 @@ from hand_models.compliance import (
     search_box,
     wrist_pose,
 )
-from hand_models.finger import FingerModel, settle
+from hand_models.finger import FingerModel, settle_finger
 from hand_models.hand import Grasp
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
 from hand_models.rock import Cylinder, Plane, Sphere
@@ -64,7 +64,7 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
     )
     rest = gripper.finger.finger
     model: FingerModel = rest.model
-    moved = settle(model, gripper.section, base)
+    moved = settle_finger(model, gripper.section, base)
     (cx, cz), radius = gripper.section.centre, gripper.section.radius
 
     def arc(point):

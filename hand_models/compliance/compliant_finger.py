@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.compliance.rolling import Numbers, Resettling
+from hand_models.compliance.rolling import Numbers, RollingContact
 from hand_models.finger import PHALANGES, FingerModel, SettledFinger
 from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, TendonState
@@ -109,7 +109,7 @@ class CompliantFinger:
         stiffness[-3:] = np.where(finger.touching, stiffness[-3:], 0.0)
         tendon = replace(tendon, contact_stiffness=tuple(stiffness.tolist()))
         self.regimes = TendonRegimes(tendon, state, scheme)
-        self._resettling = Resettling(finger, section)
+        self._resettling = RollingContact(finger, section)
 
     @property
     def model(self) -> FingerModel:
@@ -124,7 +124,7 @@ class CompliantFinger:
         Parameters
         ----------
         x, z, turn : ndarray, shape (m,)
-            As of `Resettling.move` [m, rad].
+            As of `RollingContact.move` [m, rad].
         base_slip : ndarray, shape (m,), optional
             Of the base tile along the rock, toward the base [m]; zero by default.
         """

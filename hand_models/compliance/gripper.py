@@ -19,7 +19,7 @@ from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.compliance.compliant_finger import STEP, CompliantFinger, FingerLoads
 from hand_models.compliance.grasp import Evaluation, Verdict, range_rows
 from hand_models.compliance.rolling import Numbers
-from hand_models.finger import PHALANGES, FingerModel, settle
+from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
 from hand_models.sections import RoundSection
@@ -136,7 +136,7 @@ class Gripper:
                 field="gripper.base_half_spacing",
             )
         self.section = RoundSection((-spread, math.sqrt(square)), radius)
-        finger = settle(model, self.section, (0.0, 0.0))
+        finger = settle_finger(model, self.section, (0.0, 0.0))
         if len(finger.bearing) != len(PHALANGES) or not all(finger.touching):
             raise InvalidInputError(
                 f"the fingers do not lie on a surface of {1e3 * diameter:g} mm", field="diameter"

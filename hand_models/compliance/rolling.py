@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from hand_models.finger import Contact, SettledFinger
 from hand_models.sections import Section, Vector2
 
-__all__ = ["Numbers", "Posture", "Resettling", "bearing_angle"]
+__all__ = ["MovedPosture", "Numbers", "RollingContact", "bearing_angle"]
 
 Numbers = NDArray[Any]
 """Real numbers, or complex ones of a complex step."""
@@ -42,7 +42,7 @@ PROBE: Final = 0.5
 """How far to both sides of a contact the rock's curve is looked at, in half tile lengths."""
 
 
-class Posture(NamedTuple):
+class MovedPosture(NamedTuple):
     """Fingers after their bases have moved, shapes (..., 3) or (..., 3, 2).
 
     Attributes
@@ -175,7 +175,7 @@ class _Link:
         return jx + ahead * cosine - above * sine, jz + ahead * sine + above * cosine
 
 
-class Resettling:
+class RollingContact:
     """A settled finger whose base may move.
 
     Parameters
@@ -197,7 +197,7 @@ class Resettling:
             if bears and section is not None:
                 self._links[joint] = _link(finger, section, phalanges, bears[0])
 
-    def move(self, x: Numbers, z: Numbers, turn: Numbers) -> Posture:
+    def move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
         """Return the finger after displacements of its base.
 
         Parameters
@@ -210,7 +210,7 @@ class Resettling:
         with np.errstate(invalid="ignore", divide="ignore"):
             return self._move(np.asarray(x), np.asarray(z), np.asarray(turn))
 
-    def _move(self, x: Numbers, z: Numbers, turn: Numbers) -> Posture:
+    def _move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
         contacts, spacing = self.finger.contacts, self.finger.model.joint_spacing
         nothing = 0.0 * (x + z + turn)
         jx, jz = x + nothing, z + nothing
@@ -240,7 +240,7 @@ class Resettling:
         )
         change = theta - np.array(self._angles)
         before = np.concatenate([(turn + nothing)[..., None], change[..., :-1]], axis=-1)
-        return Posture(
+        return MovedPosture(
             angles=theta,
             turns=change - before,
             slips=np.stack(slips, axis=-1),

@@ -42,11 +42,11 @@ from .sweep_picture import (
 from .wrench_hull import (
     UNITS as UNITS,
     Extents as Extents,
-    cut as cut,
+    clipped as clipped,
+    distance_along as distance_along,
     extents as extents,
     in_paper_signs as in_paper_signs,
     label_solid as label_solid,
-    reach as reach,
     section as section,
     vertices as vertices,
     volume as volume,

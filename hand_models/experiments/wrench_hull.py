@@ -24,11 +24,11 @@ __all__ = [
     "PULL_OFF",
     "UNITS",
     "Extents",
-    "cut",
+    "clipped",
+    "distance_along",
     "extents",
     "in_paper_signs",
     "label_solid",
-    "reach",
     "section",
     "vertices",
     "volume",
@@ -82,7 +82,7 @@ def volume(points: Array) -> float:
     return float(hull(points * UNITS).volume / np.prod(UNITS))
 
 
-def cut(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
+def clipped(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
     """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
 
     None, shape (0, 3), if no vertex of the hull is below the plane.
@@ -131,7 +131,7 @@ def section(points: Array, normal: ArrayLike) -> Array:
     return met[_outermost(met * UNITS @ basis.T, slack)]
 
 
-def reach(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
+def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
     """Return the largest s ≥ 0 with start + s · direction in a hull, shape (m,).
 
     Not a number where the line misses the hull, or meets it only behind. A start on a face counts

@@ -1,8 +1,8 @@
-from .closure import intrusion as intrusion, settle as settle
-from .closure_loads import LaidLoads as LaidLoads, TendonLoads as TendonLoads, stays as stays
+from .closure import intrusion as intrusion, settle_finger as settle_finger
+from .closure_loads import ClosureLoads as ClosureLoads, TendonLoads as TendonLoads, stays as stays
 from .contact_states import (
     ClosedFinger as ClosedFinger,
-    Closing as Closing,
+    OpenFinger as OpenFinger,
     cling as cling,
     close_all as close_all,
 )
@@ -18,6 +18,6 @@ from .sequential_closure import (
     FACE as FACE,
     KINDS as KINDS,
     NONE as NONE,
-    Laid as Laid,
-    Layer as Layer,
+    ClosedPhalanx as ClosedPhalanx,
+    SequentialClosure as SequentialClosure,
 )

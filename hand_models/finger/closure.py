@@ -13,7 +13,7 @@ from typing import Final
 from hand_models.finger.model import Contact, FingerModel, SettledFinger
 from hand_models.sections import Rest, Section, Vector2
 
-__all__ = ["CLEAR", "JOINTS", "intrusion", "settle", "straight"]
+__all__ = ["CLEAR", "JOINTS", "intrusion", "settle_finger", "straight"]
 
 CLEAR: Final = 2e-5
 """How far a face may seem to stand in the rock, by sampling and rounding [m]."""
@@ -21,7 +21,7 @@ CLEAR: Final = 2e-5
 JOINTS: Final = 3
 
 
-def settle(model: FingerModel, section: Section | None, joint: Vector2) -> SettledFinger:
+def settle_finger(model: FingerModel, section: Section | None, joint: Vector2) -> SettledFinger:
     """Close a finger on a section of rock, phalanx by phalanx from the base.
 
     Each phalanx turns until its face meets the rock. Where it meets it beyond its tile, the spines

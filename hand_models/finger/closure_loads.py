@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.finger.sequential_closure import EDGE, Laid
+from hand_models.finger.sequential_closure import EDGE, ClosedPhalanx
 from hand_models.tile import Surface
 
-__all__ = ["LaidLoads", "TendonLoads", "stays"]
+__all__ = ["ClosureLoads", "TendonLoads", "stays"]
 
 
-class LaidLoads(NamedTuple):
+class ClosureLoads(NamedTuple):
     """Loads of a finger's phalanges, proximal first, affine in its tension."""
 
     shears: tuple[complex, complex, complex]
@@ -83,12 +83,14 @@ class TendonLoads:
             for base_tile in (False, True)
         ]
 
-    def loads(self, laid: Sequence[Laid], closing: float, base_tile: bool) -> LaidLoads | None:
+    def loads(
+        self, laid: Sequence[ClosedPhalanx], closing: float, base_tile: bool
+    ) -> ClosureLoads | None:
         """Return the loads of a finger; None if its contacts cannot hold it.
 
         Parameters
         ----------
-        laid : sequence of Laid
+        laid : sequence of ClosedPhalanx
             All its phalanges.
         closing : float
             Tension at which the tiles caught the rock [N].
@@ -115,10 +117,12 @@ class TendonLoads:
         n_1 = (left - d_12.real * n_2) / c_1
         left = first.torque(angle_0) - h * s_0 - d_01.imag * s_1 - d_02.imag * s_2
         n_0 = (left - d_01.real * n_1 - d_02.real * n_2) / c_0
-        return LaidLoads((s_0, s_1, s_2), (n_0, n_1, n_2))
+        return ClosureLoads((s_0, s_1, s_2), (n_0, n_1, n_2))
 
 
-def stays(laid: Sequence[Laid], loads: LaidLoads, surface: Surface, tension: float) -> bool:
+def stays(
+    laid: Sequence[ClosedPhalanx], loads: ClosureLoads, surface: Surface, tension: float
+) -> bool:
     """Whether no contact of a finger breaks at a tension; as `posture_loads.stay`."""
     for phalanx, t, n in zip(laid, *loads, strict=True):
         normal = n.real + n.imag * tension

@@ -26,22 +26,22 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger.closure import JOINTS, straight
-from hand_models.finger.joint_equilibrium import Swings
+from hand_models.finger.joint_equilibrium import JointEquilibrium
 from hand_models.finger.limit_postures import OPEN_FIRST, PATTERNS, at_limits
 from hand_models.finger.model import FingerModel, SettledFinger
-from hand_models.finger.posture_loads import Loads, Tendons, loads, stay, turns
-from hand_models.finger.postures import Postures, are_clear, settle
+from hand_models.finger.posture_loads import Loads, TendonBatch, loads, stay, turns
+from hand_models.finger.postures import Postures, are_clear, settle_fingers
 from hand_models.finger.sequential_closure import NONE
 from hand_models.sections import Flags, Section, section_rows
 from hand_models.tile import Surface
 
-__all__ = ["ClosedFinger", "Closing", "cling", "close", "close_all"]
+__all__ = ["ClosedFinger", "OpenFinger", "cling", "close", "close_all"]
 
 NOTHING: Final = (-1, 0.0)
 """Contacts, and tendon drawn in [m], before any state has been found to stay."""
 
 
-class Closing(NamedTuple):
+class OpenFinger(NamedTuple):
     """A finger that is to close.
 
     Attributes
@@ -93,16 +93,16 @@ def close(
     base_tile: bool = False,
 ) -> ClosedFinger | None:
     """Close one finger; see `close_all`."""
-    return close_all(model, [Closing(section, surface, closing_tension, base_tile)])[0]
+    return close_all(model, [OpenFinger(section, surface, closing_tension, base_tile)])[0]
 
 
-def close_all(model: FingerModel, closings: Sequence[Closing]) -> list[ClosedFinger | None]:
+def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[ClosedFinger | None]:
     """Close fingers on the rock, and find the contact states in which they stay.
 
     Parameters
     ----------
     model : FingerModel
-    closings : sequence of Closing
+    closings : sequence of OpenFinger
 
     Returns
     -------
@@ -145,13 +145,13 @@ class _Search:
     Parameters
     ----------
     model : FingerModel
-    closings : sequence of Closing
+    closings : sequence of OpenFinger
     """
 
-    def __init__(self, model: FingerModel, closings: Sequence[Closing]) -> None:
+    def __init__(self, model: FingerModel, closings: Sequence[OpenFinger]) -> None:
         self._model = model
         self._rock = section_rows([closing.section for closing in closings])
-        self._tendons = Tendons.of(
+        self._tendons = TendonBatch.of(
             model,
             [closing.tension for closing in closings],
             [closing.base_tile for closing in closings],
@@ -164,14 +164,14 @@ class _Search:
     def results(self) -> list[ClosedFinger | None]:
         """Return the fingers at rest."""
         everyone = np.arange(len(self._found))
-        first = self._tried(everyone, settle(self._model, self._rock, len(everyone)))
+        first = self._tried(everyone, settle_fingers(self._model, self._rock, len(everyone)))
         self._offer(first)
         # a closed finger in the air cannot hold more
         most = [0 if in_air else JOINTS for in_air in self._in_air]
         searching = [i for i, (contacts, _) in enumerate(self._hold) if contacts < most[i]]
         if searching:
             pulls = first.loads.at(self._tendons.closing).normals
-            swings = Swings(self._model, self._rock, self._tendons, first.fingers, pulls)
+            swings = JointEquilibrium(self._model, self._rock, self._tendons, first.fingers, pulls)
             self._offer(self._tried(*swings.balances(searching)))
         idle = [i for i in searching if self._hold[i][0] <= 0]
         if idle:

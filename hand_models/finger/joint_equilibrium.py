@@ -15,12 +15,12 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.finger.posture_loads import Tendons, left_torque
+from hand_models.finger.posture_loads import TendonBatch, left_torque
 from hand_models.finger.postures import JOINTS, LOWER, UPPER, Postures, swing
 from hand_models.finger.sequential_closure import NONE
 from hand_models.sections import SectionRows
 
-__all__ = ["Swings"]
+__all__ = ["JointEquilibrium"]
 
 ANGLES: Final = 17
 """At which a phalanx without contact is tried."""
@@ -48,7 +48,7 @@ class _Tries(NamedTuple):
     angles: Array
 
 
-class Swings:
+class JointEquilibrium:
     """Phalanges of fingers that were laid on the rock bottom-up, and may give way.
 
     Parameters
@@ -56,7 +56,7 @@ class Swings:
     model : FingerModel
     rock : SectionRows
         Under each finger.
-    tendons : Tendons
+    tendons : TendonBatch
     laid : Postures
     pulls : ndarray, shape (3, n)
         Normal loads of the phalanges as laid, negative where the rock pulls; NaN or infinite where
@@ -67,7 +67,7 @@ class Swings:
         self,
         model: FingerModel,
         rock: SectionRows,
-        tendons: Tendons,
+        tendons: TendonBatch,
         laid: Postures,
         pulls: Array,
     ) -> None:

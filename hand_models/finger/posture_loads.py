@@ -19,7 +19,7 @@ from hand_models.finger.sequential_closure import EDGE, NONE
 from hand_models.sections import Complexes, Flags
 from hand_models.tile import Surface, pull_strength
 
-__all__ = ["Loads", "Tendons", "left_torque", "loads", "stay", "turns"]
+__all__ = ["Loads", "TendonBatch", "left_torque", "loads", "stay", "turns"]
 
 UNBALANCED: Final = 1e-3
 """Torque that may be left at a joint that balances without contact, about half a percent of a
@@ -38,7 +38,7 @@ LATER: Final = np.triu(np.ones((3, 3)))[..., None]
 """Which phalanges' loads turn a joint: its own and those beyond."""
 
 
-class Tendons(NamedTuple):
+class TendonBatch(NamedTuple):
     """Tendons of fingers, and what their tiles hold; one finger's serve any number of columns.
 
     Attributes
@@ -67,7 +67,7 @@ class Tendons(NamedTuple):
         closing: Sequence[float],
         base_tiles: Sequence[bool],
         surfaces: Sequence[Surface],
-    ) -> Tendons:
+    ) -> TendonBatch:
         """Gather tendons: tensions at closing, whether a base tile comes first, what rock holds."""
         tension = np.array(closing)
         order = np.arange(len(model.engagement))[:, None] + np.array(base_tiles, dtype=int)
@@ -81,11 +81,11 @@ class Tendons(NamedTuple):
             np.array([(s.shear_limit, s.pull_off_limit, s.pull_off_angle) for s in surfaces]).T,
         )
 
-    def take(self, fingers: Indices) -> Tendons:
+    def take(self, fingers: Indices) -> TendonBatch:
         """Return some of them."""
         if len(self.closing) == 1:
             return self
-        return Tendons(*(value[..., fingers] for value in self))
+        return TendonBatch(*(value[..., fingers] for value in self))
 
 
 class Loads(NamedTuple):
@@ -108,7 +108,7 @@ class Loads(NamedTuple):
         return Loads(*(value[:, 0] + value[:, 1] * tension for value in self))
 
 
-def loads(model: FingerModel, fingers: Postures, tendons: Tendons) -> Loads:
+def loads(model: FingerModel, fingers: Postures, tendons: TendonBatch) -> Loads:
     """Return the loads of fingers as affine functions of tension (Eqs. 4, 5 and 14).
 
     They are infinite or NaN where the contacts cannot hold the joints that are free.
@@ -183,7 +183,9 @@ def _resting(
     return normals
 
 
-def left_torque(model: FingerModel, fingers: Postures, tendons: Tendons, proximal: int) -> Array:
+def left_torque(
+    model: FingerModel, fingers: Postures, tendons: TendonBatch, proximal: int
+) -> Array:
     """Return the torque that rock beyond a joint's own phalanx leaves at it, shape (n,) [N·m].
 
     At the closing tensions, positive where it turns the joint in, for fingers of which every later
@@ -193,7 +195,7 @@ def left_torque(model: FingerModel, fingers: Postures, tendons: Tendons, proxima
     ----------
     model : FingerModel
     fingers : Postures
-    tendons : Tendons
+    tendons : TendonBatch
     proximal : int
         Of how many fingers, the first ones, at the proximal joint; of the others at the middle one.
     """
@@ -216,7 +218,7 @@ def left_torque(model: FingerModel, fingers: Postures, tendons: Tendons, proxima
     return np.asarray(torques[1])
 
 
-def stay(fingers: Postures, loads: Loads, tendons: Tendons, *, pressed: bool = False) -> Flags:
+def stay(fingers: Postures, loads: Loads, tendons: TendonBatch, *, pressed: bool = False) -> Flags:
     """Whether no contact breaks at the closing tensions, and no joint leaves its limit, shape (n,).
 
     A contact breaks where its tile is pulled off beyond its limit curve; a bare frame only presses.
@@ -226,7 +228,7 @@ def stay(fingers: Postures, loads: Loads, tendons: Tendons, *, pressed: bool = F
     fingers : Postures
     loads : Loads
         Affine in tension.
-    tendons : Tendons
+    tendons : TendonBatch
     pressed : bool, optional
         Whether tiles may only press as well: spines that were not on the rock before are not
         engaged by pulling.

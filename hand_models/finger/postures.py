@@ -32,7 +32,7 @@ __all__ = [
     "Postures",
     "are_clear",
     "bear",
-    "settle",
+    "settle_fingers",
     "swing",
 ]
 
@@ -117,8 +117,8 @@ class Postures(NamedTuple):
         )
 
 
-def settle(model: FingerModel, rock: SectionRows, count: int) -> Postures:
-    """Close fingers on the rock; as `closure.settle`, their joints at the origin."""
+def settle_fingers(model: FingerModel, rock: SectionRows, count: int) -> Postures:
+    """Close fingers on the rock; as `closure.settle_finger`, their joints at the origin."""
     fingers = Postures.empty(count)
     before = np.zeros(count)
     for i in range(JOINTS):

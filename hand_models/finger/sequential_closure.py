@@ -1,7 +1,7 @@
 """A finger laid on smooth rock, phalanx by phalanx from the base.
 
-This is `hand_models.finger.closure.settle` for fingers of which every phalanx finds its rock, as
-those of a hand mostly do. What else may become of a finger is left to
+This is `hand_models.finger.closure.settle_finger` for fingers of which every phalanx finds its
+rock, as those of a hand mostly do. What else may become of a finger is left to
 `hand_models.finger.contact_states`.
 """
 
@@ -12,9 +12,9 @@ import math
 from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.sections import LEVEL, Cut, Face
+from hand_models.sections import LEVEL, Face, SmoothCut
 
-__all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "Laid", "Layer"]
+__all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
 
 KINDS: Final = ("face", "edge", "frame", "none")
 """What of a phalanx touches the rock, by code."""
@@ -22,7 +22,7 @@ KINDS: Final = ("face", "edge", "frame", "none")
 FACE, EDGE, FRAME, NONE = range(len(KINDS))
 
 
-class Laid(NamedTuple):
+class ClosedPhalanx(NamedTuple):
     """A phalanx on the rock.
 
     Attributes
@@ -50,7 +50,7 @@ Rested = tuple[float, complex, float, bool]
 """How far a phalanx turns till it rests [rad], its direction and its contact, and if it is flat."""
 
 
-class Layer:
+class SequentialClosure:
     """Lays fingers of one model.
 
     Parameters
@@ -70,15 +70,15 @@ class Layer:
             for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True)
         ]
 
-    def lay(self, cut: Cut) -> list[Laid]:
+    def lay(self, cut: SmoothCut) -> list[ClosedPhalanx]:
         """Close a finger on rock, its proximal joint at the origin of F.
 
         Returns
         -------
-        list of Laid
+        list of ClosedPhalanx
             Phalanges from the base on, as many as rest on rock one after the other.
         """
-        laid: list[Laid] = []
+        laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j
         for lower, opened, span in self._joints:
             rest = self._rest(cut, joint, u * opened, span)
@@ -89,11 +89,11 @@ class Layer:
             kind = FACE
             if not flat and not self._face.start < along < self._far:
                 along, kind = self._beyond(cut, joint, u, along)
-            laid.append(Laid(angle, u, joint, along, kind))
+            laid.append(ClosedPhalanx(angle, u, joint, along, kind))
             joint += self._spacing * u
         return laid
 
-    def _rest(self, cut: Cut, joint: complex, low: complex, span: float) -> Rested | None:
+    def _rest(self, cut: SmoothCut, joint: complex, low: complex, span: float) -> Rested | None:
         """Return where a phalanx that turns from the direction ``low`` on rests, if it does."""
         face = self._face
         if not cut.clear(joint, low, face):
@@ -121,7 +121,7 @@ class Layer:
 
     def _first(
         self,
-        cut: Cut,
+        cut: SmoothCut,
         joint: complex,
         end: tuple[float, complex, complex],
         low: complex,
@@ -140,7 +140,9 @@ class Layer:
                 first = turn, u
         return first
 
-    def _beyond(self, cut: Cut, joint: complex, u: complex, along: float) -> tuple[float, int]:
+    def _beyond(
+        self, cut: SmoothCut, joint: complex, u: complex, along: float
+    ) -> tuple[float, int]:
         """Return where a phalanx bears that rests on rock at an end of its tile or beyond."""
         if along <= self._far:
             return along, EDGE

@@ -28,7 +28,7 @@ from hand_models.base import Array, Indices
 from hand_models.fixed_wrist.row_entries import (
     GIVEN,
     WRENCH_PARTS,
-    Entries,
+    RowEntries,
     entries_of,
     hand_sources,
     surface_sources,
@@ -137,13 +137,13 @@ def _starts(lengths: list[int]) -> list[int]:
 
 
 def _places(
-    entries: list[Entries], constants: list[int], tiles: list[int], planes: list[int]
+    entries: list[RowEntries], constants: list[int], tiles: list[int], planes: list[int]
 ) -> list[Indices]:
-    """Return where each hand's own sources, in the order of `Entries`, are among all.
+    """Return where each hand's own sources, in the order of `RowEntries`, are among all.
 
     Parameters
     ----------
-    entries : list of Entries, length h
+    entries : list of RowEntries, length h
     constants : list of int, length h
         How many constants each hand has.
     tiles, planes : list of int, length h + 1

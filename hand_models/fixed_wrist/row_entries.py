@@ -25,7 +25,7 @@ __all__ = [
     "GIVEN",
     "NAIL_ROWS",
     "WRENCH_PARTS",
-    "Entries",
+    "RowEntries",
     "SurfaceSources",
     "entries_of",
     "hand_sources",
@@ -100,7 +100,7 @@ def _hand_sources(hand: HandModel) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Entries:
+class RowEntries:
     """Which source each number of a set is.
 
     The sources are, in order, `hand_sources`; `surface_sources`; and of the hand on its hold
@@ -148,7 +148,7 @@ class _Numbering:
 
 
 @lru_cache(maxsize=KEPT)
-def entries_of(layout: RowLayout) -> Entries:
+def entries_of(layout: RowLayout) -> RowEntries:
     """Return where the numbers of the sets of a layout come from."""
     n, p, nails, numbering = len(layout.finger_of), layout.pieces, len(layout.nails), _Numbering()
     new = numbering.next
@@ -243,7 +243,7 @@ def entries_of(layout: RowLayout) -> Entries:
         H[[-2, -1], [-2, -1]] = minus
 
     parts = [whole[:6], V[:6].ravel(), L.ravel(), l0, s, H.ravel(), h]
-    entries = Entries(
+    entries = RowEntries(
         index=np.concatenate(parts),
         ends=tuple(np.cumsum([len(part) for part in parts[:-1]]).tolist()),
         shares=np.where(layout.shared_by > 0, 1.0 / np.maximum(layout.shared_by, 1), 0.0),

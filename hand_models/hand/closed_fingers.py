@@ -21,9 +21,9 @@ from hand_models.finger import (
     PHALANGES,
     STOPS,
     ClosedFinger,
-    Closing,
-    Laid,
-    LaidLoads,
+    ClosedPhalanx,
+    ClosureLoads,
+    OpenFinger,
     cling,
     close_all,
     intrusion,
@@ -36,7 +36,7 @@ from hand_models.hand.settled_hand import HandPostures
 
 __all__ = ["ClosedFingers", "close_fingers"]
 
-Row = list[float]
+FingerNumbers = list[float]
 """All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
 
 ANGLE, ALONG, JOINT, LOADS, CODES, PLACES = 0, 1, slice(2, 4), slice(4, 8), slice(8, 10), 10
@@ -76,7 +76,7 @@ class ClosedFingers:
     """
 
     def __init__(
-        self, rows: Sequence[Row], row_of: Sequence[int], alone: dict[int, ClosedFinger]
+        self, rows: Sequence[FingerNumbers], row_of: Sequence[int], alone: dict[int, ClosedFinger]
     ) -> None:
         self.alone = alone
         count = len(FINGERS)
@@ -114,7 +114,7 @@ class ClosedFingers:
 
 def close_fingers(
     placed: PlacedHands,
-    laid: Sequence[Sequence[list[Laid]]],
+    laid: Sequence[Sequence[list[ClosedPhalanx]]],
     tensions: Sequence[float],
     errors: dict[int, InvalidInputError],
 ) -> ClosedFingers:
@@ -123,7 +123,7 @@ def close_fingers(
     Parameters
     ----------
     placed : PlacedHands
-    laid : sequence of sequence of list of Laid, lengths n and 4
+    laid : sequence of sequence of list of ClosedPhalanx, lengths n and 4
         Phalanges of their fingers that rest on smooth rock, one after the other; the same ones for
         fingers that are alike.
     tensions : sequence of float, length n
@@ -161,8 +161,12 @@ def close_fingers(
 
 
 def _row_laid(
-    hand: HandModel, placement: Placement, laid: list[Laid], tension: float, base_tile: bool
-) -> Row | None:
+    hand: HandModel,
+    placement: Placement,
+    laid: list[ClosedPhalanx],
+    tension: float,
+    base_tile: bool,
+) -> FingerNumbers | None:
     """Return the numbers of a finger that can be left as it is laid."""
     if len(laid) < len(PHALANGES) or placement.grasp.fingernail:
         return None
@@ -178,7 +182,7 @@ def _alone(
     """Close fingers that could not be left as laid, those that are alike once."""
     hand = placed.hand
     keys: list[Hashable] = []
-    closings: dict[Hashable, Closing] = {}
+    closings: dict[Hashable, OpenFinger] = {}
     closed: dict[Hashable, ClosedFinger | None] = {}
     for k in left:
         i, finger = divmod(k, len(FINGERS))
@@ -191,7 +195,7 @@ def _alone(
         key = (k if cuts is None else (cuts[0], cuts[1][finger]), *given)
         keys.append(key)
         if key not in closings:
-            closings[key] = Closing(placed.section(i, finger), *given)
+            closings[key] = OpenFinger(placed.section(i, finger), *given)
     if closings:
         found = close_all(hand.finger, list(closings.values()))
         closed.update(zip(closings, found, strict=True))
@@ -213,13 +217,13 @@ def _no_way(placed: PlacedHands, index: int, finger: int) -> InvalidInputError:
 
 
 def _row(
-    phalanges: Sequence[Laid],
+    phalanges: Sequence[ClosedPhalanx],
     height: float,
-    loads: LaidLoads,
+    loads: ClosureLoads,
     stops: Sequence[int] = (FREE,) * len(PHALANGES),
-) -> Row:
+) -> FingerNumbers:
     """Return the numbers of a finger; ``height`` of its tiles above the phalanges [m]."""
-    row: Row = []
+    row: FingerNumbers = []
     for (angle, u, joint, along, kind), t, n, stop in zip(phalanges, *loads, stops, strict=True):
         place = joint + complex(along, height) * u
         row += (angle, along, joint.real, joint.imag)
@@ -228,15 +232,17 @@ def _row(
     return row
 
 
-def _row_alone(closed: ClosedFinger) -> Row:
+def _row_alone(closed: ClosedFinger) -> FingerNumbers:
     """Return the numbers of a finger that was closed on its own."""
     contacts, model = closed.finger.contacts, closed.finger.model
     phalanges = [
-        Laid(c.angle, cmath.rect(1.0, c.angle), complex(*c.joint), c.along, KINDS.index(c.kind))
+        ClosedPhalanx(
+            c.angle, cmath.rect(1.0, c.angle), complex(*c.joint), c.along, KINDS.index(c.kind)
+        )
         for c in contacts
     ]
     (t_0, t_1, t_2), (n_0, n_1, n_2) = (
         [complex(*load) for load in loads.tolist()] for loads in (closed.shears, closed.normals)
     )
     stops = [STOPS.index(c.stop) for c in contacts]
-    return _row(phalanges, model.tile_height, LaidLoads((t_0, t_1, t_2), (n_0, n_1, n_2)), stops)
+    return _row(phalanges, model.tile_height, ClosureLoads((t_0, t_1, t_2), (n_0, n_1, n_2)), stops)

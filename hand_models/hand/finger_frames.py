@@ -33,7 +33,7 @@ __all__ = [
     "FingerFrame",
     "FingerFrames",
     "FrameStack",
-    "Layout",
+    "PalmLayout",
 ]
 
 OUTER: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
@@ -67,7 +67,7 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 UP.setflags(write=False)
 
 
-class Layout(NamedTuple):
+class PalmLayout(NamedTuple):
     """Where fingers and flat tiles are attached to the palm, in H [m].
 
     Attributes
@@ -128,7 +128,7 @@ class FingerFrames:
     palm: Array
 
     @classmethod
-    def of(cls, layout: Layout, outer_rotation: float) -> FingerFrames:
+    def of(cls, layout: PalmLayout, outer_rotation: float) -> FingerFrames:
         """Return the frames of a hand whose outer fingers are turned outward by an angle [rad]."""
         fingers, bases = [], []
         for name in FINGERS:

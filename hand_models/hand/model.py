@@ -18,8 +18,8 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError, Pose
-from hand_models.finger import FingerModel, Fingernail, Layer, TendonLoads
-from hand_models.hand.finger_frames import FingerFrame, FingerFrames, FrameStack, Layout
+from hand_models.finger import FingerModel, Fingernail, SequentialClosure, TendonLoads
+from hand_models.hand.finger_frames import FingerFrame, FingerFrames, FrameStack, PalmLayout
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.names import FINGERS
 from hand_models.hand.structure import Structure
@@ -59,7 +59,7 @@ class HandModel:
         self.drive = TendonDrive.from_table(table)
         self.structure = Structure.from_table(table)
         self.nail = Fingernail.from_table(table)
-        self.layer = Layer(self.finger)
+        self.layer = SequentialClosure(self.finger)
         self.tendon_loads = TendonLoads(self.finger)
         # a tile on a finger's base only shifts the others on a tendon that rubs
         self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]
@@ -96,7 +96,7 @@ class HandModel:
                 for y in table.vector("palm", "tile_y")
             ]
         )
-        self.layout = Layout(
+        self.layout = PalmLayout(
             self.inner_joint,
             self.outer_axis,
             self.outer_reach,

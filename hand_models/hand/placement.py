@@ -14,7 +14,7 @@ from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
-from hand_models.sections import Plane, Section, Swept, entries
+from hand_models.sections import FingerPlane, Section, Swept, entries
 from hand_models.tile import Surface
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
@@ -110,7 +110,7 @@ class PlacedHands:
         seen = (self.frames.rows @ there).round(DIGITS)
         self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
 
-    def cuts(self, index: int) -> tuple[Swept, list[Plane]] | None:
+    def cuts(self, index: int) -> tuple[Swept, list[FingerPlane]] | None:
         """Return what the rock in the planes of a hand's fingers depends on, as `cut_of` takes it.
 
         Planes are equal for fingers that are mirror images of one another. None if the rock is not
@@ -120,7 +120,7 @@ class PlacedHands:
         if shape is None:
             return None
         into = rows[INTO]
-        planes: list[Plane] = []
+        planes: list[FingerPlane] = []
         for origin, along in zip(rows[JOINTS], rows[ALONG], strict=True):
             (a, b, c), (d, e, f), (x, y, z) = along, into, origin
             # every swept hold is its own mirror image in x and in y

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hand_models.base import Array, Pose
-from hand_models.finger import settle
+from hand_models.finger import settle_finger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
@@ -187,7 +187,7 @@ def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
         hand_in_hold.rotation[:, 0],
         hand_in_hold.rotation[:, 2],
     )
-    contact = settle(hand.finger, section, (0.0, 0.0)).contacts[0]
+    contact = settle_finger(hand.finger, section, (0.0, 0.0)).contacts[0]
     return touches_seat(hand, contact.kind, contact.along)
 
 

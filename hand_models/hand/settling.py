@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.finger import KINDS, Laid
+from hand_models.finger import KINDS, ClosedPhalanx
 from hand_models.hand.closed_fingers import close_fingers
 from hand_models.hand.finger_frames import BASES
 from hand_models.hand.hooked_nails import hook_nails, no_nails
@@ -23,11 +23,11 @@ from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.seating import CENTRED, propose, seat, seating_given, touches_seat
 from hand_models.hand.settled_hand import SettledHand
 from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_rock
-from hand_models.sections import Plane, cut_of
+from hand_models.sections import FingerPlane, cut_of
 
 __all__ = ["settle_hands"]
 
-Known = list[dict[Plane, list[Laid]]]
+Known = list[dict[FingerPlane, list[ClosedPhalanx]]]
 """Phalanges of each hand's fingers by what those depend on."""
 
 SEATED: Final = FINGERS.index("inner_left")
@@ -130,7 +130,7 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
 
 def _placed(
     hand: HandModel, placements: Sequence[Placement]
-) -> tuple[PlacedHands, list[list[list[Laid]]]]:
+) -> tuple[PlacedHands, list[list[list[ClosedPhalanx]]]]:
     """Return hands at their holds, seated where these have no place, and their fingers laid."""
     shapes = [each.hold.swept for each in placements]
     seatings, meant = [], []
@@ -156,19 +156,19 @@ def _placed(
     return placed, laid
 
 
-def _laid(placed: PlacedHands, known: Known) -> list[list[list[Laid]]]:
+def _laid(placed: PlacedHands, known: Known) -> list[list[list[ClosedPhalanx]]]:
     """Return the phalanges of the fingers of each hand that rest on smooth rock.
 
     Of a hand's fingers that are alike the same ones, and those that are known.
     """
-    laid: list[list[list[Laid]]] = []
+    laid: list[list[list[ClosedPhalanx]]] = []
     for i, lain in enumerate(known):
         cuts = placed.cuts(i)
         if cuts is None:
             laid.append([[] for _ in FINGERS])
             continue
         shape, planes = cuts
-        fingers: list[list[Laid]] = []
+        fingers: list[list[ClosedPhalanx]] = []
         for plane in planes:
             phalanges = lain.get(plane)
             if phalanges is None:
@@ -179,6 +179,6 @@ def _laid(placed: PlacedHands, known: Known) -> list[list[list[Laid]]]:
     return laid
 
 
-def _on_seat(hand: HandModel, laid: list[Laid]) -> bool:
+def _on_seat(hand: HandModel, laid: list[ClosedPhalanx]) -> bool:
     """Whether a finger's proximal contact is where a seat meant it to be."""
     return bool(laid) and touches_seat(hand, KINDS[laid[0].kind], laid[0].along)

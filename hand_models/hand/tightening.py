@@ -22,13 +22,13 @@ from hand_models.finger import PHALANGES
 from hand_models.hand.names import FINGERS, NAIL
 from hand_models.hand.settled_hand import SettledHand
 
-__all__ = ["TILES", "Closing", "Stage", "closing_sequence"]
+__all__ = ["TILES", "ClosingSequence", "ClosingStage", "closing_sequence"]
 
 TILES = "tiles"
 """Name of the last stage."""
 
 
-class Stage(NamedTuple):
+class ClosingStage(NamedTuple):
     """One part of a finger on its way.
 
     Attributes
@@ -44,13 +44,13 @@ class Stage(NamedTuple):
     ends: float
 
 
-class Closing(NamedTuple):
+class ClosingSequence(NamedTuple):
     """How one finger closes.
 
     Attributes
     ----------
     finger : str
-    stages : tuple of Stage
+    stages : tuple of ClosingStage
         Nail, joints from the base outward, tiles.
     in_order : bool
         Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
@@ -58,11 +58,11 @@ class Closing(NamedTuple):
     """
 
     finger: str
-    stages: tuple[Stage, ...]
+    stages: tuple[ClosingStage, ...]
     in_order: bool
 
 
-def closing_sequence(settled: SettledHand) -> tuple[Closing, ...]:
+def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
     """Return how each finger of a settled hand has closed, in the order of `FINGERS`.
 
     A joint that the rock has pushed open, or that stands at its lower limit, has not been closed by
@@ -80,7 +80,9 @@ def closing_sequence(settled: SettledHand) -> tuple[Closing, ...]:
         finger = settled.fingers[i]
         model = finger.model
         turned = nail.preload + nail.stiffness * float(settled.nail_angles[i])
-        stages = [Stage(NAIL, nail.preload / nail.pulley_radius, turned / nail.pulley_radius)]
+        stages = [
+            ClosingStage(NAIL, nail.preload / nail.pulley_radius, turned / nail.pulley_radius)
+        ]
         pulls = finger.losses(name.startswith("outer")) * np.asarray(model.pulley_radii)
         for phalanx, pull, stiffness, preload, angle in zip(
             PHALANGES,
@@ -92,10 +94,10 @@ def closing_sequence(settled: SettledHand) -> tuple[Closing, ...]:
         ):
             starts = max(0.0, preload / pull)
             ends = max(starts, (preload + stiffness * angle) / pull)
-            stages.append(Stage(phalanx, starts, ends))
-        stages.append(Stage(TILES, 0.0, settled.closing_tension))
+            stages.append(ClosingStage(phalanx, starts, ends))
+        stages.append(ClosingStage(TILES, 0.0, settled.closing_tension))
         ordered = all(
             later.starts >= earlier.ends for earlier, later in itertools.pairwise(stages[:-1])
         )
-        sequence.append(Closing(name, tuple(stages), ordered))
+        sequence.append(ClosingSequence(name, tuple(stages), ordered))
     return tuple(sequence)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array
 from hand_models.parameters import ParameterTable
 from hand_models.rock.holds import Hold
-from hand_models.rock.smoothing import Scale, raw_within, within
+from hand_models.rock.smoothing import Scale, raw_outline, smoothed_outline
 from hand_models.sections import Section
 
 __all__ = ["OutlinedHold"]
@@ -35,9 +35,9 @@ class OutlinedHold(Hold):
         """Return the raw outlines in a plane, rock on their left; arguments as of `section`."""
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        return within(self._pieces(origin, s_axis, t_axis), self._scale)
+        return smoothed_outline(self._pieces(origin, s_axis, t_axis), self._scale)
 
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
-        return raw_within(self._pieces(origin, s_axis, t_axis), self._scale)
+        return raw_outline(self._pieces(origin, s_axis, t_axis), self._scale)

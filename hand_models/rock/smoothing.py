@@ -29,7 +29,7 @@ from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.sections import PolylineSection
 
-__all__ = ["Scale", "raw_within", "smooth", "within"]
+__all__ = ["Scale", "raw_outline", "smooth", "smoothed_outline"]
 
 STANDS_OUT: Final = 1e-5
 """How far raw points may stand out of a raised curve [m]."""
@@ -154,7 +154,7 @@ def _outward(curve: Array, closed: bool) -> Array:
     return np.column_stack([step[:, 1], -step[:, 0]]) / length[:, None]
 
 
-def within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
+def smoothed_outline(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
     """Return what of raw polylines a finger can reach from the origin, smoothed.
 
     Parameters
@@ -178,8 +178,8 @@ def within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
     return PolylineSection(reached) if reached else None
 
 
-def raw_within(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
-    """Return the same as `within`, debris left out but not smoothed: what a nail can feel."""
+def raw_outline(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
+    """Return what `smoothed_outline` does, debris left out but not smoothed: a nail feels it."""
     runs = [_distinct(run) for run in _reached(pieces, scale)]
     reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= scale.bridged_gap]
     return PolylineSection(reached, faceted=True) if reached else None

@@ -10,6 +10,6 @@ from .section import (
     Section as Section,
     Vector2 as Vector2,
 )
-from .smooth_cuts import Cut as Cut, Face as Face
+from .smooth_cuts import Face as Face, SmoothCut as SmoothCut
 from .swept_ball import PARALLEL as PARALLEL, Swept as Swept, entries as entries
-from .swept_cuts import Plane as Plane, cut_of as cut_of
+from .swept_cuts import FingerPlane as FingerPlane, cut_of as cut_of

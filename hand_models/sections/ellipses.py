@@ -19,7 +19,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.sections.conics import circle_crossings
-from hand_models.sections.smooth_cuts import Cut, Face, Tangent, into_circle, past_circle, to_face
+from hand_models.sections.smooth_cuts import (
+    Face,
+    SmoothCut,
+    Tangent,
+    into_circle,
+    past_circle,
+    to_face,
+)
 
 __all__ = ["Oval"]
 
@@ -57,7 +64,7 @@ class _Nearest(NamedTuple):
     radius: float
 
 
-class Oval(Cut):
+class Oval(SmoothCut):
     """An ellipse of rock that is no circle.
 
     Parameters

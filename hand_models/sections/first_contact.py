@@ -23,7 +23,7 @@ from hand_models.base import Array, Indices
 from hand_models.sections.boundary import Boundary, Window, stretch_minima
 from hand_models.sections.rows import Complexes, Flags, Span
 
-__all__ = ["Sweep"]
+__all__ = ["TurningFaces"]
 
 FLAT: Final = 5e-7
 """Rock within this of a face that rests on it counts as touched [m]."""
@@ -56,7 +56,7 @@ class _Meetings(NamedTuple):
     vertex: Indices
 
 
-class Sweep:
+class TurningFaces:
     """Faces that turn over a boundary from an angle on.
 
     Parameters

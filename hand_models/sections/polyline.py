@@ -14,7 +14,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.sections.boundary import Boundary
-from hand_models.sections.first_contact import Sweep
+from hand_models.sections.first_contact import TurningFaces
 from hand_models.sections.rows import Span
 from hand_models.sections.section import Rest, Section, Vector2
 
@@ -64,8 +64,8 @@ class PolylineSection(Section):
         with np.errstate(invalid="ignore", divide="ignore"):
             return float(self._sweep(joint, Span.of(start, end, height), angle).clearances()[0])
 
-    def _sweep(self, joint: Vector2, span: Span, low: float) -> Sweep:
-        return Sweep(self.boundary, np.array([complex(*joint)]), span, np.array([low]))
+    def _sweep(self, joint: Vector2, span: Span, low: float) -> TurningFaces:
+        return TurningFaces(self.boundary, np.array([complex(*joint)]), span, np.array([low]))
 
     def clearance(self, point: Vector2) -> float:
         return float(self.boundary.clearances(np.array(complex(*point))))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.sections.first_contact import Sweep
+from hand_models.sections.first_contact import TurningFaces
 from hand_models.sections.polyline import PolylineSection
 from hand_models.sections.rows import Complexes, Rests, SectionRows, Span
 
@@ -40,7 +40,7 @@ class PolylineRows(SectionRows):
     def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
         found = np.empty(angle.shape)
         for section, rows in self._each():
-            sweep = Sweep(section.boundary, joint[rows], span.take(rows), angle[rows])
+            sweep = TurningFaces(section.boundary, joint[rows], span.take(rows), angle[rows])
             found[rows] = sweep.clearances()
         return found
 
@@ -48,7 +48,7 @@ class PolylineRows(SectionRows):
         shape = 2, len(low)
         (angle, distance), (flat, blocked) = np.empty(shape), np.empty(shape, dtype=bool)
         for section, rows in self._each():
-            sweep = Sweep(section.boundary, joint[rows], span.take(rows), low[rows])
+            sweep = TurningFaces(section.boundary, joint[rows], span.take(rows), low[rows])
             blocked[rows] = sweep.clearances() <= 0.0
             angle[rows], distance[rows], flat[rows] = sweep.contacts(high[rows], section.faceted)
         return Rests(angle, distance, flat, blocked)

@@ -23,7 +23,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.sections.conics import circle_crossings
-from hand_models.sections.rows import Complexes, Flags, SmoothRows, Span, within
+from hand_models.sections.rows import Complexes, Flags, SmoothRows, Span, angles_within
 from hand_models.sections.section import FACE_SAMPLES
 
 __all__ = ["ProfileRows"]
@@ -181,7 +181,7 @@ class ProfileRows(SmoothRows[_Numbers]):
             # the flat faces go on beyond the line of the face
             sine, cosine = rock.wedge
             theta[~(cosine * (b * -v + d * u) >= sine * np.abs(a * -v + c * u))] = np.nan
-        return within(theta, low, high), s * u + t * v
+        return angles_within(theta, low, high), s * u + t * v
 
     def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
         rock, arms = self._numbers, span.arms
@@ -196,7 +196,9 @@ class ProfileRows(SmoothRows[_Numbers]):
         )
         if not self._edged:
             angles[slopes >= 0.0] = np.nan
-            return np.asarray(np.fmin.reduce(within(angles + rock.axis - span.phases, low, high)))
+            return np.asarray(
+                np.fmin.reduce(angles_within(angles + rock.axis - span.phases, low, high))
+            )
         # on which side of the end of the arc each place is
         sine, cosine = rock.wedge
         u, v = np.cos(angles), np.sin(angles)
@@ -212,7 +214,7 @@ class ProfileRows(SmoothRows[_Numbers]):
         x, z = self._in_profile(joint + arms * np.exp(1j * entered))
         entered[~(SIDES[:, None] * sine * x + cosine * z >= -slack)] = np.nan
         angles = np.concatenate([angles, entered])
-        return np.asarray(np.fmin.reduce(within(angles - span.phases, low, high)))
+        return np.asarray(np.fmin.reduce(angles_within(angles - span.phases, low, high)))
 
     def _straight(self, joint: Complexes, span: Span, angle: Array) -> Flags | bool:
         if not self._edged:

@@ -26,7 +26,7 @@ __all__ = [
     "SectionRows",
     "SmoothRows",
     "Span",
-    "within",
+    "angles_within",
 ]
 
 Complexes = NDArray[np.complex128]
@@ -190,7 +190,7 @@ class FlatRows(SmoothRows[_Flat]):
     def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
         # the cosine of how far both ends are from the direction into the rock, from outside
         turn = np.arccos(self.clearances(joint) / span.arms)
-        return within(self._numbers.bearing - turn - span.phases, low, high)
+        return angles_within(self._numbers.bearing - turn - span.phases, low, high)
 
     def clearances(self, points: Complexes) -> Array:
         _, s, t, offset = self._numbers
@@ -229,7 +229,7 @@ class RoundRows(SmoothRows[_Round]):
         way, offset = centre - joint, radius + span.height
         distance = np.abs(way)
         angle = np.arctan2(way.imag, way.real) - np.arcsin(offset / distance)
-        return within(angle, low, high), np.sqrt((distance - offset) * (distance + offset))
+        return angles_within(angle, low, high), np.sqrt((distance - offset) * (distance + offset))
 
     def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
         centre, radius = self._numbers
@@ -237,7 +237,7 @@ class RoundRows(SmoothRows[_Round]):
         distance = np.abs(way)
         cosine = (arms * arms + distance * distance - radius * radius) / (2.0 * arms * distance)
         angle = np.arctan2(way.imag, way.real) - np.arccos(cosine)
-        return within(angle - span.phases, low, high)
+        return angles_within(angle - span.phases, low, high)
 
     def clearances(self, points: Complexes) -> Array:
         centre, radius = self._numbers
@@ -251,7 +251,7 @@ class RoundRows(SmoothRows[_Round]):
         return np.asarray(np.hypot(beside, way.imag - span.height) - radius)
 
 
-def within(angle: Array, low: Array, high: Array) -> Array:
+def angles_within(angle: Array, low: Array, high: Array) -> Array:
     """Return angles plus the whole turns that bring them into [low, high]; else NaN."""
     angle = low + (angle - low) % math.tau
     angle[angle > high] = np.nan

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from hand_models.sections.section import FACE_SAMPLES
 
-__all__ = ["Cut", "Disc", "Face", "Tangent", "Wall", "into_circle", "past_circle", "to_face"]
+__all__ = ["Disc", "Face", "SmoothCut", "Tangent", "Wall", "into_circle", "past_circle", "to_face"]
 
 Tangent = tuple[complex, float]
 """Direction of a phalanx whose face's line touches the rock, and how far along it that is [m]."""
@@ -32,7 +32,7 @@ class Face(NamedTuple):
     height: float
 
 
-class Cut(ABC):
+class SmoothCut(ABC):
     """Rock in a finger's plane.
 
     Attributes
@@ -75,7 +75,7 @@ class Cut(ABC):
         return False
 
 
-class Disc(Cut):
+class Disc(SmoothCut):
     """A disc of rock."""
 
     def __init__(self, centre: complex, radius: float) -> None:
@@ -100,7 +100,7 @@ class Disc(Cut):
         return abs(point - self.centre) - self._radius
 
 
-class Wall(Cut):
+class Wall(SmoothCut):
     """A half-plane of rock.
 
     Parameters

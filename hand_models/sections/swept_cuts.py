@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from hand_models.sections.ellipses import Oval
-from hand_models.sections.smooth_cuts import Cut, Disc, Face, Tangent, Wall
+from hand_models.sections.smooth_cuts import Disc, Face, SmoothCut, Tangent, Wall
 from hand_models.sections.swept_ball import PARALLEL, Swept
 
-__all__ = ["Plane", "cut_of"]
+__all__ = ["FingerPlane", "cut_of"]
 
-Plane = tuple[float, float, float, float, float, float, float, float, float]
+FingerPlane = tuple[float, float, float, float, float, float, float, float, float]
 """Axes of a finger's plane, along the finger and into the rock, and its origin from the centre of
 the hold's ball, all scaled."""
 
@@ -26,7 +26,7 @@ BESIDE: Final = -1e-9
 """How far on the inner side of a line through the ball's centre counts as beside it [m]."""
 
 
-def cut_of(shape: Swept, plane: Plane) -> Cut | None:
+def cut_of(shape: Swept, plane: FingerPlane) -> SmoothCut | None:
     """Return the rock in a plane; None if the plane misses it, or runs along its axis."""
     a, b, c, d, e, f, x, y, z = plane
     if not shape.radius:
@@ -96,7 +96,7 @@ class _Line(NamedTuple):
         return way if self.beside(joint + arm * way) >= 0.0 else None
 
 
-def _line(shape: Swept, plane: Plane, side: float) -> _Line:
+def _line(shape: Swept, plane: FingerPlane, side: float) -> _Line:
     """Return the face on one side of a hold."""
     a, _, c, d, _, f, x, _, z = plane
     sine, cosine = side * shape.sine, side * shape.cosine
@@ -113,7 +113,7 @@ def _line(shape: Swept, plane: Plane, side: float) -> _Line:
     )
 
 
-class _Edge(Cut):
+class _Edge(SmoothCut):
     """A disc or an ellipse of rock that is swept along two faces."""
 
     faced = True

@@ -28,7 +28,7 @@ from hand_models.experiments import (
     Claim,
     Progress,
     StudyResult,
-    cut,
+    clipped,
     extents,
     in_paper_signs,
     save_picture,
@@ -167,7 +167,7 @@ class Fit:
             loads, _ = gripper.finger_loads(pulled_pose(gripper, pull)[None])
             found += [*loads.shears[0], *loads.normals[0]]
         space = boundary(gripper, linear_box(gripper), RAYS)
-        return np.array([*found, *extents(cut(in_paper_signs(space.wrenches)))])
+        return np.array([*found, *extents(clipped(in_paper_signs(space.wrenches)))])
 
     def residuals(self, x: Array) -> Array:
         """Return how many tolerances each datum is off, shape (15,)."""

@@ -28,11 +28,11 @@ from hand_models.tile import (
     SpineArray,
     Surface,
     bounds_gap,
+    directional_strength,
     fit_lateral,
     fit_line,
     inner_half_planes,
     measured_tile_shear,
-    reach,
     statistics,
     within_law,
 )
@@ -136,7 +136,7 @@ def _trials(array: SpineArray) -> Array:
 def _half_plane_reach(surface: Surface, angles: Array) -> Array:
     """Return how far the planner's half-planes let a load in the finger plane go [N]."""
     directions = np.column_stack([np.cos(angles), -np.sin(angles), np.zeros(len(angles))])
-    return reach(inner_half_planes(surface), directions)
+    return directional_strength(inner_half_planes(surface), directions)
 
 
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
@@ -185,7 +185,10 @@ def _gaps(surface: Surface) -> list[dict[str, float]]:
     gaps = []
     for count in COUNTS:
         pieces = replace(surface, half_planes=count)
-        lateral = float(reach(inner_half_planes(pieces), sideways)[0]) / surface.shear_limit
+        lateral = (
+            float(directional_strength(inner_half_planes(pieces), sideways)[0])
+            / surface.shear_limit
+        )
         gap = bounds_gap(pieces, directions)
         gaps.append({"half_planes": count, "lateral_reach": lateral, **gap._asdict()})
     return gaps
@@ -428,7 +431,9 @@ def _draw_surface() -> Figure:
         ]
         for count, style in ((1, ":"), (4, "--")):
             pieces = inner_half_planes(replace(surface, half_planes=count))
-            radii.append((reach(pieces, directions), "k", style, f"half-planes: {count}"))
+            radii.append(
+                (directional_strength(pieces, directions), "k", style, f"half-planes: {count}")
+            )
         for radius, colour, style, label in radii:
             axes.plot(radius * along, radius * aside, style, color=colour, label=label)
         axes.set(

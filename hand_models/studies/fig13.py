@@ -24,13 +24,13 @@ from hand_models.experiments import (
     Extents,
     Progress,
     StudyResult,
-    cut,
+    clipped,
+    distance_along,
     even_pulls,
     extents,
     in_paper_signs,
     label_solid,
     pull,
-    reach,
     save_picture,
     section,
     unloaded,
@@ -82,13 +82,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     unloaded(gripper)
     found = search(gripper, PER_AXIS, lambda i, n: progress(SEARCHED * i // n, STEPS))
     whole = in_paper_signs(found.wrenches)
-    full, shown = vertices(whole), cut(whole)
+    full, shown = vertices(whole), clipped(whole)
     size = np.abs(shown).max(axis=0)
     held = whole[whole[:, 1] <= 0.0]
     directions = even_pulls(DIRECTIONS, size)
     pulled = pull(gripper, directions, _told(progress))
     over = np.linalg.norm(pulled.wrenches * UNITS, axis=1)
-    filled = reach(full, pulled.wrenches / over[:, None]) / over
+    filled = distance_along(full, pulled.wrenches / over[:, None]) / over
     force_x, moment = np.linspace(-1.0, 1.0, GRID) * size[0], np.linspace(-1.0, 1.0, GRID) * size[2]
     data: dict[str, Any] = {
         "diameter": diameter,
@@ -159,7 +159,7 @@ def _pull_off(points: Array, force_x: Array, moment: Array) -> list[list[float |
     x, m = np.meshgrid(force_x, moment)
     start = np.column_stack([x.ravel(), 0.0 * x.ravel(), m.ravel()])
     down = np.tile([0.0, -1.0, 0.0], (len(start), 1))
-    least = -reach(points, down, start).reshape(x.shape)
+    least = -distance_along(points, down, start).reshape(x.shape)
     return [[None if np.isnan(value) else float(value) for value in row] for row in least]
 
 
@@ -174,7 +174,7 @@ def _positive_moment(points: Array, force_x: Array) -> dict[str, list[Any]]:
         if not len(slice_) or slice_[:, 1].min() >= 0.0:
             break
         best = slice_[slice_[:, 1].argmin()]
-        without = float(reach(points, np.array([[0.0, -1.0, 0.0]]), at)[0])
+        without = float(distance_along(points, np.array([[0.0, -1.0, 0.0]]), at)[0])
         found["force_x"].append(float(force))
         found["best_moment"].append(float(best[2]))
         found["strength"].append(float(-best[1]))
@@ -225,7 +225,7 @@ def _linearised(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
             "mean_size_of_error": float(np.abs(error).mean()),
             "error_pulling": _spread(error[pulling]),
             "mean_size_of_error_pulling": float(np.abs(error[pulling]).mean()),
-            "extents": extents(cut(points))._asdict(),
+            "extents": extents(clipped(points))._asdict(),
         }
     return result
 

@@ -26,7 +26,7 @@ from hand_models.experiments import (
     Progress,
     Pulled,
     StudyResult,
-    cut,
+    clipped,
     even_pulls,
     extents,
     in_paper_signs,
@@ -112,7 +112,7 @@ def _surface(gripper: Gripper, tell: Callable[[float], None]) -> dict[str, Any]:
     unloaded(gripper)
     found = search(gripper, PER_AXIS)
     tell(0.1)
-    shown = cut(in_paper_signs(found.wrenches))
+    shown = clipped(in_paper_signs(found.wrenches))
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
     directions = even_pulls(DIRECTIONS, np.abs(shown).max(axis=0))

@@ -25,9 +25,9 @@ from hand_models.experiments import (
     Limit,
     Progress,
     StudyResult,
-    cut,
+    clipped,
+    distance_along,
     limit,
-    reach,
     rest_state,
     save_picture,
     sharpened,
@@ -117,13 +117,13 @@ def _at(grasp: Gripper, rays: int) -> dict[str, Any]:
         nobody: dict[str, list[str]] = {f"{force}_phalanges": [] for force in FORCES}
         return {"state": state, **dict.fromkeys(keys), **nobody}
     ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
-    pure = float(reach(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0])
+    pure = float(distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0])
     return {
         "state": state,
         "shear": shear.value,
         "pure_shear": pure if np.isfinite(pure) else None,
         "normal": normal.value,
-        "volume": volume(cut(points.wrenches)),
+        "volume": volume(clipped(points.wrenches)),
         "pressed_share": _pressed_share(grasp, points, shear),
         "shear_phalanges": _phalanges(points, shear),
         "normal_phalanges": _phalanges(points, normal),

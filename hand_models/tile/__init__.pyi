@@ -1,9 +1,9 @@
 from .half_planes import (
     HalfPlane as HalfPlane,
     bounds_gap as bounds_gap,
+    directional_strength as directional_strength,
     inner_half_planes as inner_half_planes,
     outer_half_planes as outer_half_planes,
-    reach as reach,
 )
 from .spine_array import SpineArray as SpineArray, statistics as statistics
 from .spine_calibration import (

@@ -32,9 +32,9 @@ __all__ = [
     "BoundsGap",
     "HalfPlane",
     "bounds_gap",
+    "directional_strength",
     "inner_half_planes",
     "outer_half_planes",
-    "reach",
 ]
 
 GRID: Final = (129, 33)
@@ -140,7 +140,7 @@ def outer_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
     return tuple(pieces)
 
 
-def reach(pieces: Sequence[HalfPlane], directions: Array) -> Array:
+def directional_strength(pieces: Sequence[HalfPlane], directions: Array) -> Array:
     """Return how far half-planes let a load go.
 
     Parameters
@@ -177,7 +177,9 @@ def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
     angle = np.arctan2(-directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
     azimuth = np.arctan2(np.abs(directions[:, 2]), directions[:, 0])
     exact = surface.strength(angle, azimuth)
-    inner, outer = (reach(p(surface), directions) for p in (inner_half_planes, outer_half_planes))
+    inner, outer = (
+        directional_strength(p(surface), directions) for p in (inner_half_planes, outer_half_planes)
+    )
     volume = float(np.sum(exact**3))
     return BoundsGap(
         inner_volume=float(np.sum(inner**3)) / volume,

@@ -18,7 +18,14 @@ from hand_models.wrench_spaces import SCALE
 from planner import programs
 from planner.capability.body_motion import Motion, motion_of
 from planner.explanation import ALIKE, BINDING, joint_name, limit_name
-from planner.prepare import Hands, Point, Posture, gather, posture_at, widest_at_rest
+from planner.prepare import (
+    HandSets,
+    LinearisationPoint,
+    Posture,
+    assemble,
+    posture_at,
+    widest_at_rest,
+)
 from planner.programs import JOINT_TORQUE, SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
 from planner.question import Question
 from planner.result import LimitName, Plan
@@ -55,7 +62,7 @@ class BodyPrograms:
         self.question = replace(question, want=frozenset(), objective="max_margin", deadline=None)
         self.plan = plan(self.question)
         where = None if self.plan.joints is None else posture_at(question, self.plan.joints)
-        _, hands = gather(self.question, where, self.plan.body_wrench)
+        _, hands = assemble(self.question, where, self.plan.body_wrench)
         self._hands = hands
         self._point = _where_planned(hands, self.plan)
         self.exact = not hands.floating
@@ -204,7 +211,7 @@ def size_of(direction: Array) -> float:
     return size
 
 
-def _where_planned(hands: Hands, planned: Plan) -> Point:
+def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
     """Return where floating wrists are in a plan; without one, at rest as they can do most."""
     if planned.hands is None:
         palms = [None if wrist is None else widest_at_rest(wrist)[0] for wrist in hands.wrists]
@@ -214,7 +221,7 @@ def _where_planned(hands: Hands, planned: Plan) -> Point:
     for i, hand in enumerate(planned.hands):
         if hand.wrist is not None:
             loads[i], palms[i] = hand.wrist.twist, hand.wrist.palm
-    return Point(tuple(loads), tuple(palms))
+    return LinearisationPoint(tuple(loads), tuple(palms))
 
 
 class _Rows(NamedTuple):

@@ -23,12 +23,12 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.wrench_spaces import SCALE
 from planner.capability.body_programs import BodyPrograms, size_of
-from planner.capability.polygon import MOST, Polygon, Touch, enclose
+from planner.capability.polygon import MOST, Polygon, SupportPoint, enclose
 from planner.programs import WRENCH_UNIT, Reached
 from planner.question import Question
 from planner.result import LimitName
 
-__all__ = ["COMPONENTS", "OTHERS", "BodySpace", "End", "Others", "Section", "checked_axes"]
+__all__ = ["COMPONENTS", "OTHERS", "BodySection", "BodySpace", "End", "Others", "checked_axes"]
 
 COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
 """Of a body wrench."""
@@ -60,7 +60,7 @@ class End(NamedTuple):
     loads: tuple[Array, ...]
 
 
-class Section(NamedTuple):
+class BodySection(NamedTuple):
     """A plane of the body wrenches that are held.
 
     Attributes
@@ -135,7 +135,7 @@ class BodySpace:
         cap = self._programs.cap_at_needed
         return None if cap is None else self._along(self.needed, direction, cap)
 
-    def section(self, axes: Sequence[str], others: Others = "needed") -> Section:
+    def section(self, axes: Sequence[str], others: Others = "needed") -> BodySection:
         """Return the wrenches that are held in the plane of two components.
 
         Parameters
@@ -166,17 +166,17 @@ class BodySpace:
         programs = self._programs
         cap = programs.cap_at_needed if others == "needed" else None
 
-        def touching(normal: Array) -> Touch | None:
+        def touching(normal: Array) -> SupportPoint | None:
             goal = columns[plane].T @ (normal * units)
             found = programs.reached(goal, columns, at, cap)
             if found is None:
                 return None
             point = (SCALE * programs.wrench(found))[plane]
-            return Touch(point, float(normal @ point), programs.limiting(found.outcome))
+            return SupportPoint(point, float(normal @ point), programs.limiting(found.outcome))
 
         polygon = enclose(touching)
         scaled = None if polygon is None else polygon.scaled(1.0 / SCALE[plane])
-        return Section((one, two), others, scaled)
+        return BodySection((one, two), others, scaled)
 
     def error(self, ends: Sequence[End]) -> float:
         """Return how far floating hands' sets are off at most at some ends [N].
@@ -246,12 +246,12 @@ class BodySpace:
             return None
         plane = np.hstack(ways)
 
-        def touching(normal: Array) -> Touch | None:
+        def touching(normal: Array) -> SupportPoint | None:
             found, unit = programs.accelerated(normal, plane)
             if found is None:
                 return None
             point = found.t / unit
-            return Touch(point, float(normal @ point), programs.limiting(found.outcome))
+            return SupportPoint(point, float(normal @ point), programs.limiting(found.outcome))
 
         return enclose(touching, most)
 

@@ -20,7 +20,7 @@ import numpy as np
 from hand_models.base import Array, SolverError
 from planner.result import LimitName
 
-__all__ = ["MOST", "Polygon", "Touch", "enclose"]
+__all__ = ["MOST", "Polygon", "SupportPoint", "enclose"]
 
 FIRST: Final = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 """Directions that are asked for first."""
@@ -38,7 +38,7 @@ TURN: Final = 1e-7
 """Least turn between two directions [rad]; nearer, where their half-planes meet is all rounding."""
 
 
-class Touch(NamedTuple):
+class SupportPoint(NamedTuple):
     """How far a set reaches in a direction.
 
     Attributes
@@ -86,10 +86,10 @@ class _Side(NamedTuple):
     """A direction that was asked for, and what it gave."""
 
     normal: Array
-    touch: Touch
+    touch: SupportPoint
 
 
-def enclose(touching: Callable[[Array], Touch | None], most: int = MOST) -> Polygon | None:
+def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) -> Polygon | None:
     """Return the polygons of a set; None if it is empty.
 
     Parameters
@@ -133,7 +133,7 @@ def enclose(touching: Callable[[Array], Touch | None], most: int = MOST) -> Poly
     )
 
 
-def _asked(touching: Callable[[Array], Touch | None], normal: Array) -> _Side:
+def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> _Side:
     touch = touching(normal)
     if touch is None:
         raise SolverError(f"a set that is not empty has no end toward {normal.tolist()}")

@@ -8,5 +8,5 @@ from .clock import (
     seconds as seconds,
     within as within,
 )
-from .overlap import Beside as Beside, begin as begin
+from .overlap import Overlap as Overlap, begin_overlap as begin_overlap
 from .unfinished import Unfinished as Unfinished, late_sentence as late_sentence

@@ -10,14 +10,14 @@ from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
-__all__ = ["Beside", "begin"]
+__all__ = ["Overlap", "begin_overlap"]
 
 T = TypeVar("T")
 
-_waiting: Final[ContextVar[Beside[Any] | None]] = ContextVar("waiting", default=None)
+_waiting: Final[ContextVar[Overlap[Any] | None]] = ContextVar("waiting", default=None)
 
 
-class Beside(Generic[T]):
+class Overlap(Generic[T]):
     """Work for the first solver that runs while this is entered; without one it is done after.
 
     Parameters
@@ -49,7 +49,7 @@ class Beside(Generic[T]):
         return self._work() if begun is None or begun.cancel() else begun.result()
 
 
-def begin() -> None:
+def begin_overlap() -> None:
     """Begin what waits for a solver to run, which is just about to."""
     waiting = _waiting.get()
     if waiting is not None:

@@ -1,13 +1,17 @@
 from .active_limits import (
     ALIKE as ALIKE,
     BINDING as BINDING,
-    Binding as Binding,
-    Used as Used,
+    ActiveLimits as ActiveLimits,
+    LimitUse as LimitUse,
     joint_name as joint_name,
     limit_name as limit_name,
     unit_of as unit_of,
 )
-from .certificate import Hindered as Hindered, certify as certify, certify_idle as certify_idle
+from .certificate import (
+    InfeasibleStance as InfeasibleStance,
+    certify as certify,
+    certify_idle as certify_idle,
+)
 from .floating_warnings import (
     far_wrists as far_wrists,
     idle_preloads as idle_preloads,
@@ -22,7 +26,7 @@ from .sentences import (
     LEAST_FACTOR as LEAST_FACTOR,
     NO_FACTOR as NO_FACTOR,
     UNPROVEN as UNPROVEN,
-    barrier_words as barrier_words,
+    constraint_words as constraint_words,
     limit_sentence as limit_sentence,
     overload_sentence as overload_sentence,
     shortfall_sentence as shortfall_sentence,

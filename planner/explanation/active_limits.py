@@ -13,11 +13,19 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.prepare import KEPT_NAMES, Same, joined
+from planner.prepare import KEPT_NAMES, IdentityKey, concatenated
 from planner.programs import JOINT_TORQUE, SLACK
 from planner.result import LimitName, Price
 
-__all__ = ["Binding", "Used", "close_to", "joint_name", "limit_name", "unit_of", "used_limits"]
+__all__ = [
+    "ActiveLimits",
+    "LimitUse",
+    "close_to",
+    "joint_name",
+    "limit_name",
+    "limit_uses",
+    "unit_of",
+]
 
 BINDING: Final = 1e-6
 """Multipliers below this do not count as binding."""
@@ -47,7 +55,7 @@ def joint_name(limb: str, joint: str) -> LimitName:
     return LimitName(limb, None, None, JOINT_TORQUE, joint)
 
 
-class Used(NamedTuple):
+class LimitUse(NamedTuple):
     """How much of a limit is used: load over capacity of one of its rows."""
 
     name: LimitName
@@ -60,9 +68,9 @@ class Used(NamedTuple):
         return self.load / self.capacity
 
 
-def used_limits(
+def limit_uses(
     limbs: Sequence[str], spaces: Sequence[WrenchSpace], used: Array, least: float
-) -> Iterator[Used]:
+) -> Iterator[LimitUse]:
     """Yield how much is used of every limit row of which that is at least so much.
 
     Parameters
@@ -79,7 +87,7 @@ def used_limits(
         first += len(space.s)
         for i in np.flatnonzero(mine >= least).tolist():
             capacity = float(space.s[i])
-            yield Used(limit_name(limb, space.rows[i]), float(mine[i]) * capacity, capacity)
+            yield LimitUse(limit_name(limb, space.rows[i]), float(mine[i]) * capacity, capacity)
 
 
 def close_to(utilisation: float) -> float:
@@ -87,7 +95,7 @@ def close_to(utilisation: float) -> float:
     return utilisation - 2.0 * SLACK * max(1.0, utilisation)
 
 
-class Binding:
+class ActiveLimits:
     """What binds a plan, by the multipliers of its program; rows of one name are one limit.
 
     The dearest come first: of which one per cent more would take most off, so that newtons compare
@@ -108,8 +116,8 @@ class Binding:
         multipliers: Sequence[Array],
     ) -> None:
         self._spaces = spaces
-        self._named = named = _named(Same(*[space.rows for space in spaces]), tuple(limbs))
-        duals = joined(multipliers)
+        self._named = named = _named(IdentityKey(*[space.rows for space in spaces]), tuple(limbs))
+        duals = concatenated(multipliers)
         self._weights = duals * (duals > BINDING)
         self._worth = np.bincount(named.of_row, self._weights, len(named.names))
 
@@ -132,13 +140,15 @@ class Binding:
         utilisation : float
             At which the rows stand.
         """
-        names, capacities = self._named.names, joined([space.s for space in self._spaces])
+        names, capacities = self._named.names, concatenated([space.s for space in self._spaces])
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
         each = self._weights * utilisation / capacities
         price = np.bincount(self._named.of_row, each, len(names)).tolist()
         return tuple(Price(names[i], price[i], unit_of(names[i].limit)) for i in dear)
 
-    def limiting(self, used: Array, utilisation: float, idle: Sequence[Used]) -> Used | None:
+    def limiting(
+        self, used: Array, utilisation: float, idle: Sequence[LimitUse]
+    ) -> LimitUse | None:
         """Return the limit with the largest utilisation; of those that tie, the dearest.
 
         The others only follow it.
@@ -149,7 +159,7 @@ class Binding:
             Utilisation of every limit row, hand by hand.
         utilisation : float
             The largest of these and the idle ones.
-        idle : sequence of Used
+        idle : sequence of LimitUse
             Limits of limbs without a hand, which have no price.
         """
         named = self._named
@@ -170,7 +180,7 @@ class Binding:
         found = int(rows[best])
         h = bisect_right(named.first_row, found) - 1
         capacity = float(self._spaces[h].s[found - named.first_row[h]])
-        return Used(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
+        return LimitUse(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
 
 
 class _Named(NamedTuple):
@@ -191,19 +201,21 @@ class _Named(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named(key: Same, limbs: tuple[str, ...]) -> _Named:
+def _named(key: IdentityKey, limbs: tuple[str, ...]) -> _Named:
     """Return the limits of hands of limbs; ``key``: the rows of the set of each."""
-    hands = [_named_alone(Same(rows), limb) for rows, limb in zip(key.each, limbs, strict=True)]
+    hands = [
+        _named_alone(IdentityKey(rows), limb) for rows, limb in zip(key.each, limbs, strict=True)
+    ]
     offsets = accumulate((len(hand.names) for hand in hands), initial=0)
     return _Named(
         tuple(chain.from_iterable(hand.names for hand in hands)),
-        joined([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
+        concatenated([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
         tuple(accumulate((len(hand.of_row) for hand in hands[:-1]), initial=0)),
     )
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named_alone(key: Same, limb: str) -> _Named:
+def _named_alone(key: IdentityKey, limb: str) -> _Named:
     rows: tuple[Row, ...] = key.each[0]  # type: ignore[assignment]
     names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
     index = {name: i for i, name in enumerate(dict.fromkeys(names))}

@@ -16,15 +16,15 @@ from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
 from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline, programs
-from planner.explanation.active_limits import Used
-from planner.explanation.infeasibility import HELD_WRENCH, System, ranked, vertex
+from planner.explanation.active_limits import LimitUse
+from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem, ranked, vertex
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.prepare import FORCE_CAP, TENSION_CHANGE
 from planner.programs import JOINT_TORQUE, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Limits
 from planner.result import Certificate, LimitName
 
-__all__ = ["Hindered", "certify", "certify_idle"]
+__all__ = ["InfeasibleStance", "certify", "certify_idle"]
 
 BLOCKING: Final = 1e-6
 """A direction shorter than this, in the body's six components, is none."""
@@ -39,7 +39,7 @@ DISTANT: Final = 1e-9
 """Distance to the nearest body wrench below which there is nothing to prove."""
 
 
-class Hindered(NamedTuple):
+class InfeasibleStance(NamedTuple):
     """A stance whose loads do not balance.
 
     Attributes
@@ -66,16 +66,16 @@ class Hindered(NamedTuple):
 
 
 def certify(
-    stance: Hindered, nearest: Outcome | None = None, known: Outcome | None = None
+    stance: InfeasibleStance, nearest: Outcome | None = None, known: Outcome | None = None
 ) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
     With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
-    `System.bound`; it must be below d · W.
+    `HardRowSystem.bound`; it must be below d · W.
 
     Parameters
     ----------
-    stance : Hindered
+    stance : InfeasibleStance
     nearest : Outcome, optional
         The loads that come nearest to the body wrench, with given wrenches of hands as they are
         given; found here by default.
@@ -88,7 +88,7 @@ def certify(
         None if the bound proves nothing.
     """
     data, limbs, spaces, held, cap, limits = stance
-    system = System.of(data, limbs, spaces, held, cap)
+    system = HardRowSystem.of(data, limbs, spaces, held, cap)
     if nearest is None:
         nearest = programs.nearest_body(data if cap is None else data.capped(cap))
     missing: Array | None = None
@@ -130,12 +130,12 @@ def certify(
     )
 
 
-def certify_idle(used: Used, cap: float, alone: bool | None) -> Certificate:
+def certify_idle(used: LimitUse, cap: float, alone: bool | None) -> Certificate:
     """Return the proof that a joint of a limb without a hand bears more than a cap allows.
 
     Parameters
     ----------
-    used : Used
+    used : LimitUse
         How much.
     cap : float
         On the utilisation.
@@ -184,17 +184,19 @@ def _is_own(name: LimitName, limits: Limits) -> bool:
     return name.limit in (FORCE_CAP, HELD_WRENCH, TENSION_CHANGE)
 
 
-def _contradiction(system: System, limbs: Sequence[str]) -> tuple[Array, Array] | None:
+def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, Array] | None:
     """Return d and λ that show that one hand's rows and given wrench have no loads, if so."""
     for limb in limbs:
-        mine = [name for name in system.barriers if name.limb == limb]
+        mine = [name for name in system.constraints if name.limb == limb]
         found = system.least_violation(mine, balance=False)
         if found is not None and found.size > CONTRADICTS:
             return found.direction, found.multipliers
     return None
 
 
-def _multipliers(system: System, outcome: Outcome, *, capped: bool) -> tuple[Array, Array] | None:
+def _multipliers(
+    system: HardRowSystem, outcome: Outcome, *, capped: bool
+) -> tuple[Array, Array] | None:
     """Return a unit d and λ as the multipliers of a program without a plan tell them.
 
     Where d is next to none, rows contradict each other whatever the body needs.
@@ -214,7 +216,7 @@ def _multipliers(system: System, outcome: Outcome, *, capped: bool) -> tuple[Arr
     return (direction / weight, multipliers / weight) if weight > 0.0 else None
 
 
-def _polished(system: System, missing: Array) -> tuple[Array, Array]:
+def _polished(system: HardRowSystem, missing: Array) -> tuple[Array, Array]:
     """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
 
     A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error

@@ -1,7 +1,7 @@
-"""The barriers of a stance: all hands' hard rows, by name, and the wrenches that hands are given.
+"""The constraints of a stance: all hands' hard rows, by name, and wrenches that hands are given.
 
-Limit rows at a cap on the utilisation are barriers like any other. All rows of one name are one
-barrier. Whether some of them leave loads that balance the body is a linear program,
+Limit rows at a cap on the utilisation are constraints like any other. All rows of one name are one
+constraint. Whether some of them leave loads that balance the body is a linear program,
 
     min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X,
 
@@ -28,10 +28,19 @@ from planner.explanation.active_limits import limit_name
 from planner.programs import UNLIMITED, StanceData
 from planner.result import LimitName
 
-__all__ = ["BODY", "HELD_WRENCH", "WEIGHS", "System", "Violation", "among", "ranked", "vertex"]
+__all__ = [
+    "BODY",
+    "HELD_WRENCH",
+    "WEIGHS",
+    "HardRowSystem",
+    "Violation",
+    "among",
+    "ranked",
+    "vertex",
+]
 
 HELD_WRENCH: Final = "held_wrench"
-"""Name of the barrier that a given wrench of a hand is."""
+"""Name of the constraint that a given wrench of a hand is."""
 
 BODY: Final = 6
 """Rows of the balance that are the body's."""
@@ -47,7 +56,7 @@ EXACT: Final = 1e-10
 
 
 class Violation(NamedTuple):
-    """By how much barriers and balance must be broken at least, and why.
+    """By how much constraints and balance must be broken at least, and why.
 
     Attributes
     ----------
@@ -66,7 +75,7 @@ class Violation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class HardRowSystem:
     """The hard rows of all hands, with their names, and the balance; nondimensional.
 
     Attributes
@@ -98,7 +107,7 @@ class System:
         spaces: Sequence[WrenchSpace],
         held: Sequence[Array],
         utilisation: float | None = None,
-    ) -> System:
+    ) -> HardRowSystem:
         """Stack the hands' rows.
 
         Parameters
@@ -141,7 +150,7 @@ class System:
         return np.asarray(self.wrench - self.g)
 
     @property
-    def barriers(self) -> tuple[LimitName, ...]:
+    def constraints(self) -> tuple[LimitName, ...]:
         """Every name once."""
         return tuple(dict.fromkeys((*self.names, *self.given)))
 
@@ -160,7 +169,7 @@ class System:
         return self.bound(direction, multipliers) < float(direction @ self.wrench)
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
-        """Return what multipliers weigh each barrier with, those that count alone."""
+        """Return what multipliers weigh each constraint with, those that count alone."""
         found: dict[LimitName, float] = {}
         shares = (*multipliers.tolist(), *np.abs(direction[BODY:]).tolist())
         for name, share in zip((*self.names, *self.given), shares, strict=True):
@@ -168,13 +177,13 @@ class System:
         return {name: weight for name, weight in found.items() if weight > WEIGHS}
 
     def least_violation(
-        self, barriers: Collection[LimitName], *, balance: bool = True
+        self, constraints: Collection[LimitName], *, balance: bool = True
     ) -> Violation | None:
-        """Return by how much barriers must be broken at least, by loads in the box.
+        """Return by how much constraints must be broken at least, by loads in the box.
 
         Parameters
         ----------
-        barriers : collection of LimitName
+        constraints : collection of LimitName
         balance : bool
             Whether the body's balance counts, too.
 
@@ -183,7 +192,7 @@ class System:
         Violation or None
             None if the solver does not say, or the time is over.
         """
-        chosen = frozenset(barriers)
+        chosen = frozenset(constraints)
         rows = np.flatnonzero(among(self.names, chosen))
         tied = np.flatnonzero(among(self.given, chosen)) + BODY
         if balance:
@@ -207,7 +216,7 @@ class System:
 
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
-    """Return barriers, the weightiest first."""
+    """Return constraints, the weightiest first."""
     return sorted(weights, key=lambda name: -round(weights[name], ALIKE))
 
 

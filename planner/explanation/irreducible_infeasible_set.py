@@ -1,11 +1,11 @@
-"""Which barriers together leave no loads: an irreducible set of them, by name.
+"""Which constraints together leave no loads: an irreducible set of them, by name.
 
-A set of barriers is irreducible if they and the balance of the body have no loads, and have some as
-soon as any one of them is left out. It is found by a deletion filter over the barriers that a proof
-weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
+A set of constraints is irreducible if they and the balance of the body have no loads, and have some
+as soon as any one of them is left out. It is found by a deletion filter over the constraints that a
+proof weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
 
-Other barriers may leave no loads, too: there may be many such sets. A barrier without which all the
-others have loads is in every one of them.
+Other constraints may leave no loads, too: there may be many such sets. A constraint without which
+all the others have loads is in every one of them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from planner.explanation.infeasibility import BODY, WEIGHS, System, Violation, among, ranked
+from planner.explanation.infeasibility import BODY, WEIGHS, HardRowSystem, Violation, among, ranked
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -28,30 +28,30 @@ KEPT: Final = 2e-9
 """Rows that need not be broken by more than this have loads: what the solver's rounding leaves."""
 
 MOST: Final = 24
-"""Barriers of a set that are left out one by one; larger sets are not tried."""
+"""Constraints of a set that are left out one by one; larger sets are not tried."""
 
 RANK: Final = 1e-9
 """Relative size below which singular values of rows are none."""
 
 
 def irreducible_set(
-    system: System, suspects: Collection[LimitName]
+    system: HardRowSystem, suspects: Collection[LimitName]
 ) -> tuple[LimitName, ...] | None:
-    """Return barriers that with the balance have no loads, and all of which it takes for that.
+    """Return constraints that with the balance have no loads, and all of which it takes for that.
 
     Parameters
     ----------
-    system : System
+    system : HardRowSystem
     suspects : collection of LimitName
-        Among which such a set is sought; among all barriers if these have loads.
+        Among which such a set is sought; among all constraints if these have loads.
 
     Returns
     -------
     tuple of LimitName or None
         The weightiest first; empty if the balance alone has no loads. None if rounding leaves
-        undecided whether some barriers have loads.
+        undecided whether some constraints have loads.
     """
-    for start in (suspects, system.barriers):
+    for start in (suspects, system.constraints):
         first = system.least_violation(start)
         if first is None:
             return None
@@ -60,8 +60,8 @@ def irreducible_set(
     return None
 
 
-def _filtered(system: System, proof: Violation) -> tuple[LimitName, ...] | None:
-    """Leave out one barrier after the other, for good where the rest still has no loads."""
+def _filtered(system: HardRowSystem, proof: Violation) -> tuple[LimitName, ...] | None:
+    """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
     needed = _needed(system, proof, list(kept))
     for name in reversed(ranked(kept)):
@@ -81,14 +81,14 @@ def _filtered(system: System, proof: Violation) -> tuple[LimitName, ...] | None:
 
 
 def sufficient_alone(
-    system: System, irreducible: tuple[LimitName, ...] | None
+    system: HardRowSystem, irreducible: tuple[LimitName, ...] | None
 ) -> tuple[LimitName, ...] | None:
-    """Return the barriers without any one of which all the others have loads.
+    """Return the constraints without any one of which all the others have loads.
 
     Parameters
     ----------
-    system : System
-        All barriers together have none.
+    system : HardRowSystem
+        All constraints together have none.
     irreducible : tuple of LimitName or None
         Some irreducible set: only its members can do. So it is with those of every other set that
         a trial shows, which soon leaves few to try.
@@ -97,11 +97,11 @@ def sufficient_alone(
     -------
     tuple of LimitName or None
         In the order of the set. None without a set, or if rounding leaves undecided whether some
-        barriers have loads, or if a set of more than `MOST` would have to be tried one by one.
+        constraints have loads, or if a set of more than `MOST` would have to be tried one by one.
     """
     if not irreducible:
         return irreducible
-    others = system.least_violation([n for n in system.barriers if n not in irreducible])
+    others = system.least_violation([n for n in system.constraints if n not in irreducible])
     if others is not None and others.size > BROKEN:
         # what is left is in the way even without all of them
         return ()
@@ -110,7 +110,7 @@ def sufficient_alone(
     found, left = [], list(irreducible)
     while left:
         name = left.pop(0)
-        trial = system.least_violation([other for other in system.barriers if other != name])
+        trial = system.least_violation([other for other in system.constraints if other != name])
         if trial is None or KEPT < trial.size <= BROKEN:
             return None
         if trial.size <= KEPT:
@@ -122,19 +122,19 @@ def sufficient_alone(
     return tuple(found)
 
 
-def _prove_alone(system: System, proof: Violation, kept: Collection[LimitName]) -> bool:
-    """Whether a proof stands on these barriers alone."""
+def _prove_alone(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> bool:
+    """Whether a proof stands on these constraints alone."""
     multipliers = np.where(among(system.names, kept), proof.multipliers, 0.0)
     direction = proof.direction.copy()
     direction[BODY:] *= among(system.given, kept)
     return system.proves(direction, multipliers)
 
 
-def _needed(system: System, proof: Violation, kept: Sequence[LimitName]) -> set[LimitName]:
-    """Return barriers without which the others have loads, as far as a guess shows that.
+def _needed(system: HardRowSystem, proof: Violation, kept: Sequence[LimitName]) -> set[LimitName]:
+    """Return constraints without which the others have loads, as far as a guess shows that.
 
     The rows that a proof weighs, n = (−d, λ) on M z against r, contradict each other by n · r < 0
-    alone. With the row of one barrier moved by −n · r / n_k they agree; those loads z are solved
+    alone. With the row of one constraint moved by −n · r / n_k they agree; those loads z are solved
     for, and count if they also keep to what the others' other rows say.
     """
     chosen = frozenset(kept)

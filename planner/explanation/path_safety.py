@@ -25,9 +25,9 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs
-from planner.explanation.active_limits import Used, close_to, limit_name, used_limits
+from planner.explanation.active_limits import LimitUse, close_to, limit_name, limit_uses
 from planner.explanation.infeasibility import ranked
-from planner.explanation.sentences import barriers_sentence
+from planner.explanation.sentences import blocking_sentence
 from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
 from planner.result import LimitName, TensionPath
 
@@ -54,7 +54,7 @@ def tension_path(
     loads: Sequence[Array],
     present: Mapping[str, Array],
     cap: float,
-    idle: Sequence[Used] = (),
+    idle: Sequence[LimitUse] = (),
 ) -> TensionPath | None:
     """Return how safe the way to a plan is.
 
@@ -72,7 +72,7 @@ def tension_path(
         Tensions now, by limb [N]; of hands with fixed wrists.
     cap : float
         On the utilisation.
-    idle : sequence of Used, optional
+    idle : sequence of LimitUse, optional
         What limbs without a hand use of their joints.
 
     Returns
@@ -102,7 +102,7 @@ def tension_path(
     here = max(still, *used)
     at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
     if here > cap + SLACK:
-        uses = [*used_limits(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
+        uses = [*limit_uses(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
         return TensionPath(False, 0.0, at_present, change, _most_used(uses))
     if change <= GIVE:
         return TensionPath(True, 1.0, at_present, change, ())
@@ -126,10 +126,10 @@ def unsafe_sentence(path: TensionPath) -> str:
     part = math.floor(100.0 * path.safe_part)
     much = f"only the last {part} %" if part > 0 else "no part"
     sentence = f"{much} of the straight way from the present tensions is safe"
-    return f"{sentence}: {barriers_sentence(path.limiting)}" if path.limiting else sentence
+    return f"{sentence}: {blocking_sentence(path.limiting)}" if path.limiting else sentence
 
 
-def _most_used(used: Sequence[Used]) -> tuple[LimitName, ...]:
+def _most_used(used: Sequence[LimitUse]) -> tuple[LimitName, ...]:
     """Return the limit of which a plan uses most, and those that tie with it."""
     close = close_to(max(each.utilisation for each in used))
     return tuple(dict.fromkeys(each.name for each in used if each.utilisation >= close))

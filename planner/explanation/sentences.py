@@ -11,9 +11,9 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.fixed_wrist import HAND_LOAD
 from hand_models.hand import FINGERS, NAIL, SettledHand
-from planner.explanation.active_limits import Used
+from planner.explanation.active_limits import LimitUse
 from planner.explanation.infeasibility import HELD_WRENCH
-from planner.prepare import FORCE_CAP, TENSION_CHANGE, stacked
+from planner.prepare import FORCE_CAP, TENSION_CHANGE, batch_of
 from planner.programs import JOINT_TORQUE, WRENCH_UNIT
 from planner.question import Stance
 from planner.result import Certificate, HandPlan, LimitName
@@ -22,8 +22,8 @@ __all__ = [
     "LEAST_FACTOR",
     "NO_FACTOR",
     "UNPROVEN",
-    "barrier_words",
-    "barriers_sentence",
+    "blocking_sentence",
+    "constraint_words",
     "limit_sentence",
     "overload_sentence",
     "shortfall_sentence",
@@ -34,7 +34,7 @@ NOTABLE: Final = 0.3
 """Components of what is missing are told from this part of the largest on."""
 
 FOREMOST: Final = 2
-"""So many of the barriers that leave no loads are told; the rest are counted."""
+"""So many of the constraints that leave no loads are told; the rest are counted."""
 
 MANNERS: Final = {
     "shear": " in shear",
@@ -143,7 +143,7 @@ def _verb(limit: str, held: bool) -> str:
 
 
 def _barrier(limit: str) -> str:
-    """Say what a barrier forbids."""
+    """Say what a constraint forbids."""
     if limit in BARRIERS:
         return BARRIERS[limit]
     return f"cannot {VERBS.get(limit, CARRIES)[1]} more{MANNERS.get(limit, '')}"
@@ -159,7 +159,7 @@ def _spoken_load(limit: str, load: float) -> str:
     return f"{load:.0f} N" if abs(load) >= 10.0 else f"{load:.2g} N"
 
 
-def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
+def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
     """Say how much of a limit is used.
 
     A tile's force is told with what the tile would hold in that direction, not with the distances
@@ -167,7 +167,7 @@ def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
 
     Parameters
     ----------
-    used : Used
+    used : LimitUse
         Load and capacity of its row [N], [N·m] or [A].
     hand : HandPlan or None
         Whose limit it is; None for a limb without a hand.
@@ -192,8 +192,8 @@ def limit_sentence(used: Used, hand: HandPlan | None, *, held: bool) -> str:
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
 
 
-def barrier_words(name: LimitName) -> str:
-    """Say what a barrier is about and what it forbids: ``palm cannot pull``."""
+def constraint_words(name: LimitName) -> str:
+    """Say what a constraint is about and what it forbids: ``palm cannot pull``."""
     return f"{_bearer(name)} {_barrier(name.limit)}"
 
 
@@ -212,12 +212,12 @@ def shortfall_sentence(
         Limbs whose hands float.
     """
     names = certificate.irreducible
-    barriers = barriers_sentence(_blamed(certificate))
+    constraints = blocking_sentence(_blamed(certificate))
     note = ""
     if _floats(certificate, floating):
         note = "; floating hands as they give way where the search for a plan ended"
     if not certificate.direction.any():
-        return f"no loads at any utilisation, whatever the body needs: {barriers}{note}"
+        return f"no loads at any utilisation, whatever the body needs: {constraints}{note}"
     sentence = "no loads balance the body at any utilisation"
     if certificate.shortfall is not None:
         sentence += f": missing {_missing(certificate.shortfall)} (in B)"
@@ -225,7 +225,7 @@ def shortfall_sentence(
         return f"{sentence}; no hand touches rock"
     if names == ():
         return f"{sentence}; these hands have no loads at all, of any sign, that give it{note}"
-    return (f"{sentence}; {barriers}" if barriers else sentence) + note
+    return (f"{sentence}; {constraints}" if constraints else sentence) + note
 
 
 def overload_sentence(certificate: Certificate | None, *, floating: Collection[str] = ()) -> str:
@@ -243,10 +243,10 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
     if not certificate.spaces:
         return "; it holds nothing on, so no plan changes that"
     if not certificate.direction.any():
-        barriers = barriers_sentence(_blamed(certificate))
-        sentence = f"; whatever the body needs, no loads keep within all limits: {barriers}"
+        constraints = blocking_sentence(_blamed(certificate))
+        sentence = f"; whatever the body needs, no loads keep within all limits: {constraints}"
     elif certificate.shortfall is None:
-        sentence = f"; no loads keep within all limits: {barriers_sentence(_blamed(certificate))}"
+        sentence = f"; no loads keep within all limits: {blocking_sentence(_blamed(certificate))}"
     else:
         cap = certificate.utilisation
         within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
@@ -278,7 +278,7 @@ def _missing(shortfall: Array) -> str:
     return ", ".join(f"{AXES[i]} {values[i]} {units[i]}" for i in order)
 
 
-def barriers_sentence(names: Sequence[LimitName]) -> str:
+def blocking_sentence(names: Sequence[LimitName]) -> str:
     """Say what is in the way, the foremost first; a limb's name once in a row."""
     told: list[str] = []
     for i, name in enumerate(names[:FOREMOST]):
@@ -296,7 +296,7 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
     found: list[str] = []
     limbs = [place.limb for place in stance.hands]
     stretches = stance.robot.stretches(stance.body, limbs, [place.pose for place in stance.hands])
-    holding, count = stacked(tuple(settled)).touch.holding, len(FINGERS)
+    holding, count = batch_of(tuple(settled)).touch.holding, len(FINGERS)
     for h, (place, hand, stretch) in enumerate(zip(stance.hands, settled, stretches, strict=True)):
         if stretch > 1.0:
             found.append(

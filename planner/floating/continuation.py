@@ -18,8 +18,8 @@ import numpy as np
 from planner import deadline
 from planner.deadline import Budget
 from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
-from planner.floating.wrist_iteration import Settled, settle_wrists
-from planner.prepare import Hands
+from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.prepare import HandSets
 from planner.programs import SLACK
 
 __all__ = ["NO_WRENCH", "PROGRAMS", "LargestFactor", "least_use", "most_load"]
@@ -81,11 +81,11 @@ class _Way(NamedTuple):
     """A search along the factor: its largest, the plan there, and one for the whole wrench."""
 
     most: LargestFactor
-    at: Settled
-    whole: Settled | None
+    at: WristSolution
+    whole: WristSolution | None
 
 
-def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | None]:
+def least_use(hands: HandSets, budget: Budget) -> tuple[WristSolution, LargestFactor | None]:
     """Find the point of least utilisation over the modes of the hands' palms.
 
     Where that is beyond 1, or there is none, the search is continued from smaller body wrenches, up
@@ -93,7 +93,7 @@ def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | No
 
     Returns
     -------
-    Settled
+    WristSolution
         If there is no plan, that of the search with the least missing.
     LargestFactor or None
         Of the body wrench, as far as it has been sought: None for a plan within its limits.
@@ -123,7 +123,7 @@ def least_use(hands: Hands, budget: Budget) -> tuple[Settled, LargestFactor | No
 
 
 def most_load(
-    hands: Hands, plan: Settled, known: LargestFactor | None, budget: Budget
+    hands: HandSets, plan: WristSolution, known: LargestFactor | None, budget: Budget
 ) -> LargestFactor | None:
     """Return the largest factor of the body wrench that has a plan of utilisation 1.
 
@@ -131,8 +131,8 @@ def most_load(
 
     Parameters
     ----------
-    hands : Hands
-    plan : Settled
+    hands : HandSets
+    plan : WristSolution
         For the whole body wrench, or what a search for it has come to.
     known : LargestFactor or None
         What that search has found of it.
@@ -145,12 +145,12 @@ def most_load(
     return way.most
 
 
-def _held(found: Settled) -> bool:
+def _held(found: WristSolution) -> bool:
     """Whether it is a plan within its limits."""
     return found.exact and found.measure.utilisation <= 1.0 + SLACK
 
 
-def _better(plan: Settled, other: Settled | None) -> Settled:
+def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
     """Return the one that uses less; a plan rather than none."""
     if other is None or not other.exact:
         return plan
@@ -159,12 +159,12 @@ def _better(plan: Settled, other: Settled | None) -> Settled:
     return plan
 
 
-def _as_good(found: Settled, plan: Settled) -> bool:
+def _as_good(found: WristSolution, plan: WristSolution) -> bool:
     """Whether a plan uses no more than another, as near as such searches end."""
     return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
 
 
-def _ways(hands: Hands, plan: Settled, budget: Budget) -> Iterator[_Way]:
+def _ways(hands: HandSets, plan: WristSolution, budget: Budget) -> Iterator[_Way]:
     """Yield searches along the factor: up from a small one, and down from a plan."""
     for fraction in FRACTIONS:
         if deadline.expired():
@@ -182,7 +182,7 @@ def _ways(hands: Hands, plan: Settled, budget: Budget) -> Iterator[_Way]:
             yield way
 
 
-def _way(hands: Hands, start: Settled, budget: Budget) -> _Way | None:
+def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
     """Search for the largest factor from a plan for some factor; None if none is held.
 
     By Newton's method on the least utilisation as a function of the factor, whose slope the
@@ -227,7 +227,7 @@ def _way(hands: Hands, start: Settled, budget: Budget) -> _Way | None:
             aim = 1.0
         if aim < LEAST:
             break
-        there = settle_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
         if there.exact:
             now = there
         elif aim > factor or best is not None:
@@ -239,13 +239,13 @@ def _way(hands: Hands, start: Settled, budget: Budget) -> _Way | None:
     return _Way(LargestFactor(best.point.factor, sure), best, whole)
 
 
-def _carried_on(hands: Hands, at: Settled, budget: Budget) -> Settled | None:
+def _carried_on(hands: HandSets, at: WristSolution, budget: Budget) -> WristSolution | None:
     """Return a plan for the whole body wrench that follows from one for a part of it."""
     now, aim = at, 1.0
     for _ in range(HALVINGS):
         if budget.ended:
             break
-        there = settle_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
         if there.exact and aim == 1.0:
             return there
         now, aim = (there, 1.0) if there.exact else (now, 0.5 * (now.point.factor + aim))

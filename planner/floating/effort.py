@@ -26,8 +26,8 @@ from planner import programs
 from planner.deadline import Budget
 from planner.floating.goals import BINDING, Goal, bent_root
 from planner.floating.palm_modes import exchanged
-from planner.floating.wrist_iteration import Settled, settle_wrists
-from planner.prepare import Hands, Measure, Point, Sets
+from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import SLACK, TWIST_UNIT, Outcome, StanceData
 
 __all__ = ["LeastEffort", "least_effort", "with_room"]
@@ -57,16 +57,16 @@ class LeastEffort(Goal):
         self.cap = cap
         self.farthest = farthest
 
-    def value(self, measure: Measure) -> float:
+    def value(self, measure: ExactMeasure) -> float:
         return measure.effort
 
-    def excess(self, measure: Measure) -> float:
+    def excess(self, measure: ExactMeasure) -> float:
         return max(measure.utilisation - self.cap, 0.0)
 
-    def exact(self, measure: Measure, hands: Hands) -> bool:
+    def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
         return measure.exact(hands) and self.excess(measure) <= OVER
 
-    def barriers(self, data: StanceData) -> StanceData:
+    def constraints(self, data: StanceData) -> StanceData:
         return data.capped(self.cap)
 
     def solve(self, data: StanceData) -> Outcome:
@@ -83,7 +83,12 @@ class LeastEffort(Goal):
         return self.later_step(data, root, near)
 
     def root(
-        self, hands: Hands, point: Point, sets: Sets, within: float, weights: Outcome
+        self,
+        hands: HandSets,
+        point: LinearisationPoint,
+        sets: Sets,
+        within: float,
+        weights: Outcome,
     ) -> Array:
         efforts = [
             2.0 * (hand.E @ (y / hand.unit) + hand.e0)
@@ -122,7 +127,7 @@ def with_room(cap: float, used: float) -> float:
     return max(cap, min(used + 0.5 * SLACK, cap + SLACK - OVER))
 
 
-def least_effort(hands: Hands, plan: Settled, cap: float, budget: Budget) -> Settled:
+def least_effort(hands: HandSets, plan: WristSolution, cap: float, budget: Budget) -> WristSolution:
     """Return the plan of least effort that is found down from a plan within a cap.
 
     Wrists stay within `FARTHEST` of rest, or where the plan has them. If nothing is better, the
@@ -130,8 +135,8 @@ def least_effort(hands: Hands, plan: Settled, cap: float, budget: Budget) -> Set
 
     Parameters
     ----------
-    hands : Hands
-    plan : Settled
+    hands : HandSets
+    plan : WristSolution
         Within the cap.
     cap : float
         On the utilisation.
@@ -143,7 +148,7 @@ def least_effort(hands: Hands, plan: Settled, cap: float, budget: Budget) -> Set
     ]
     goal = LeastEffort(cap, away)
     budget = budget.part(PROGRAMS)
-    found = settle_wrists(hands, plan.point, budget, goal=goal)
+    found = solve_wrists(hands, plan.point, budget, goal=goal)
     if not found.exact or found.measure.effort > plan.measure.effort:
         sets = hands.sets(plan.point, 1.0, goal.farthest)
         return replace(plan, found="unproven", sets=sets, outcome=goal.solve(sets.data))

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from hand_models.base import Array
 from planner import programs
-from planner.prepare import Hands, Measure, Point, Sets
+from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import SLACK, Outcome, StanceData
 
 __all__ = ["BINDING", "RANK", "Goal", "LeastUse", "bent_root"]
@@ -51,26 +51,26 @@ class Goal(ABC):
     farthest: Sequence[Array] | None = None
 
     @abstractmethod
-    def value(self, measure: Measure) -> float:
+    def value(self, measure: ExactMeasure) -> float:
         """Return what is to be least, of a point."""
 
-    def excess(self, measure: Measure) -> float:
+    def excess(self, measure: ExactMeasure) -> float:
         """Return by how much a point is beyond what the goal allows; nothing by default."""
         return 0.0
 
-    def exact(self, measure: Measure, hands: Hands) -> bool:
+    def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
         """Whether a point is a plan: nothing missing, nothing broken, nothing in excess."""
         return measure.exact(hands)
 
-    def wrong(self, measure: Measure) -> float:
+    def wrong(self, measure: ExactMeasure) -> float:
         """Return what is missing, broken or in excess, together."""
         return measure.missing + measure.broken + self.excess(measure)
 
-    def merit(self, measure: Measure, penalty: float) -> float:
+    def merit(self, measure: ExactMeasure, penalty: float) -> float:
         """Return the value, and ρ for what is wrong."""
         return self.value(measure) + penalty * self.wrong(measure)
 
-    def barriers(self, data: StanceData) -> StanceData:
+    def constraints(self, data: StanceData) -> StanceData:
         """Return the stance with all that must hold as hard rows; as it is by default."""
         return data
 
@@ -88,7 +88,12 @@ class Goal(ABC):
 
     @abstractmethod
     def root(
-        self, hands: Hands, point: Point, sets: Sets, within: float, weights: Outcome
+        self,
+        hands: HandSets,
+        point: LinearisationPoint,
+        sets: Sets,
+        within: float,
+        weights: Outcome,
     ) -> Array:
         """Return R (M, M) for `later_step`: RᵀR is the curvature that linear sets lack."""
 
@@ -107,7 +112,7 @@ class LeastUse(Goal):
     least_penalty = 10.0
     promised = None
 
-    def value(self, measure: Measure) -> float:
+    def value(self, measure: ExactMeasure) -> float:
         return measure.utilisation
 
     def solve(self, data: StanceData) -> Outcome:
@@ -122,7 +127,12 @@ class LeastUse(Goal):
         return programs.tie_break(data, cap)
 
     def root(
-        self, hands: Hands, point: Point, sets: Sets, within: float, weights: Outcome
+        self,
+        hands: HandSets,
+        point: LinearisationPoint,
+        sets: Sets,
+        within: float,
+        weights: Outcome,
     ) -> Array:
         parts = sets.data.hands
         limits = block_diag(*(hand.L for hand in parts))

@@ -17,8 +17,8 @@ from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
 from planner.deadline import Budget
 from planner.floating.goals import Goal, LeastUse
-from planner.floating.wrist_iteration import ROUNDS, Settled, settle_wrists
-from planner.prepare import Hands
+from planner.floating.wrist_iteration import ROUNDS, WristSolution, solve_wrists
+from planner.prepare import HandSets
 from planner.programs import SLACK
 
 __all__ = ["NEARBY", "exchanged", "first_plan", "starts"]
@@ -41,24 +41,26 @@ UNBALANCED: Final = 1e6
 Palms = tuple[PalmMode | None, ...]
 
 
-def first_plan(hands: Hands, factor: float, choices: Iterator[Palms], budget: Budget) -> Settled:
+def first_plan(
+    hands: HandSets, factor: float, choices: Iterator[Palms], budget: Budget
+) -> WristSolution:
     """Return the first plan that a choice of modes gives, or what comes nearest to one."""
-    failed: list[Settled] = []
+    failed: list[WristSolution] = []
     for palms in choices:
         most = NEARBY if failed else ROUNDS
         start = replace(hands.at_rest(palms), factor=factor)
-        found = settle_wrists(hands, start, budget, most)
+        found = solve_wrists(hands, start, budget, most)
         if found.exact:
             return found
         failed.append(found)
         if budget.ended:
             break
     if not failed:
-        return settle_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
+        return solve_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
     return min(failed, key=lambda found: found.measure.missing)
 
 
-def starts(hands: Hands, factor: float, budget: Budget) -> Iterator[Palms]:
+def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
     """Yield choices of modes, the best at rest first."""
     choices = [None if wrist is None else wrist.palm_modes() for wrist in hands.wrists]
     engaged = [i for i, modes in enumerate(choices) if modes is not None and len(modes) > 1]
@@ -78,7 +80,7 @@ def starts(hands: Hands, factor: float, budget: Budget) -> Iterator[Palms]:
     yield from sorted(dict.fromkeys([best, *common]), key=lambda palms: ranks[palms])[:STARTS]
 
 
-def _rank(hands: Hands, palms: Palms, factor: float, budget: Budget) -> float:
+def _rank(hands: HandSets, palms: Palms, factor: float, budget: Budget) -> float:
     """Return the least utilisation with the sets at rest; more where they have no balance."""
     if deadline.expired():
         return float("inf")
@@ -96,7 +98,9 @@ def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
     return (*palms[:i], mode, *palms[i + 1 :])
 
 
-def exchanged(hands: Hands, found: Settled, budget: Budget, goal: Goal | None = None) -> Settled:
+def exchanged(
+    hands: HandSets, found: WristSolution, budget: Budget, goal: Goal | None = None
+) -> WristSolution:
     """Return a better point that is had by turning palms that their mode holds back.
 
     The goal is the least utilisation if none is given.
@@ -108,7 +112,7 @@ def exchanged(hands: Hands, found: Settled, budget: Budget, goal: Goal | None = 
         if new is None or budget.ended:
             break
         tried.add(new)
-        there = settle_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
+        there = solve_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
         value = goal.value(found.measure)
         lower = value - SLACK * max(1.0, value)
         if there.exact and goal.value(there.measure) < lower:
@@ -116,7 +120,7 @@ def exchanged(hands: Hands, found: Settled, budget: Budget, goal: Goal | None = 
     return found
 
 
-def _turned(found: Settled) -> Iterator[Palms]:
+def _turned(found: WristSolution) -> Iterator[Palms]:
     """Yield choices in which one palm that its mode holds back goes the other way."""
     palms = found.point.palms
     for i, (space, mode) in enumerate(zip(found.sets.spaces, palms, strict=True)):

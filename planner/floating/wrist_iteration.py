@@ -32,10 +32,10 @@ from hand_models.wrench_spaces import SCALE
 from planner import deadline, programs
 from planner.deadline import Budget
 from planner.floating.goals import RANK, Goal, LeastUse
-from planner.prepare import Hands, Measure, Point, Sets
+from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import Outcome
 
-__all__ = ["Settled", "settle_wrists"]
+__all__ = ["WristSolution", "solve_wrists"]
 
 ROUNDS: Final = 40
 """Most rounds for one choice of palm modes."""
@@ -91,7 +91,7 @@ STALLED: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class WristSolution:
     """How a search for a point ended.
 
     Attributes
@@ -101,7 +101,7 @@ class Settled:
         better. ``unproven``: it balances and keeps to them, but lies at a kink, where a tendon
         begins to slip or a contact comes to its tile's edge, or the rounds ended: nothing better
         was found, and the sets about it do not prove that there is none. ``nothing``: none of it.
-    point : Point
+    point : LinearisationPoint
     sets : Sets
         About it.
     outcome : Outcome
@@ -113,7 +113,7 @@ class Settled:
     """
 
     found: Literal["least", "unproven", "nothing"]
-    point: Point
+    point: LinearisationPoint
     sets: Sets
     outcome: Outcome
     rounds: int
@@ -125,7 +125,7 @@ class Settled:
         return self.found != "nothing"
 
     @property
-    def measure(self) -> Measure:
+    def measure(self) -> ExactMeasure:
         """What the model says of the point."""
         return self.sets.measure(self.point.loads)
 
@@ -133,23 +133,32 @@ class Settled:
 class _State(NamedTuple):
     """A point, the sets about it, what the model says of it, and how far off its step was [N]."""
 
-    point: Point
+    point: LinearisationPoint
     sets: Sets
-    measure: Measure
+    measure: ExactMeasure
     error: float
 
     @classmethod
     def of(
-        cls, hands: Hands, goal: Goal, point: Point, within: float, before: Sets | None = None
+        cls,
+        hands: HandSets,
+        goal: Goal,
+        point: LinearisationPoint,
+        within: float,
+        before: Sets | None = None,
     ) -> _State:
         sets = hands.sets(point, within, goal.farthest)
         error = 0.0 if before is None else _disagreement(hands, before, sets, point.loads)
         return cls(point, sets, sets.measure(point.loads), error)
 
 
-def settle_wrists(
-    hands: Hands, start: Point, budget: Budget, most: int = ROUNDS, goal: Goal | None = None
-) -> Settled:
+def solve_wrists(
+    hands: HandSets,
+    start: LinearisationPoint,
+    budget: Budget,
+    most: int = ROUNDS,
+    goal: Goal | None = None,
+) -> WristSolution:
     """Find the best point for a goal, from a start and with the start's palm modes.
 
     The goal is the least utilisation if none is given. Where the search ends without proof, or its
@@ -158,7 +167,7 @@ def settle_wrists(
     """
     goal = LeastUse() if goal is None else goal
     now = _State.of(hands, goal, start, START)
-    passed: Settled | None = None
+    passed: WristSolution | None = None
     within, penalty, stalled = START, goal.least_penalty, 0
     weights, root, rounds = UNSOLVED, None, 0
     for rounds in range(1, most + 1):
@@ -168,7 +177,7 @@ def settle_wrists(
         budget.spend(2)
         if outcome.solved:
             if goal.exact(now.measure, hands):
-                here = Settled("least", now.point, now.sets, outcome, rounds, now.error)
+                here = WristSolution("least", now.point, now.sets, outcome, rounds, now.error)
                 if _gap(goal, now, outcome) <= CLOSE:
                     return here
                 passed = replace(here, found="unproven")
@@ -214,13 +223,13 @@ def settle_wrists(
     return _made_exact(hands, goal, now, rounds, budget)
 
 
-def _repaired(hands: Hands, goal: Goal, state: _State, within: float) -> _State:
+def _repaired(hands: HandSets, goal: Goal, state: _State, within: float) -> _State:
     """Return a point with less missing and broken, hardly moving: a second-order correction.
 
     The smallest step that balances, and puts hard rows that are broken on their limits; those that
     just hold stay as they are.
     """
-    data, loads = goal.barriers(state.sets.data), state.point.loads
+    data, loads = goal.constraints(state.sets.data), state.point.loads
     if not state.sets.finite:
         return state
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
@@ -242,7 +251,9 @@ def _repaired(hands: Hands, goal: Goal, state: _State, within: float) -> _State:
     return _State.of(hands, goal, replace(state.point, loads=moved), within, state.sets)
 
 
-def _made_exact(hands: Hands, goal: Goal, start: _State, rounds: int, budget: Budget) -> Settled:
+def _made_exact(
+    hands: HandSets, goal: Goal, start: _State, rounds: int, budget: Budget
+) -> WristSolution:
     """Make the point exact at which a search ended without proof."""
     now = start = _State.of(hands, goal, start.point, START)._replace(error=start.error)
     for _ in range(REPAIRS):
@@ -253,13 +264,13 @@ def _made_exact(hands: Hands, goal: Goal, start: _State, rounds: int, budget: Bu
         if goal.exact(now.measure, hands) and outcome.solved:
             value = goal.value(start.measure)
             if goal.value(now.measure) - value <= GIVEN * max(1.0, value):
-                return Settled("unproven", now.point, now.sets, outcome, rounds, now.error)
+                return WristSolution("unproven", now.point, now.sets, outcome, rounds, now.error)
             break
         before, now, rounds = now, _repaired(hands, goal, now, START), rounds + 1
         lost, left = (goal.wrong(state.measure) for state in (before, now))
         if not now.sets.finite or not left < 0.5 * lost:
             break
-    return Settled("nothing", start.point, start.sets, UNSOLVED, rounds, start.error)
+    return WristSolution("nothing", start.point, start.sets, UNSOLVED, rounds, start.error)
 
 
 def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
@@ -268,7 +279,7 @@ def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
     return (value - outcome.value) / max(1.0, value)
 
 
-def _disagreement(hands: Hands, sets: Sets, there: Sets, loads: Sequence[Array]) -> float:
+def _disagreement(hands: HandSets, sets: Sets, there: Sets, loads: Sequence[Array]) -> float:
     """Return how far the sets of a step were off at its end [N]."""
     return max(
         float(np.abs((a.wrench(y) - b.wrench(y)) * SCALE).max())

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models.base import Array
-from planner.capability import COMPONENTS, BodySpace, Polygon, Section
+from planner.capability import COMPONENTS, BodySection, BodySpace, Polygon
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,13 +69,13 @@ VIEWS: Final = (
 """In which accelerations are drawn."""
 
 
-def plot_body_space(space: BodySpace, section: Section, path: Path, title: str) -> None:
+def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: str) -> None:
     """Draw a plane of the body wrenches that are held, and the accelerations from rest.
 
     Parameters
     ----------
     space : BodySpace
-    section : Section
+    section : BodySection
         Of that space.
     path : Path
         PNG, PDF or SVG.
@@ -103,7 +103,7 @@ def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
     return space.acceleration_section(turn @ view.across, turn @ view.up, DRAWN)
 
 
-def _draw_section(axes: Axes, space: BodySpace, section: Section) -> None:
+def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     indices = [COMPONENTS.index(axis) for axis in section.axes]
     names = [f"${axis[0].upper()}_{axis[1]}$" for axis in section.axes]
     units = ["N" if index < 3 else "N·m" for index in indices]

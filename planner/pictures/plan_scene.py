@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
 from planner.pictures.rock_patches import rock_patch
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
 from planner.result import HandPlan, Plan
 
@@ -179,7 +179,7 @@ def scene_of(plan: Plan, question: Question) -> Scene:
     return Scene(
         body=stance.body,
         hands=tuple(
-            _hand(hand, settle(hand, stance), plans.get(hand.limb)) for hand in stance.hands
+            _hand(hand, settle_hand(hand, stance), plans.get(hand.limb)) for hand in stance.hands
         ),
         limbs=limbs,
         torso=_torso(np.array([stance.body.position, *(limb.chain[0] for limb in limbs)])),

@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import NAIL
-from planner.explanation import barrier_words
+from planner.explanation import constraint_words
 from planner.pictures.plan_scene import DrawnLimb
 from planner.pictures.plan_views import COLOURS, UTILISATION
 from planner.result import Certificate, LimitName, Plan
@@ -145,12 +145,12 @@ def _barriers(proof: Certificate) -> list[str]:
 
 
 def _lines(names: Sequence[LimitName]) -> list[str]:
-    """Return what barriers forbid, by hand, a hand's alike in one line; the first of the lines."""
+    """Return what constraints forbid, by hand, a hand's alike in one line; the first lines."""
     alike: dict[str, dict[str, list[str]]] = {}
     for name in names:
         parts = (name.phalanx, name.finger, name.joint)
         whose = " of ".join(part.replace("_", " ") for part in parts if part is not None)
-        alike.setdefault(name.limb, {}).setdefault(barrier_words(name), []).append(whose)
+        alike.setdefault(name.limb, {}).setdefault(constraint_words(name), []).append(whose)
     lines = []
     for limb, found in alike.items():
         lines.append(f"{limb.replace('_', ' ')}:")

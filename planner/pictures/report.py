@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from planner.pictures.route_plots import plot_route
 from planner.result import LimitName, Plan
-from planner.route import OutOfReach, RouteResult, Stage
+from planner.route import OutOfReach, RouteResult, RouteStage
 
 __all__ = ["COLUMNS", "summary", "write_report"]
 
@@ -71,7 +71,7 @@ def summary(result: RouteResult) -> dict[str, Any]:
     }
 
 
-def _sentence(stage: Stage, plan: Plan | OutOfReach) -> str:
+def _sentence(stage: RouteStage, plan: Plan | OutOfReach) -> str:
     limb = str(stage.limb).replace("_", " ")
     what = {
         "start": "the start stance",
@@ -83,7 +83,7 @@ def _sentence(stage: Stage, plan: Plan | OutOfReach) -> str:
     return f"The crux is {what}: {used}; {plan.reason}."
 
 
-def _row(stage: Stage, plan: Plan | OutOfReach) -> dict[str, Any]:
+def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
     name = plan.limiting or LimitName("", None, None, "")
     used = plan.utilisation
     return {

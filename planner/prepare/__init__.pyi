@@ -1,4 +1,4 @@
-from .assembly import gather as gather
+from .assembly import assemble as assemble
 from .hand_batch import (
     CONTACTS as CONTACTS,
     KEPT as KEPT,
@@ -6,18 +6,18 @@ from .hand_batch import (
     NONE as NONE,
     NOTHING as NOTHING,
     TOUCHING as TOUCHING,
-    Places as Places,
-    Same as Same,
-    Stacked as Stacked,
-    joined as joined,
-    places_of as places_of,
-    stacked as stacked,
-    touch_of as touch_of,
+    HandBatch as HandBatch,
+    IdentityKey as IdentityKey,
+    TileIndex as TileIndex,
+    batch_of as batch_of,
+    concatenated as concatenated,
+    contact_pattern_of as contact_pattern_of,
+    tile_index_of as tile_index_of,
 )
 from .hand_sets import (
-    Hands as Hands,
-    Measure as Measure,
-    Point as Point,
+    ExactMeasure as ExactMeasure,
+    HandSets as HandSets,
+    LinearisationPoint as LinearisationPoint,
     Sets as Sets,
     widest_at_rest as widest_at_rest,
 )
@@ -31,7 +31,7 @@ from .settled_stance import (
     floating_wrist as floating_wrist,
     hand_space as hand_space,
     resting_hand as resting_hand,
-    settle as settle,
+    settle_hand as settle_hand,
 )
 from .stance_constraints import (
     BALL as BALL,

@@ -10,14 +10,14 @@ import numpy as np
 from hand_models.base import Array, wrench_transports
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
-from planner.prepare.hand_sets import Hands
+from planner.prepare.hand_sets import HandSets
 from planner.prepare.joint_posture import Posture
 from planner.prepare.settled_stance import settle_stance, wrist_at
-from planner.prepare.stance_constraints import NOTHING, AddedRows
+from planner.prepare.stance_constraints import NOTHING, StanceConstraints
 from planner.programs import WRENCH_UNIT
 from planner.question import Question
 
-__all__ = ["gather"]
+__all__ = ["assemble"]
 
 FREE: Final = np.zeros((0, 6))
 """What is given of a hand's wrench where nothing is given of any."""
@@ -26,9 +26,9 @@ NO_AIMS: Final = np.zeros(0)
 """The values of that."""
 
 
-def gather(
+def assemble(
     question: Question, where: Posture | None, wrench: Array
-) -> tuple[list[SettledHand], Hands]:
+) -> tuple[list[SettledHand], HandSets]:
     """Return the hands of a question on their holds, and what the programs need of them.
 
     Parameters
@@ -49,7 +49,7 @@ def gather(
         for wrist, rows in zip(wrists, added, strict=True)
     ]
     held, aims = _held(question)
-    hands = Hands(
+    hands = HandSets(
         spaces=tuple(spaces),
         wrists=tuple(wrists),
         transports=wrench_transports(stance.body, [hand.pose for hand in stance.hands]),
@@ -60,7 +60,7 @@ def gather(
     return settled, hands
 
 
-def _added_rows(question: Question, where: Posture | None, index: int) -> AddedRows:
+def _added_rows(question: Question, where: Posture | None, index: int) -> StanceConstraints:
     """Return what joints, caps and present tensions add to the set of the hand of that index."""
     hand, limits = question.stance.hands[index], question.limits
     cap, change = limits.per_hand.get(hand.limb), limits.tension_change
@@ -74,7 +74,7 @@ def _added_rows(question: Question, where: Posture | None, index: int) -> AddedR
             "world": hand.pose.rotation.T,
         }
         frame = axes[cap.frame]
-    return AddedRows(
+    return StanceConstraints(
         joints=None if where is None else where.joints[hand.limb],
         cap=None if cap is None else cap.largest_force,
         frame=frame,

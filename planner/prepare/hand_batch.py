@@ -25,14 +25,14 @@ __all__ = [
     "NONE",
     "NOTHING",
     "TOUCHING",
-    "Places",
-    "Same",
-    "Stacked",
-    "Touch",
-    "joined",
-    "places_of",
-    "stacked",
-    "touch_of",
+    "ContactPattern",
+    "HandBatch",
+    "IdentityKey",
+    "TileIndex",
+    "batch_of",
+    "concatenated",
+    "contact_pattern_of",
+    "tile_index_of",
 ]
 
 KEPT: Final = 64
@@ -58,7 +58,7 @@ UNLIMITED: Final = (math.inf, math.inf)
 """Limits of a palm that touches nothing: no part of them is used."""
 
 
-class Same:
+class IdentityKey:
     """Some objects as a key: the same only as these themselves, whatever they are equal to."""
 
     __slots__ = ("each",)
@@ -70,11 +70,13 @@ class Same:
         return hash(tuple(map(id, self.each)))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and tuple(map(id, self.each)) == tuple(map(id, other.each))
+        return isinstance(other, IdentityKey) and tuple(map(id, self.each)) == tuple(
+            map(id, other.each)
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class TileIndex:
     """Which tile is whose. Arrays are read-only.
 
     Attributes
@@ -113,7 +115,7 @@ class Places:
 
 
 @lru_cache(maxsize=KEPT)
-def places_of(counts: tuple[int, ...]) -> Places:
+def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
     """Return the places of hands that have so many tiles each."""
     parts = [
         (h, len(FINGERS) * h + i, phalanx)
@@ -127,7 +129,7 @@ def places_of(counts: tuple[int, ...]) -> Places:
     hands = np.arange(len(counts))
     phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
     bases = np.flatnonzero(phalanx == "base")
-    places = Places(
+    places = TileIndex(
         hand=hand,
         finger=finger,
         first=np.searchsorted(hand, hands),
@@ -144,7 +146,7 @@ def places_of(counts: tuple[int, ...]) -> Places:
     return places
 
 
-class Touch(NamedTuple):
+class ContactPattern(NamedTuple):
     """What the tiles of some hands touch. Arrays are read-only.
 
     Attributes
@@ -174,16 +176,16 @@ class Touch(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def touch_of(key: Same) -> Touch:
+def contact_pattern_of(key: IdentityKey) -> ContactPattern:
     """Return what hands with these tuples of tiles touch."""
     hands: tuple[tuple[Tile, ...], ...] = key.each  # type: ignore[assignment]
-    places = places_of(tuple(map(len, hands)))
+    places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
     away = contacts != TOUCHING
     touches = 1.0 - away
     grips = np.add.reduceat(touches, places.first_of_finger)
     holds = touches + (contacts == CONTACTS[NAIL])
-    touch = Touch(
+    touch = ContactPattern(
         contacts=contacts,
         touches=touches,
         framed=1.0 * (contacts == CONTACTS["frame"]),
@@ -199,14 +201,14 @@ def touch_of(key: Same) -> Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Stacked:
+class HandBatch:
     """What the settled hands of a stance say, in arrays of all of them.
 
     Attributes
     ----------
     hands : tuple of SettledHand
-    places : Places
-    touch : Touch
+    places : TileIndex
+    touch : ContactPattern
     points : ndarray, shape (T + H, 3)
         Where all tiles are, then all palms.
     axes : ndarray, shape (T, 3, 3)
@@ -219,8 +221,8 @@ class Stacked:
     """
 
     hands: tuple[SettledHand, ...]
-    places: Places
-    touch: Touch
+    places: TileIndex
+    touch: ContactPattern
     points: Array
     axes: Array
     angles: Array
@@ -230,16 +232,16 @@ class Stacked:
     @cached_property
     def stops(self) -> NDArray[np.int8]:
         """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
-        return joined([hand.postures.stops for hand in self.hands])
+        return concatenated([hand.postures.stops for hand in self.hands])
 
 
 @lru_cache(maxsize=KEPT)
-def stacked(hands: tuple[SettledHand, ...]) -> Stacked:
+def batch_of(hands: tuple[SettledHand, ...]) -> HandBatch:
     """Return what settled hands say, found once for the same hands."""
     tiles = [hand.tiles for hand in hands]
     positions = [hand.positions for hand in hands]
     postures = [hand.postures for hand in hands]
-    angles = joined([posture.angles for posture in postures])
+    angles = concatenated([posture.angles for posture in postures])
     bends = angles.copy()
     bends[:, 1:] -= angles[:, :-1]
     limits = [
@@ -247,14 +249,14 @@ def stacked(hands: tuple[SettledHand, ...]) -> Stacked:
         for hand in hands
     ]
     points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
-    axes = joined([hand.axes for hand in hands])
+    axes = concatenated([hand.axes for hand in hands])
     # plans show them
     points.setflags(write=False)
     axes.setflags(write=False)
-    return Stacked(
+    return HandBatch(
         hands,
-        places_of(tuple(map(len, tiles))),
-        touch_of(Same(*tiles)),
+        tile_index_of(tuple(map(len, tiles))),
+        contact_pattern_of(IdentityKey(*tiles)),
         points,
         axes,
         angles,
@@ -263,6 +265,6 @@ def stacked(hands: tuple[SettledHand, ...]) -> Stacked:
     )
 
 
-def joined(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
+def concatenated(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
     """Return the hands' arrays one after another."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -19,7 +19,7 @@ from hand_models.base import Array
 from hand_models.compliance import FloatingWrist, PalmMode
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import programs
-from planner.prepare.stance_constraints import AddedRows
+from planner.prepare.stance_constraints import StanceConstraints
 from planner.programs import (
     TWIST_UNIT,
     WRIST_RANGE,
@@ -31,7 +31,7 @@ from planner.programs import (
     with_held,
 )
 
-__all__ = ["Hands", "Measure", "Point", "Sets", "slopes_of", "widest_at_rest"]
+__all__ = ["ExactMeasure", "HandSets", "LinearisationPoint", "Sets", "slopes_of", "widest_at_rest"]
 
 DIFFERENCE: Final = 1e-3
 """Step of the differences of slopes, in `TWIST_UNIT`."""
@@ -50,7 +50,7 @@ UNBROKEN: Final = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class LinearisationPoint:
     """Where the hands' sets are linearised.
 
     Attributes
@@ -68,7 +68,7 @@ class Point:
     factor: float = 1.0
 
 
-class Measure(NamedTuple):
+class ExactMeasure(NamedTuple):
     """What the model says of a point: exact, the sets about it being so there.
 
     Attributes
@@ -89,7 +89,7 @@ class Measure(NamedTuple):
     broken: float
     effort: float
 
-    def exact(self, hands: Hands) -> bool:
+    def exact(self, hands: HandSets) -> bool:
         """Whether nothing is missing, and nothing broken."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
         return self.missing <= BALANCED * size and self.broken <= UNBROKEN
@@ -101,7 +101,7 @@ class Sets(NamedTuple):
     spaces: tuple[WrenchSpace, ...]
     data: StanceData
 
-    def measure(self, loads: Sequence[Array]) -> Measure:
+    def measure(self, loads: Sequence[Array]) -> ExactMeasure:
         """Return what loads do, exact for those of the point."""
         used, broken, effort = -math.inf, 0.0, 0.0
         for hand, y in zip(self.data.hands, loads, strict=True):
@@ -110,7 +110,7 @@ class Sets(NamedTuple):
             broken = max(broken, float((hand.H @ z - hand.h).max(initial=0.0)))
             effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum(hand.rest * z**2))
         missing = programs.body_wrench(self.data, loads) - self.data.wrench
-        return Measure(used, float(np.abs(missing).sum()), broken, effort)
+        return ExactMeasure(used, float(np.abs(missing).sum()), broken, effort)
 
     @property
     def finite(self) -> bool:
@@ -121,7 +121,7 @@ class Sets(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Hands:
+class HandSets:
     """The hands of a stance, as the planner sees them.
 
     Attributes
@@ -137,7 +137,7 @@ class Hands:
         wrenches that are given.
     held : tuple of ndarray, shape (nb − 6, 6)
         Of `HandData.of`.
-    added : tuple of AddedRows
+    added : tuple of StanceConstraints
         What the stance adds to each hand's set; `spaces` have it already. Joints and their
         Jacobians are those at which the hand rests: a floating wrist that gives way by a
         millimetre or some ten milliradians hardly moves them.
@@ -148,7 +148,7 @@ class Hands:
     transports: Array
     wrench: Array
     held: tuple[Array, ...]
-    added: tuple[AddedRows, ...]
+    added: tuple[StanceConstraints, ...]
 
     @property
     def floating(self) -> bool:
@@ -165,7 +165,7 @@ class Hands:
             )
         )
 
-    def turned(self, wrench: Array) -> Hands:
+    def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
         aims = self.wrench[len(wrench) :]
         other = replace(self, wrench=np.concatenate([wrench / programs.WRENCH_UNIT, aims]))
@@ -178,14 +178,14 @@ class Hands:
         """Modes in which no floating hand's palm carries."""
         return tuple(None if wrist is None else "off" for wrist in self.wrists)
 
-    def at_rest(self, palms: Sequence[PalmMode | None]) -> Point:
+    def at_rest(self, palms: Sequence[PalmMode | None]) -> LinearisationPoint:
         """Return the point at which wrists are at rest, and the other hands carry nothing."""
         loads = [np.zeros(len(space.columns)) for space in self.spaces]
-        return Point(tuple(loads), tuple(palms))
+        return LinearisationPoint(tuple(loads), tuple(palms))
 
     def sets(
         self,
-        point: Point,
+        point: LinearisationPoint,
         within: float | None = None,
         farthest: Sequence[Array] | None = None,
     ) -> Sets:
@@ -193,7 +193,7 @@ class Hands:
 
         Parameters
         ----------
-        point : Point
+        point : LinearisationPoint
         within : float, optional
             A range about it for wrists, in `TWIST_UNIT`; by default as far as the rows let.
         farthest : sequence of ndarray, shape (6,), optional
@@ -223,7 +223,11 @@ class Hands:
         return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])
 
     def curvature(
-        self, point: Point, within: float, duals: Outcome, efforts: Sequence[Array] | None = None
+        self,
+        point: LinearisationPoint,
+        within: float,
+        duals: Outcome,
+        efforts: Sequence[Array] | None = None,
     ) -> list[Array]:
         """Return the curvature of each hand's rows, weighed by multipliers, shape (m, m).
 
@@ -245,11 +249,11 @@ class Hands:
                     bent[i][j] = (slope - slopes[i]) / DIFFERENCE
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
-    def near_rest(self, point: Point) -> bool:
+    def near_rest(self, point: LinearisationPoint) -> bool:
         """Whether no wrist is farther from rest than a small twist."""
         return self.step(self.at_rest(point.palms), point.loads) <= FARTHEST
 
-    def step(self, point: Point, loads: Sequence[Array]) -> float:
+    def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
         """Return how far the wrists move from a point to loads, in `TWIST_UNIT`."""
         moved = [
             float(np.abs((y - at) / TWIST_UNIT).max())

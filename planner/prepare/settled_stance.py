@@ -17,14 +17,14 @@ __all__ = [
     "floating_wrist",
     "hand_space",
     "resting_hand",
-    "settle",
     "settle_at",
+    "settle_hand",
     "settle_stance",
     "wrist_at",
 ]
 
 
-def settle(hand: HandOnHold, stance: Stance) -> SettledHand:
+def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
     """Close one hand of a stance on its hold."""
     return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
 

@@ -22,7 +22,7 @@ from hand_models.hand import FINGERS, HELD
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.programs import JOINT_TORQUE, Names
 
-__all__ = ["FORCE_CAP", "NOTHING", "TENSION_CHANGE", "AddedRows", "JointLoads"]
+__all__ = ["FORCE_CAP", "NOTHING", "TENSION_CHANGE", "JointLoads", "StanceConstraints"]
 
 FORCE_CAP: Final = "force_cap"
 """Name of the limit rows of a cap on a hand's force."""
@@ -81,7 +81,7 @@ class _Block(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class AddedRows:
+class StanceConstraints:
     """What a stance adds to the set of one hand.
 
     Attributes
@@ -117,12 +117,12 @@ class AddedRows:
         s = np.concatenate([np.zeros(0), *(block.s for block in blocks)])
         C = np.concatenate([np.zeros((0, 6)), *(block.C for block in blocks)])
         limits = tuple(row for block in blocks for row in block.rows)
-        barriers = tuple(row for block in blocks for row in block.hard)
+        constraints = tuple(row for block in blocks for row in block.hard)
         return WrenchSpace.assembled(
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,
-            rows=_joined(Names(space), apart, limits, barriers + hard),
+            rows=_joined(Names(space), apart, limits, constraints + hard),
             L=np.concatenate([space.L[:apart], D @ space.generators, space.L[apart:]]),
             l0=np.concatenate([space.l0[:apart], D @ space.origin + d0, space.l0[apart:]]),
             s=np.concatenate([space.s[:apart], s, space.s[apart:]]),
@@ -192,7 +192,7 @@ class AddedRows:
         return tuple(rows), H, np.array(most)
 
 
-NOTHING: Final = AddedRows()
+NOTHING: Final = StanceConstraints()
 """No rows."""
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from hand_models.base import Array, Recent
 from planner import deadline
-from planner.programs.conic_extent import Extent, Layout, Room
+from planner.programs.conic_extent import Extent, Layout, PaddedProgram
 from planner.programs.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
 
 __all__ = ["OUT_OF_TIME", "Compiled", "Solution"]
@@ -121,7 +121,7 @@ class Compiled:
                 stacklevel=2,
             )
         else:
-            self._room = Room(self.map)
+            self._room = PaddedProgram(self.map)
 
     def solve(self, values: Values, extent: Extent) -> Solution:
         """Solve for some values.
@@ -313,7 +313,7 @@ class _Solver:
 
     def solve(self) -> Solution:
         """Solve with the values taken last."""
-        deadline.begin()
+        deadline.begin_overlap()
         if deadline.left() is None:
             return self._read(self._solver.solve())
         caught: list[BaseException] = []

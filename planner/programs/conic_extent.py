@@ -18,9 +18,9 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from hand_models.base import Array, Indices
-from planner.programs.cvxpy_internals import Affine, ConeMap, Places
+from planner.programs.cvxpy_internals import Affine, ConeMap, Positions
 
-__all__ = ["Extent", "Layout", "Part", "Room"]
+__all__ = ["Extent", "Layout", "PaddedProgram", "Part"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -59,7 +59,7 @@ ONE = Kept.of(np.ones(1, dtype=bool))
 """The column of a vector."""
 
 
-class Entries:
+class AffineEntries:
     """Numbers that are affine in p, each a row of a sparse matrix times p.
 
     Parameters
@@ -80,7 +80,7 @@ class Entries:
         self._sum = None if single else sp.csr_array((data, index, indptr), (len(counts), width))
 
     @classmethod
-    def of(cls, values: Any) -> Entries:
+    def of(cls, values: Any) -> AffineEntries:
         """Take a sparse matrix over, in compressed rows."""
         return cls(values.data, values.indices, values.indptr, values.shape[1])
 
@@ -108,7 +108,7 @@ class Entries:
             return np.asarray(self._data * p.take(self._index))
         return np.asarray(self._sum @ p)
 
-    def chosen(self, kept: Mask, filled: Kept | None = None) -> Entries:
+    def chosen(self, kept: Mask, filled: Kept | None = None) -> AffineEntries:
         """Return some of them, of what is there of p."""
         hit = kept if self._sum is None else kept[self._rows]
         if filled is not None:
@@ -117,7 +117,7 @@ class Entries:
         if filled is not None:
             index, width = filled.numbers[index], filled.total
         counts = np.bincount(self._rows[hit], minlength=len(self))[kept]
-        return Entries(self._data[hit], index, np.append(0, np.cumsum(counts)), width)
+        return AffineEntries(self._data[hit], index, np.append(0, np.cumsum(counts)), width)
 
     def _some(self, hit: Mask) -> Mask:
         """Return of which any summand is hit."""
@@ -131,13 +131,13 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    entries : Entries
+    entries : AffineEntries
     rows, columns : ndarray of int
         Of the entries, column by column.
     shape : tuple of int
     """
 
-    entries: Entries
+    entries: AffineEntries
     rows: Indices
     columns: Indices
     shape: tuple[int, int]
@@ -146,7 +146,7 @@ class Part(NamedTuple):
     def of(cls, affine: Affine) -> Part:
         """Take a part of CVXPY's data over."""
         columns = np.repeat(np.arange(affine.shape[1]), np.diff(affine.indptr))
-        return cls(Entries.of(affine.values), affine.indices, columns, affine.shape)
+        return cls(AffineEntries.of(affine.values), affine.indices, columns, affine.shape)
 
     def matrix(self, p: Array) -> Any:
         """Return it as a sparse matrix for the values p."""
@@ -188,7 +188,7 @@ class Layout(NamedTuple):
         Of Clarabel.
     sign : float
         −1 where the problem maximises.
-    variables, constraints : Places
+    variables, constraints : Positions
         Of those that are wanted.
     shaping : ndarray of int
         Entries of p that A may depend on.
@@ -206,13 +206,13 @@ class Layout(NamedTuple):
     d: Part
     cones: list[Any]
     sign: float
-    variables: Places
-    constraints: Places
+    variables: Positions
+    constraints: Positions
     shaping: Indices
     touched: tuple[tuple[str, ...], ...]
 
 
-class Room:
+class PaddedProgram:
     """A problem's conic program, with all its room.
 
     Parameters
@@ -304,7 +304,7 @@ class Room:
         columns[A.columns[kept & alone[A.rows]]] = False
 
 
-def _there(count: int, places: Places, extents: Sequence[int]) -> Mask:
+def _there(count: int, places: Positions, extents: Sequence[int]) -> Mask:
     """Return which entries of x, or of z, there are."""
     there = np.ones(count, dtype=bool)
     for (part, _), extent in zip(places.parts, extents, strict=True):
@@ -312,7 +312,7 @@ def _there(count: int, places: Places, extents: Sequence[int]) -> Mask:
     return there
 
 
-def _renumbered(places: Places, extents: Sequence[int], there: Kept) -> Places:
+def _renumbered(places: Positions, extents: Sequence[int], there: Kept) -> Positions:
     """Return where the first entries of each are, of those that there are."""
     kept, parts, start = [], [], 0
     for (part, shape), extent in zip(places.parts, extents, strict=True):
@@ -320,4 +320,4 @@ def _renumbered(places: Places, extents: Sequence[int], there: Kept) -> Places:
         parts.append((slice(start, start + extent), (extent,) if shape else ()))
         start += extent
     chosen = np.concatenate([np.zeros(0, dtype=np.intp), *kept])
-    return Places(there.numbers[places.entries[chosen]], places.factors[chosen], tuple(parts))
+    return Positions(there.numbers[places.entries[chosen]], places.factors[chosen], tuple(parts))

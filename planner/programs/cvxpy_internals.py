@@ -25,7 +25,7 @@ from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import CLARABEL, dims
 
 from hand_models.base import Array, Indices
 
-__all__ = ["STATUS", "WRITTEN_FOR", "Affine", "ChangedError", "ConeMap", "Places", "cone_map"]
+__all__ = ["STATUS", "WRITTEN_FOR", "Affine", "ChangedError", "ConeMap", "Positions", "cone_map"]
 
 WRITTEN_FOR: Final = "1.9"
 """CVXPY's version, as far as its internals are known."""
@@ -57,7 +57,7 @@ class Affine(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class Positions:
     """Where variables, or the multipliers of constraints, are in x or z.
 
     Attributes
@@ -89,7 +89,7 @@ class Places:
         )
 
 
-NOWHERE: Final = Places(np.zeros(0, dtype=int), np.zeros(0), ())
+NOWHERE: Final = Positions(np.zeros(0, dtype=int), np.zeros(0), ())
 
 
 class ConeMap(NamedTuple):
@@ -107,7 +107,7 @@ class ConeMap(NamedTuple):
         Of p.
     sign : float
         −1 where the problem maximises.
-    variables, constraints : Places
+    variables, constraints : Positions
         Of those that were asked for.
     """
 
@@ -120,8 +120,8 @@ class ConeMap(NamedTuple):
     parameters: tuple[tuple[cp.Parameter, slice], ...]
     size: int
     sign: float
-    variables: Places
-    constraints: Places
+    variables: Positions
+    constraints: Positions
 
     def vector(self) -> Array:
         """Return p for the parameters' present values."""
@@ -246,7 +246,7 @@ class _Reader:
             values |= {row.id: row.dual_value for row in problem.constraints}
             self._found.append({key: np.array(value, dtype=float) for key, value in values.items()})
 
-    def places(self, wanted: Sequence[cp.Variable | cp.Constraint]) -> Places:
+    def places(self, wanted: Sequence[cp.Variable | cp.Constraint]) -> Positions:
         entries, factors, parts, start = [NOWHERE.entries], [NOWHERE.factors], [], 0
         for part in wanted:
             first, second = (found[part.id] for found in self._found)
@@ -256,7 +256,7 @@ class _Reader:
             factors.append(factor)
             parts.append((slice(start, start + first.size), first.shape))
             start += first.size
-        return Places(np.concatenate(entries), np.concatenate(factors), tuple(parts))
+        return Positions(np.concatenate(entries), np.concatenate(factors), tuple(parts))
 
 
 def _compare(found: ConeMap, data: dict[str, Any]) -> None:

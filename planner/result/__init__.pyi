@@ -1,6 +1,6 @@
-from .floating_load_recovery import read_floating_hand as read_floating_hand
+from .floating_load_recovery import recover_floating_hand as recover_floating_hand
 from .hand_plan import HandPlan as HandPlan, WristPlan as WristPlan
-from .load_recovery import Reader as Reader, reader_of as reader_of
+from .load_recovery import LoadRecovery as LoadRecovery, load_recovery_of as load_recovery_of
 from .plan import (
     Certificate as Certificate,
     LimitName as LimitName,
@@ -11,5 +11,5 @@ from .plan import (
     TensionPath as TensionPath,
     Times as Times,
 )
-from .plan_arrays import Carried as Carried
+from .plan_arrays import PlanArrays as PlanArrays
 from .set_points import SetPoints as SetPoints, Source as Source, no_set_points as no_set_points

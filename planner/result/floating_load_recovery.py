@@ -8,14 +8,14 @@ from hand_models.compliance import CompliantHand
 from hand_models.hand import SettledHand
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import stacked
+from planner.prepare import batch_of
 from planner.result.hand_plan import HandPlan, PalmPlan, WristPlan
 from planner.result.load_recovery import drawn_tendons
 
-__all__ = ["read_floating_hand"]
+__all__ = ["recover_floating_hand"]
 
 
-def read_floating_hand(
+def recover_floating_hand(
     limb: str, settled: SettledHand, hand: CompliantHand, space: WrenchSpace, wrist: WristPlan
 ) -> HandPlan:
     """Turn the pose of a floating hand's wrist into tile loads and forces, by the model itself.
@@ -39,7 +39,7 @@ def read_floating_hand(
     capacities = np.array([p.capacity for p in pieces])
     magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
     used = (magnitudes @ planes.T / capacities).max(axis=1)
-    known, drive = stacked((settled,)), settled.hand.drive
+    known, drive = batch_of((settled,)), settled.hand.drive
     # the winch stands still from the preload on
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)

@@ -20,19 +20,19 @@ from planner.prepare import (
     KEPT,
     KEPT_NAMES,
     TOUCHING,
-    Places,
-    Same,
-    Stacked,
-    joined,
-    places_of,
-    stacked,
-    touch_of,
+    HandBatch,
+    IdentityKey,
+    TileIndex,
+    batch_of,
+    concatenated,
+    contact_pattern_of,
+    tile_index_of,
 )
 from planner.programs import LOAD_UNIT, is_effort, scaled_rows
 from planner.result.hand_plan import HandPlan, PalmPlan
-from planner.result.plan_arrays import Carried
+from planner.result.plan_arrays import PlanArrays
 
-__all__ = ["Reader", "Reading", "drawn_tendons", "reader_of"]
+__all__ = ["LoadRecovery", "RecoveredLoads", "drawn_tendons", "load_recovery_of"]
 
 COUNT: Final = len(FINGERS)
 
@@ -53,34 +53,34 @@ SIGNED: Final = ("/lateral", f"/{NAIL}")
 """Loads that may be negative."""
 
 
-class Reading(NamedTuple):
+class RecoveredLoads(NamedTuple):
     """What loads say.
 
     Attributes
     ----------
-    carried : Carried
+    arrays : PlanArrays
     used : ndarray, shape (sum of nl,)
         Utilisation of every limit row, hand by hand.
     effort : float
         Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
     """
 
-    carried: Carried
+    arrays: PlanArrays
     used: Array
     effort: float
 
 
-def reader_of(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> Reader:
-    """Return what reads loads of hands, made once for the same hands and sets; see `Reader`."""
-    return _reader_of(Same(*settled), Same(*spaces))
+def load_recovery_of(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> LoadRecovery:
+    """Return what recovers loads of hands, made once for the same hands and sets."""
+    return _reader_of(IdentityKey(*settled), IdentityKey(*spaces))
 
 
 @lru_cache(maxsize=KEPT)
-def _reader_of(settled: Same, spaces: Same) -> Reader:
-    return Reader(settled.each, spaces.each)  # type: ignore[arg-type]
+def _reader_of(settled: IdentityKey, spaces: IdentityKey) -> LoadRecovery:
+    return LoadRecovery(settled.each, spaces.each)  # type: ignore[arg-type]
 
 
-class Reader:
+class LoadRecovery:
     """Reads loads of hands with fixed wrists, all hands at once; made once for their rows.
 
     Parameters
@@ -92,15 +92,15 @@ class Reader:
 
     def __init__(self, settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> None:
         self._spaces = spaces
-        self._known = known = stacked(tuple(settled))
+        self._known = known = batch_of(tuple(settled))
         names = [name for space in spaces for name in (space.columns, space.rows)]
-        pieces = _pieces_of(Same(*[hand.surface for hand in settled]))
+        pieces = _pieces_of(IdentityKey(*[hand.surface for hand in settled]))
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
         tiles = [hand.tiles for hand in settled]
-        self._layout = layout = _layout_of(Same(*tiles, *names), tuple(limits))
+        self._layout = layout = _layout_of(IdentityKey(*tiles, *names), tuple(limits))
 
-        laws = joined([hand.loads for hand in settled])
+        laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
         self._at_zero[:, :2], self._slope[:, :2] = laws[..., 0], laws[..., 1]
         self._slope[:, 2] = known.touch.shares
@@ -115,7 +115,7 @@ class Reader:
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
             rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
         joints, _, nails = drawn_tendons(known)
-        self._drives, self._per_shear = _drives_of(known.places, Same(settled[0].hand))
+        self._drives, self._per_shear = _drives_of(known.places, IdentityKey(settled[0].hand))
         self._winches = (joints + nails) / settled[0].hand.drive.winch_radius
         self._fixed = (
             tuple(tiles),
@@ -124,7 +124,7 @@ class Reader:
             (None,) * len(settled),
         )
 
-    def read(self, loads: Sequence[Array]) -> Reading:
+    def read(self, loads: Sequence[Array]) -> RecoveredLoads:
         """Return what loads y of all hands say [N].
 
         What may not be negative and is, by rounding, counts as zero.
@@ -160,7 +160,7 @@ class Reader:
         forces[: len(of_tiles)] = (of_tiles[:, None] @ known.axes)[:, 0]
         forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
         palm_used = palms / known.palm_limits
-        carried = Carried(
+        arrays = PlanArrays(
             tensions,
             drives,
             of_tiles,
@@ -174,32 +174,32 @@ class Reader:
             np.maximum(np.maximum.reduceat(used, layout.first_row), 0.0),
             *self._fixed,
         )
-        return Reading(carried, used, float(efforts.dot(efforts)))
+        return RecoveredLoads(arrays, used, float(efforts.dot(efforts)))
 
-    def hands(self, limbs: Sequence[str], carried: Carried) -> tuple[HandPlan, ...]:
+    def hands(self, limbs: Sequence[str], arrays: PlanArrays) -> tuple[HandPlan, ...]:
         """Return what was read, hand by hand; its arrays are parts of those."""
         known, nails = self._known, self._nail_planes()
         firsts = known.places.first.tolist()
-        palm_used, used = carried.palm_utilisations.tolist(), carried.utilisations.tolist()
-        found, tiles, moments = [], len(carried.loads), carried.palm_moments
+        palm_used, used = arrays.palm_utilisations.tolist(), arrays.utilisations.tolist()
+        found, tiles, moments = [], len(arrays.loads), arrays.palm_moments
         for h, (limb, hand, space) in enumerate(zip(limbs, known.hands, self._spaces, strict=True)):
             own = slice(firsts[h], firsts[h] + len(hand.tiles))
             fingers = slice(COUNT * h, COUNT * (h + 1))
-            place, force = carried.points[tiles + h], carried.forces[tiles + h]
+            place, force = arrays.points[tiles + h], arrays.forces[tiles + h]
             found.append(
                 HandPlan(
                     limb=limb,
-                    wrench=carried.wrenches[h],
-                    tensions=carried.tensions[fingers],
-                    drives=carried.drives[:, fingers],
-                    loads=carried.loads[own],
-                    forces=carried.forces[own],
-                    positions=carried.points[own],
-                    axes=carried.axes[own],
-                    tile_utilisations=carried.tile_utilisations[own],
-                    tiles=carried.tiles[h],
-                    half_planes=carried.half_planes[h],
-                    palm=PalmPlan(place, force, moments[h], carried.engaged[h], palm_used[h]),
+                    wrench=arrays.wrenches[h],
+                    tensions=arrays.tensions[fingers],
+                    drives=arrays.drives[:, fingers],
+                    loads=arrays.loads[own],
+                    forces=arrays.forces[own],
+                    positions=arrays.points[own],
+                    axes=arrays.axes[own],
+                    tile_utilisations=arrays.tile_utilisations[own],
+                    tiles=arrays.tiles[h],
+                    half_planes=arrays.half_planes[h],
+                    palm=PalmPlan(place, force, moments[h], arrays.engaged[h], palm_used[h]),
                     utilisation=used[h],
                     seating=hand.seating,
                     space=space,
@@ -220,7 +220,7 @@ class Reader:
         return found
 
 
-def drawn_tendons(known: Stacked) -> tuple[Array, Array, Array]:
+def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
     """Return what winches draw in besides travel of the tiles, of each finger.
 
     Returns
@@ -233,13 +233,13 @@ def drawn_tendons(known: Stacked) -> tuple[Array, Array, Array]:
         [m]
     """
     hand = known.hands[0].hand
-    radii, losses = _losses(known.places, Same(hand))
-    nails = hand.nail.pulley_radius * joined([each.nail_angles for each in known.hands])
+    radii, losses = _losses(known.places, IdentityKey(hand))
+    nails = hand.nail.pulley_radius * concatenated([each.nail_angles for each in known.hands])
     return known.bends @ radii, losses, nails
 
 
 @lru_cache(maxsize=KEPT)
-def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
+def _drives_of(places: TileIndex, key: IdentityKey) -> tuple[Array, float]:
     """Return what tensions and tiles' shears do to motors and winches, affine in them.
 
     Returns
@@ -262,14 +262,14 @@ def _drives_of(places: Places, key: Same) -> tuple[Array, float]:
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _pieces_of(key: Same) -> tuple[tuple[HalfPlane, ...], ...]:
+def _pieces_of(key: IdentityKey) -> tuple[tuple[HalfPlane, ...], ...]:
     """Return the half-planes of tiles on these surfaces."""
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
     return tuple([inner_half_planes(surface) for surface in surfaces])
 
 
 @lru_cache(maxsize=KEPT)
-def _losses(places: Places, key: Same) -> tuple[Array, Array]:
+def _losses(places: TileIndex, key: IdentityKey) -> tuple[Array, Array]:
     """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
     (hand,) = key.each
     assert isinstance(hand, HandModel)
@@ -317,12 +317,12 @@ class _HandLayout(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _hand_layout(key: Same, limits: int) -> _HandLayout:
+def _hand_layout(key: IdentityKey, limits: int) -> _HandLayout:
     """Return the layout of a hand.
 
     Parameters
     ----------
-    key : Same
+    key : IdentityKey
         Its tiles; columns and rows of its set.
     limits : int
         Limit rows of each tile, of which a hand has the first, tile by tile.
@@ -393,12 +393,12 @@ class _Layout(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
+def _layout_of(key: IdentityKey, limits: tuple[int, ...]) -> _Layout:
     """Return the layout of all hands.
 
     Parameters
     ----------
-    key : Same
+    key : IdentityKey
         The tiles of each hand; then columns and rows of the set of each.
     limits : tuple of int
         Of `_hand_layout`, for each.
@@ -406,8 +406,8 @@ def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
     count = len(limits)
     tiles: tuple[tuple[Tile, ...], ...] = key.each[:count]  # type: ignore[assignment]
     names = zip(tiles, key.each[count::2], key.each[count + 1 :: 2], strict=True)
-    hands = [_hand_layout(Same(*own), rows) for own, rows in zip(names, limits, strict=True)]
-    places, touch = places_of(tuple(map(len, tiles))), touch_of(Same(*tiles))
+    hands = [_hand_layout(IdentityKey(*own), rows) for own, rows in zip(names, limits, strict=True)]
+    places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(IdentityKey(*tiles))
     ends = list(accumulate((len(hand.least) for hand in hands), initial=1))
     found = np.array([hand.places + at * hand.has for hand, at in zip(hands, ends, strict=False)])
     found -= np.sign(found)
@@ -430,7 +430,7 @@ def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
     return _Layout(
         columns=columns,
         shape=shape,
-        limits=joined(
+        limits=concatenated(
             [
                 shape[1] * h + WRENCH + np.arange(hand.rows, dtype=np.intp)
                 for h, hand in enumerate(hands)
@@ -441,9 +441,9 @@ def _layout_of(key: Same, limits: tuple[int, ...]) -> _Layout:
         palms=found[:, 3 * COUNT :],
         of_tile=of_tile,
         first_row=np.array(first_row),
-        begins=joined([at + hand.begins for at, hand in pairs]),
+        begins=concatenated([at + hand.begins for at, hand in pairs]),
         kept=kept,
         hooked=hooked,
-        nail_limits=joined([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
-        efforts=joined([at + hand.efforts for at, hand in pairs]),
+        nail_limits=concatenated([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
+        efforts=concatenated([at + hand.efforts for at, hand in pairs]),
     )

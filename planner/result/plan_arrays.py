@@ -10,13 +10,13 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import Tile
 from hand_models.tile import HalfPlane
-from planner.prepare import joined
+from planner.prepare import concatenated
 from planner.result.hand_plan import HandPlan, WristPlan
 
-__all__ = ["Carried"]
+__all__ = ["PlanArrays"]
 
 
-class Carried(NamedTuple):
+class PlanArrays(NamedTuple):
     """The numbers of all hands' plans, one hand after another, as `places_of` says.
 
     Vectors in each hand's H, forces on the rock, SI units; T tiles, F fingers, H hands.
@@ -60,17 +60,17 @@ class Carried(NamedTuple):
     wrists: tuple[WristPlan | None, ...]
 
     @classmethod
-    def of(cls, hands: Sequence[HandPlan]) -> Carried:
+    def of(cls, hands: Sequence[HandPlan]) -> PlanArrays:
         """Return the numbers of hands' plans."""
         palms = [hand.palm for hand in hands]
         return cls(
-            tensions=joined([hand.tensions for hand in hands]),
+            tensions=concatenated([hand.tensions for hand in hands]),
             drives=np.hstack([hand.drives for hand in hands]),
-            loads=joined([hand.loads for hand in hands]),
+            loads=concatenated([hand.loads for hand in hands]),
             forces=np.vstack([*(hand.forces for hand in hands), *(p.force for p in palms)]),
             points=np.vstack([*(hand.positions for hand in hands), *(p.position for p in palms)]),
-            axes=joined([hand.axes for hand in hands]),
-            tile_utilisations=joined([hand.tile_utilisations for hand in hands]),
+            axes=concatenated([hand.axes for hand in hands]),
+            tile_utilisations=concatenated([hand.tile_utilisations for hand in hands]),
             palm_moments=np.array([p.moment for p in palms]),
             palm_utilisations=np.array([p.utilisation for p in palms]),
             wrenches=np.array([hand.wrench for hand in hands]),

@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
 from planner import deadline
 from planner.robots.limb_batch import Efforts, LimbBatch
-from planner.robots.out_of_reach import PLACED, TURNED, lack
+from planner.robots.out_of_reach import PLACED, TURNED, pose_shortfall
 from planner.robots.pose_search import TOLERANCE, find_angles, starts_near
 from planner.robots.robot import Robot
 from planner.robots.torque_lowering import lower_torques
@@ -186,7 +186,7 @@ def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None
     beyond = float(batch.beyond[i])
     limb = batch.limbs[i]
     starts = [best, *starts_near(batch, i, 0)[:STARTS, : batch.joints[i]]]
-    lacks = lack(batch.robot.model, limb, batch.poses[limb], starts)
+    lacks = pose_shortfall(batch.robot.model, limb, batch.poses[limb], starts)
     # without a posture that is turned as asked, what is told is how far away the place is
     missing = lacks.way if lacks.askew <= TURNED else lacks.place
     if beyond > 0.0 and missing <= beyond + PLACED:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Array, Pose
 from planner.robots.kinematics import RobotModel
 
-__all__ = ["PLACED", "TURNED", "Lack", "lack"]
+__all__ = ["PLACED", "TURNED", "PoseShortfall", "pose_shortfall"]
 
 FIRST: Final = 300.0
 """How much heavier what comes first counts than what comes second."""
@@ -35,7 +35,7 @@ SMALL: Final = 1e-4
 """Angle below which a rotation's higher powers are nil [rad]."""
 
 
-class Lack(NamedTuple):
+class PoseShortfall(NamedTuple):
     """How near a hand comes to a pose that is out of its reach.
 
     Attributes
@@ -52,7 +52,9 @@ class Lack(NamedTuple):
     askew: float
 
 
-def lack(model: RobotModel, limb: str, pose: Pose, starts: Sequence[Array]) -> Lack:
+def pose_shortfall(
+    model: RobotModel, limb: str, pose: Pose, starts: Sequence[Array]
+) -> PoseShortfall:
     """Return how near a limb's hand comes to a pose, from several starts.
 
     Parameters
@@ -99,7 +101,7 @@ def lack(model: RobotModel, limb: str, pose: Pose, starts: Sequence[Array]) -> L
 
     place, turn = nearest(FIRST, 1.0)
     way, askew = nearest(1.0, FIRST)
-    return Lack(place, turn, way, askew)
+    return PoseShortfall(place, turn, way, askew)
 
 
 def _turning(turn: Array) -> Array:

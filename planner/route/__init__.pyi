@@ -3,6 +3,6 @@ from .climb import (
     OutOfReach as OutOfReach,
     Route as Route,
     RouteResult as RouteResult,
-    Stage as Stage,
+    RouteStage as RouteStage,
     evaluate as evaluate,
 )

@@ -18,13 +18,13 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from hand_models.base import InvalidInputError, Pose
-from planner.prepare import settle
+from planner.prepare import settle_hand
 from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.result import Plan
 from planner.robots import UnreachableError
 from planner.solving import plan
 
-__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "Stage", "evaluate"]
+__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "evaluate"]
 
 Phase = Literal["start", "shift", "lift", "place"]
 
@@ -74,7 +74,7 @@ class Route:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class RouteStage:
     """One stance of a climb.
 
     Attributes
@@ -121,13 +121,13 @@ class RouteResult:
     Attributes
     ----------
     route : Route
-    stages : tuple of Stage
+    stages : tuple of RouteStage
     plans : tuple of Plan or OutOfReach
         One for each stage.
     """
 
     route: Route
-    stages: tuple[Stage, ...]
+    stages: tuple[RouteStage, ...]
     plans: tuple[Plan | OutOfReach, ...]
 
     @property
@@ -147,7 +147,7 @@ def _hardness(answer: Plan | OutOfReach) -> tuple[int, float]:
     return order[answer.status], used
 
 
-def stages(route: Route) -> Iterator[Stage]:
+def stages(route: Route) -> Iterator[RouteStage]:
     """Yield the stances of a climb in order.
 
     Raises
@@ -169,7 +169,7 @@ def stages(route: Route) -> Iterator[Stage]:
     body = route.start.body
     index = 0
 
-    def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> Stage:
+    def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> RouteStage:
         stance = replace(route.start, hands=tuple(held), body=body)
         on_rock = {hand.limb for hand in held}
         caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
@@ -180,7 +180,7 @@ def stages(route: Route) -> Iterator[Stage]:
             want=frozenset(["load_factor"]),
             objective=route.objective,
         )
-        return Stage(index, move, phase, limb, question)
+        return RouteStage(index, move, phase, limb, question)
 
     yield stage(0, "start", None, list(hands.values()))
     for number, move in enumerate(route.moves, start=1):
@@ -230,7 +230,7 @@ def evaluate(
         workers = (os.cpu_count() or 1) if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
 
-    def done(stage: Stage, answer: Plan | OutOfReach) -> None:
+    def done(stage: RouteStage, answer: Plan | OutOfReach) -> None:
         plans[stage.index] = answer
         if progress is not None:
             progress(len(plans), len(todo))
@@ -244,12 +244,12 @@ def evaluate(
 
 
 def _in_processes(
-    todo: Sequence[Stage], workers: int, done: Callable[[Stage, Plan | OutOfReach], None]
+    todo: Sequence[RouteStage], workers: int, done: Callable[[RouteStage, Plan | OutOfReach], None]
 ) -> None:
     """Plan stages in processes; those of a process that dies are left to the caller."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(todo)), mp_context=context) as pool:
-        futures: dict[Future[Plan | OutOfReach], Stage] = {}
+        futures: dict[Future[Plan | OutOfReach], RouteStage] = {}
         try:
             for stage in todo:
                 futures[pool.submit(_plan_stage, stage)] = stage
@@ -262,7 +262,7 @@ def _in_processes(
             raise
 
 
-def _plan_stage(stage: Stage) -> Plan | OutOfReach:
+def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:
     try:
         if stage.phase == "place":
             _must_touch(stage)
@@ -274,10 +274,10 @@ def _plan_stage(stage: Stage) -> Plan | OutOfReach:
         raise error.within(place) from None
 
 
-def _must_touch(stage: Stage) -> None:
+def _must_touch(stage: RouteStage) -> None:
     """Refuse a move that ends in the air."""
     stance = stage.question.stance
     hand = next(hand for hand in stance.hands if hand.limb == stage.limb)
-    settled = settle(hand, stance)
+    settled = settle_hand(hand, stance)
     if not (settled.holding.any() or settled.palm.engaged):
         raise InvalidInputError(f"{hand.limb} touches nothing there", field="hold")

@@ -29,10 +29,10 @@ import numpy.typing as npt
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from hand_models.base import Array
-from planner.prepare import joined
+from planner.prepare import concatenated
 from planner.programs import Outcome, StanceData, tie_weight
 
-__all__ = ["Polished", "polished"]
+__all__ = ["ActiveSetOptimum", "active_set_optimum"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -100,7 +100,7 @@ class _Rows(NamedTuple):
         return np.asarray(self.b + self.d * u - self.C @ z)
 
 
-class Polished(NamedTuple):
+class ActiveSetOptimum(NamedTuple):
     """The optimum of `program.Unique`, exact.
 
     Attributes
@@ -117,7 +117,9 @@ class Polished(NamedTuple):
     second: float
 
 
-def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Polished | None:
+def active_set_optimum(
+    data: StanceData, outcome: Outcome, share: float = 1.0
+) -> ActiveSetOptimum | None:
     """Return the exact optimum of `program.unique` from its outcome; None if that is not found.
 
     Parameters
@@ -132,8 +134,8 @@ def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Polished
     hands, rows = data.hands, _Rows.of(data)
     unit = data.rows.unit
     Q = 2.0 * share * tie_weight(data.shape) * data.rows.tie
-    multipliers = joined([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
-    start = _Point(joined(outcome.loads) / unit, outcome.value, multipliers)
+    multipliers = concatenated([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
+    start = _Point(concatenated(outcome.loads) / unit, outcome.value, multipliers)
     room = rows.room(start.z, start.u)
     for sure in SURE:
         active = multipliers > sure * room
@@ -146,7 +148,7 @@ def polished(data: StanceData, outcome: Outcome, share: float = 1.0) -> Polished
             break
         ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
         loads = tuple(np.split(found.z * unit, ends))
-        return Polished(loads, found.u, 0.5 * float(Q @ found.z**2))
+        return ActiveSetOptimum(loads, found.u, 0.5 * float(Q @ found.z**2))
     return None
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from hand_models.base import Array, finite_vector
 from planner.question import Question, moderate
 from planner.result import Plan
-from planner.solving.prepared_checks import prepare
-from planner.solving.prepared_stance import asked, ground_of
+from planner.solving.prepared_checks import prepare_checks
+from planner.solving.prepared_stance import checked_question, prepare_stance
 from planner.solving.solve import plan_on
 
 __all__ = ["KnownStance"]
@@ -34,14 +34,14 @@ class KnownStance:
     """
 
     def __init__(self, question: Question) -> None:
-        ground = ground_of(asked(question))
-        hands = ground.hands
+        prepared = prepare_stance(checked_question(question))
+        hands = prepared.hands
         # what joints bear changes with the wrench
-        if ground.where is None and question.stance.joints is None and not hands.floating:
+        if prepared.where is None and question.stance.joints is None and not hands.floating:
             spaces, _ = hands.sets(hands.at_rest(hands.idle))
-            prepared = prepare(question, None, ground.settled, spaces)
-            ground = ground._replace(prepared=prepared)
-        self.ground = ground
+            checks = prepare_checks(question, None, prepared.settled, spaces)
+            prepared = prepared._replace(checks=checks)
+        self.prepared = prepared
 
     def plan(self, body_wrench: Array) -> Plan:
         """Answer for another body wrench, as `planner.solving.solve.plan` would.
@@ -58,7 +58,7 @@ class KnownStance:
         """
         start = time.perf_counter()
         wrench = moderate(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
-        ground = self.ground
-        asked = replace(ground.question, body_wrench=wrench)
-        hands = ground.hands.turned(wrench)
-        return plan_on(ground._replace(question=asked, hands=hands, wrench=wrench), start)
+        prepared = self.prepared
+        question = replace(prepared.question, body_wrench=wrench)
+        hands = prepared.hands.turned(wrench)
+        return plan_on(prepared._replace(question=question, hands=hands, wrench=wrench), start)

@@ -10,18 +10,18 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.explanation import warnings
 from planner.prepare import Posture
 from planner.question import Question
-from planner.result import Reader, reader_of
+from planner.result import LoadRecovery, load_recovery_of
 from planner.verification import Check
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["PreparedChecks", "prepare_checks"]
 
 
-class Prepared(NamedTuple):
+class PreparedChecks(NamedTuple):
     """What is known of reading and checking before there are loads.
 
     Attributes
     ----------
-    reader : Reader or None
+    reader : LoadRecovery or None
         Reads loads; None where a wrist floats.
     check : Check
         What every plan must pass.
@@ -29,17 +29,17 @@ class Prepared(NamedTuple):
         What is odd about the stance.
     """
 
-    reader: Reader | None
+    reader: LoadRecovery | None
     check: Check
     oddities: tuple[str, ...]
 
 
-def prepare(
+def prepare_checks(
     question: Question,
     where: Posture | None,
     settled: Sequence[SettledHand],
     spaces: Sequence[WrenchSpace] | None,
-) -> Prepared:
+) -> PreparedChecks:
     """Return what reading and checking plans needs of the hands alone.
 
     It changes nothing but caches that threads may share, so it may run beside a solver.
@@ -54,8 +54,8 @@ def prepare(
     spaces : sequence of WrenchSpace or None
         Their sets; None where a wrist floats.
     """
-    return Prepared(
-        reader=None if spaces is None else reader_of(settled, spaces),
+    return PreparedChecks(
+        reader=None if spaces is None else load_recovery_of(settled, spaces),
         check=Check(question, settled, where),
         oddities=warnings(question.stance, settled),
     )

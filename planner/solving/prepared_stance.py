@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.hand import SettledHand
-from planner.prepare import Hands, Posture, gather, posture
+from planner.prepare import HandSets, Posture, assemble, posture
 from planner.question import Question
-from planner.solving.prepared_checks import Prepared
+from planner.solving.prepared_checks import PreparedChecks
 
-__all__ = ["Ground", "asked", "ground_of"]
+__all__ = ["PreparedStance", "checked_question", "prepare_stance"]
 
 
-class Ground(NamedTuple):
+class PreparedStance(NamedTuple):
     """All that is known of a question before a solver is asked.
 
     Attributes
@@ -24,23 +24,23 @@ class Ground(NamedTuple):
         The joints; None if the question says nothing of them.
     settled : sequence of SettledHand
         The hands on their holds.
-    hands : Hands
+    hands : HandSets
         What the programs need of them.
     wrench : ndarray, shape (6,)
         The body wrench that is planned for, in B [N, N·m].
-    prepared : Prepared or None
+    checks : PreparedChecks or None
         What reads and checks its plans; by default it is made with each.
     """
 
     question: Question
     where: Posture | None
     settled: Sequence[SettledHand]
-    hands: Hands
+    hands: HandSets
     wrench: Array
-    prepared: Prepared | None = None
+    checks: PreparedChecks | None = None
 
 
-def asked(question: Question) -> Question:
+def checked_question(question: Question) -> Question:
     """Return a question.
 
     Raises
@@ -53,7 +53,7 @@ def asked(question: Question) -> Question:
     return question
 
 
-def ground_of(question: Question) -> Ground:
+def prepare_stance(question: Question) -> PreparedStance:
     """Return what is known of a question before a solver is asked.
 
     Raises
@@ -66,5 +66,5 @@ def ground_of(question: Question) -> Ground:
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
     except InvalidInputError as error:
         raise error.within("load") from None
-    settled, hands = gather(question, where, wrench)
-    return Ground(question, where, settled, hands, wrench)
+    settled, hands = assemble(question, where, wrench)
+    return PreparedStance(question, where, settled, hands, wrench)

@@ -14,15 +14,15 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import SettledHand
 from planner import deadline, programs
-from planner.deadline import Beside, Budget, Unfinished, late_sentence
+from planner.deadline import Budget, Overlap, Unfinished, late_sentence
 from planner.explanation import (
     LEAST_FACTOR,
     NO_FACTOR,
     UNKNOWN,
     UNPROVEN,
-    Binding,
-    Hindered,
-    Used,
+    ActiveLimits,
+    InfeasibleStance,
+    LimitUse,
     certify,
     certify_idle,
     far_wrists,
@@ -40,33 +40,33 @@ from planner.floating import (
     NO_WRENCH,
     PROGRAMS,
     LargestFactor,
-    Settled,
+    WristSolution,
     least_effort,
     least_use,
     most_load,
     with_room,
 )
-from planner.prepare import Hands, Posture
+from planner.prepare import HandSets, Posture
 from planner.programs import SLACK, SOLVER, Outcome
 from planner.question import Question
 from planner.result import (
-    Carried,
     Certificate,
     HandPlan,
     LimitName,
     Plan,
+    PlanArrays,
     Price,
     SolverInfo,
     Status,
     TensionPath,
     Times,
     WristPlan,
-    read_floating_hand,
-    reader_of,
+    load_recovery_of,
+    recover_floating_hand,
 )
 from planner.solving import dual_bounds
-from planner.solving.prepared_checks import Prepared, prepare
-from planner.solving.prepared_stance import Ground, asked, ground_of
+from planner.solving.prepared_checks import PreparedChecks, prepare_checks
+from planner.solving.prepared_stance import PreparedStance, checked_question, prepare_stance
 from planner.solving.unique_plan import LeastUtilisation, is_least, least_utilisation
 
 __all__ = ["plan", "plan_on"]
@@ -94,16 +94,16 @@ def plan(question: Question) -> Plan:
         If its deadline comes before anything is found that passes the checks.
     """
     start = time.perf_counter()
-    with deadline.within(asked(question).deadline, started=start):
-        return plan_on(ground_of(question), start)
+    with deadline.within(checked_question(question).deadline, started=start):
+        return plan_on(prepare_stance(question), start)
 
 
-def plan_on(ground: Ground, start: float) -> Plan:
-    """Answer a question of which the ground is known.
+def plan_on(prepared: PreparedStance, start: float) -> Plan:
+    """Answer a question of a prepared stance.
 
     Parameters
     ----------
-    ground : Ground
+    prepared : PreparedStance
     start : float
         When it began, on the clock of `time.perf_counter`.
 
@@ -112,10 +112,10 @@ def plan_on(ground: Ground, start: float) -> Plan:
     DeadlineError
         If the deadline comes before anything is found that passes the checks.
     """
-    with deadline.within(ground.question.deadline, started=start):
+    with deadline.within(prepared.question.deadline, started=start):
         modelled = time.perf_counter()
         deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
-        answer = _Answer(*ground)
+        answer = _Answer(*prepared)
         answer.solve()
         solved = time.perf_counter()
         return answer.read(Times(modelled - start, solved - modelled, 0.0), start)
@@ -129,9 +129,9 @@ class _Answer:
         question: Question,
         where: Posture | None,
         settled: Sequence[SettledHand],
-        hands: Hands,
+        hands: HandSets,
         wrench: Array,
-        prepared: Prepared | None,
+        checks: PreparedChecks | None,
     ) -> None:
         self.question = question
         self.where = where
@@ -142,15 +142,15 @@ class _Answer:
         self.limbs = [hand.limb for hand in question.stance.hands]
         self.idle = _idle_joints(where, self.limbs)
         self.idle_preloads = idle_preloads(self.limbs, settled, hands.wrists)
-        self.search: Settled | None = None
-        self.least_used: Settled | None = None
+        self.search: WristSolution | None = None
+        self.least_used: WristSolution | None = None
         self.budget = Budget(PROGRAMS)
         self.known_factor: LargestFactor | None = None
         self.outcome: Outcome
         self.bound: float | None = None
         """Of the least utilisation, from below, where it is known already."""
         self.loads: tuple[Array, ...] = ()
-        self.carried: Carried
+        self.arrays: PlanArrays
         self.used: Array
         self.effort = math.inf
         self.hands: tuple[HandPlan, ...] = ()
@@ -165,8 +165,8 @@ class _Answer:
         self.path: TensionPath | None = None
         self.path_unknown = False
         self.unfinished: list[Unfinished] = []
-        self._ready = prepared
-        self._preparing: Beside[Prepared] | None = None
+        self._ready = checks
+        self._preparing: Overlap[PreparedChecks] | None = None
 
     # Solving ------------------------------------------------------------------------------------
 
@@ -197,7 +197,7 @@ class _Answer:
         else:
             self.spaces, self.data = self.parts.sets(self.search.point)
 
-    def _take_search(self, found: Settled) -> None:
+    def _take_search(self, found: WristSolution) -> None:
         """Take the plan that a search for floating wrists has found."""
         self.search = found
         self.spaces, self.data = found.sets
@@ -230,7 +230,7 @@ class _Answer:
         """Solve, and prepare meanwhile what reads and checks the loads."""
         if self._ready is not None:
             return least_utilisation(self.data)
-        with Beside(self._prepare) as self._preparing:
+        with Overlap(self._prepare) as self._preparing:
             return least_utilisation(self.data)
 
     def _settle_in_two(self) -> None:
@@ -272,7 +272,7 @@ class _Answer:
         else:
             self.wrong = [f"least effort: {self.least_effort.status}"]
 
-    def _settle_floating_effort(self, plan: Settled, cap: float) -> None:
+    def _settle_floating_effort(self, plan: WristSolution, cap: float) -> None:
         """Take the plan of least effort that floating wrists come to from that of least use."""
         used = plan.measure.utilisation
         if used > cap + SLACK:
@@ -288,38 +288,38 @@ class _Answer:
     def _take(self, loads: tuple[Array, ...]) -> None:
         """Read these loads, and check them."""
         self.loads = loads
-        reader, check, _ = self._prepared
+        reader, check, _ = self._checks
         if reader is None:
             self.hands = tuple(self._read_hand(i, y) for i, y in enumerate(loads))
-            self.carried = Carried.of(self.hands)
+            self.arrays = PlanArrays.of(self.hands)
             self.used = programs.used(self.data, loads)
             self.effort = programs.used_effort(self.data, loads)
         else:
             self.hands = ()
-            self.carried, self.used, self.effort = reader.read(loads)
-        self.utilisation = float(np.maximum.reduce(self.carried.utilisations))
-        self.wrong = check.problems(self.carried, self._whole_utilisation, self.wrench, self.effort)
+            self.arrays, self.used, self.effort = reader.read(loads)
+        self.utilisation = float(np.maximum.reduce(self.arrays.utilisations))
+        self.wrong = check.problems(self.arrays, self._whole_utilisation, self.wrench, self.effort)
 
     @cached_property
-    def _prepared(self) -> Prepared:
+    def _checks(self) -> PreparedChecks:
         """What reads and checks plans."""
         if self._ready is not None:
             return self._ready
         return self._prepare() if self._preparing is None else self._preparing.result()
 
-    def _prepare(self) -> Prepared:
+    def _prepare(self) -> PreparedChecks:
         spaces = None if self.parts.floating else self.spaces
-        return prepare(self.question, self.where, self.settled, spaces)
+        return prepare_checks(self.question, self.where, self.settled, spaces)
 
     def _read_hand(self, index: int, y: Array) -> HandPlan:
         """Read one hand of a stance of which some float."""
         limb, settled = self.limbs[index], self.settled[index]
         space, wrist, search = self.spaces[index], self.parts.wrists[index], self.search
         if wrist is None or search is None:
-            reader = reader_of((settled,), (space,))
-            return reader.hands((limb,), reader.read((y,)).carried)[0]
+            reader = load_recovery_of((settled,), (space,))
+            return reader.hands((limb,), reader.read((y,)).arrays)[0]
         pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
-        return read_floating_hand(limb, settled, wrist.hand, space, pose)
+        return recover_floating_hand(limb, settled, wrist.hand, space, pose)
 
     def _look_again(self) -> None:
         """Tell no balance at all from a solver that failed."""
@@ -349,10 +349,10 @@ class _Answer:
             for hand in self.question.stance.hands
         )
 
-    def _hindered(self, cap: float | None) -> Hindered:
+    def _hindered(self, cap: float | None) -> InfeasibleStance:
         """Return what a proof is made of: at any utilisation, or within a cap."""
         limits = self.question.limits
-        return Hindered(self.data, self.limbs, self.spaces, self.parts.held, cap, limits)
+        return InfeasibleStance(self.data, self.limbs, self.spaces, self.parts.held, cap, limits)
 
     def _overload(self) -> Certificate | None:
         """Return the proof that no plan keeps to the cap on the utilisation; None without one.
@@ -431,8 +431,8 @@ class _Answer:
             if wrong:
                 reason = f"the solver's plan does not pass the checks: {wrong[0]}"
             else:
-                if self._prepared.reader is not None:
-                    self.hands = self._prepared.reader.hands(self.limbs, self.carried)
+                if self._checks.reader is not None:
+                    self.hands = self._checks.reader.hands(self.limbs, self.arrays)
                 verified, hands = True, self.hands
                 utilisation = self._whole_utilisation
                 cap = self.question.limits.utilisation
@@ -505,7 +505,7 @@ class _Answer:
             self.path_unknown = "path" not in self.unfinished
 
     def _warnings(self) -> tuple[str, ...]:
-        found = self._prepared.oddities
+        found = self._checks.oddities
         seconds = deadline.seconds()
         if self.unfinished and seconds is not None:
             found += (late_sentence(seconds, self.unfinished),)
@@ -555,8 +555,8 @@ class _Answer:
 
     def _residual(self) -> Array:
         """Return the body wrench of the hands' wrenches less the one planned for."""
-        carried = self.parts.transports @ self.carried.wrenches[:, :, None]
-        return np.asarray(-self.wrench - np.add.reduce(carried).ravel())
+        arrays = self.parts.transports @ self.arrays.wrenches[:, :, None]
+        return np.asarray(-self.wrench - np.add.reduce(arrays).ravel())
 
     @property
     def _floating(self) -> list[str]:
@@ -596,9 +596,9 @@ class _Answer:
         return most.name, sentence
 
     @cached_property
-    def _binding(self) -> Binding:
+    def _binding(self) -> ActiveLimits:
         """What binds the plan."""
-        return Binding(self.limbs, self.spaces, self.outcome.limit_duals)
+        return ActiveLimits(self.limbs, self.spaces, self.outcome.limit_duals)
 
     def _prices(self) -> tuple[Price, ...]:
         """Return what more of each limit that binds would take off the utilisation."""
@@ -613,13 +613,13 @@ class _Answer:
         """Return what more of each limit that binds would take off the effort."""
         if self.least_effort is None:
             return None
-        return Binding(self.limbs, self.spaces, self.least_effort.limit_duals).prices(self.cap)
+        return ActiveLimits(self.limbs, self.spaces, self.least_effort.limit_duals).prices(self.cap)
 
 
-def _idle_joints(where: Posture | None, limbs: Sequence[str]) -> list[Used]:
+def _idle_joints(where: Posture | None, limbs: Sequence[str]) -> list[LimitUse]:
     """Return how much of their joints' torque limbs without a hand use."""
     return [
-        Used(joint_name(limb, name), abs(float(torque)), float(most))
+        LimitUse(joint_name(limb, name), abs(float(torque)), float(most))
         for limb, joints in ({} if where is None else where.joints).items()
         if limb not in limbs
         for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)

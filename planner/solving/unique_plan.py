@@ -9,7 +9,7 @@ from hand_models.base import Array
 from planner import programs
 from planner.programs import TIE, Outcome, StanceData
 from planner.solving import dual_bounds
-from planner.solving.active_set import polished
+from planner.solving.active_set import active_set_optimum
 
 __all__ = ["LeastUtilisation", "is_least", "least_utilisation"]
 
@@ -58,7 +58,7 @@ def least_utilisation(data: StanceData) -> LeastUtilisation:
             outcome, share = again, smaller
     if not outcome.solved:
         return LeastUtilisation(outcome, -math.inf)
-    exact = polished(data, outcome, share)
+    exact = active_set_optimum(data, outcome, share)
     if exact is None:
         return LeastUtilisation(outcome, dual_bounds.unique_bound(data, outcome, share))
     # with exact multipliers the bound of `unique_bound` is the optimum itself, but for second terms

@@ -19,7 +19,7 @@ import numpy as np
 from hand_models.base import Array
 from planner.programs import UNLIMITED, WRENCH_UNIT, Outcome, StanceData
 
-__all__ = ["Cut", "cut"]
+__all__ = ["AffineBound", "affine_bound"]
 
 NOTHING: Final = 1e-8
 """A multiplier below this is taken for none."""
@@ -34,7 +34,7 @@ DEAREST: Final = 1e-6
 """Most of the utilisation that may be paid for what is left; with more there is no bound."""
 
 
-class Cut(NamedTuple):
+class AffineBound(NamedTuple):
     """Least utilisation ≥ slope · body wrench + constant.
 
     Attributes
@@ -48,7 +48,7 @@ class Cut(NamedTuple):
     constant: float
 
 
-def cut(data: StanceData, outcome: Outcome) -> Cut | None:
+def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     """Return what the multipliers of a program that minimises the utilisation prove.
 
     Of `program.Margin`, or of `program.Unique`, whose second term the repair takes out.
@@ -61,7 +61,7 @@ def cut(data: StanceData, outcome: Outcome) -> Cut | None:
 
     Returns
     -------
-    Cut or None
+    AffineBound or None
         None if the multipliers could not be repaired.
     """
     assert outcome.balance_dual is not None
@@ -97,4 +97,4 @@ def cut(data: StanceData, outcome: Outcome) -> Cut | None:
     g = np.sum([hand.g for hand in data.hands], axis=0)
     constant = -float(multipliers[: len(signed)] @ data.rows.rest)
     constant += float(nu @ g - nu[6:] @ data.wrench[6:]) - price
-    return Cut(-nu[:6] / WRENCH_UNIT, constant)
+    return AffineBound(-nu[:6] / WRENCH_UNIT, constant)

@@ -69,7 +69,7 @@ class Interpolation:
                 return None
             loads.append(solved.loads.ravel())
             used.append(solved.outcome.value)
-            found = stance.cut(centre + aside, solved)
+            found = stance.affine_bound(centre + aside, solved)
             if found is not None:
                 cuts.append(found)
         if not cuts:

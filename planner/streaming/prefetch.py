@@ -22,7 +22,7 @@ from hand_models.base import Array
 from planner.streaming.interpolation import PER_RADIUS, Interpolation
 from planner.streaming.stream_stance import StreamStance
 
-__all__ = ["Following", "Mixture"]
+__all__ = ["Mixture", "Prefetch"]
 
 log = logging.getLogger(__name__)
 
@@ -68,7 +68,7 @@ class Mixture(NamedTuple):
     distance: float
 
 
-class Following:
+class Prefetch:
     """The interpolations about a wrench, of which one call after another tells; of one thread.
 
     Parameters

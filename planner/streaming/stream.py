@@ -27,8 +27,8 @@ from hand_models.hand import FINGERS
 from planner.programs import SLACK
 from planner.question import Question, moderate
 from planner.result import SetPoints, Source, no_set_points
-from planner.streaming.prefetch import Following, Mixture
-from planner.streaming.stream_stance import Proof, Read, StreamStance
+from planner.streaming.prefetch import Mixture, Prefetch
+from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
 
 __all__ = ["RADIUS", "WrenchStream"]
 
@@ -73,9 +73,9 @@ class WrenchStream:
             )
         self.radius = float(radius)
         self._stance = StreamStance(question)
-        self._following = Following(self._stance, self.radius)
+        self._following = Prefetch(self._stance, self.radius)
         self._lock = threading.Lock()
-        self._proofs: list[Proof] = []
+        self._proofs: list[SupportBound] = []
         self._last: SetPoints | None = None
         self._closed = False
         self._key = b""
@@ -187,7 +187,7 @@ class WrenchStream:
         return points if points.verified else self._without(wrench)
 
     def _told(
-        self, wrench: Array, loads: Array, read: Read, bound: float, source: Source
+        self, wrench: Array, loads: Array, read: LoadEffects, bound: float, source: Source
     ) -> SetPoints:
         """Return loads, and what they do, as set-points, checked."""
         stance, check = self._stance, self._stance.check

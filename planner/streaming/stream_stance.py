@@ -20,10 +20,10 @@ from planner.programs import WRENCH_UNIT, Outcome
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import KnownStance, is_least, least_utilisation
-from planner.streaming.affine_bounds import Cut, cut
+from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import LoadsCheck
 
-__all__ = ["Proof", "Read", "Solved", "StreamStance"]
+__all__ = ["LoadEffects", "Solved", "StreamStance", "SupportBound"]
 
 SIGNED: Final = ("/lateral", f"/{NAIL}")
 """Loads that may be negative."""
@@ -46,14 +46,14 @@ class Solved(NamedTuple):
     bound: float
 
 
-class Read(NamedTuple):
+class LoadEffects(NamedTuple):
     """What loads do: the hands' wrenches (hands, 6) on the rock in H, the largest utilisation."""
 
     wrenches: Array
     utilisation: float
 
 
-class Proof(NamedTuple):
+class SupportBound(NamedTuple):
     """No plan has a body wrench w with direction · w > most."""
 
     direction: Array
@@ -93,18 +93,18 @@ class StreamStance:
         known = KnownStance(question)
         if question.body_wrench is None:
             # whatever accelerates now does not do so in the wrenches to come
-            known = KnownStance(replace(question, body_wrench=known.ground.wrench))
-        self._known, ground = known, known.ground
-        self.first = ground.wrench
+            known = KnownStance(replace(question, body_wrench=known.prepared.wrench))
+        self._known, prepared = known, known.prepared
+        self.first = prepared.wrench
         self.cap = question.limits.utilisation
         self.limbs = tuple(hand.limb for hand in question.stance.hands)
-        hands = ground.hands
+        hands = prepared.hands
         spaces, self._data = hands.sets(hands.at_rest(hands.idle))
         self.columns = tuple(space.columns for space in spaces)
         sizes = [len(names) for names in self.columns]
         self.shape = len(spaces), max(sizes)
-        self.check = LoadsCheck(ground.question, ground.settled, self.columns, ground.where)
-        self.drive = ground.settled[0].hand.drive
+        self.check = LoadsCheck(prepared.question, prepared.settled, self.columns, prepared.where)
+        self.drive = prepared.settled[0].hand.drive
         self._least = np.zeros(self.shape)
         limits = max(len(space.s) for space in spaces)
         self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
@@ -119,12 +119,12 @@ class StreamStance:
             self._least[i, :size] = np.where(signed, -np.inf, 0.0)
         self._limits = limits
 
-    def read(self, loads: Array) -> Read:
+    def read(self, loads: Array) -> LoadEffects:
         """Return what loads (hands, m) do."""
         rows = (self._rows @ loads[:, :, None])[:, :, 0]
         rows += self._rest
         used = np.maximum.reduce(rows[:, : self._limits], axis=None)
-        return Read(rows[:, self._limits :], float(used))
+        return LoadEffects(rows[:, self._limits :], float(used))
 
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""
@@ -143,22 +143,22 @@ class StreamStance:
             loads = tidy.loads if tidy.solved else outcome.loads
         return Solved(self._stacked(loads), outcome, bound)
 
-    def cut(self, body_wrench: Array, solved: Solved) -> Cut | None:
+    def affine_bound(self, body_wrench: Array, solved: Solved) -> AffineBound | None:
         """Return what the solver's answer proves for every wrench."""
-        return cut(self._data.turned(self._scaled(body_wrench)), solved.outcome)
+        return affine_bound(self._data.turned(self._scaled(body_wrench)), solved.outcome)
 
     def plan(self, body_wrench: Array) -> Plan:
         """Return the whole plan of a wrench, or the proof that there is none."""
         return self._known.plan(body_wrench)
 
-    def proof(self, plan: Plan) -> Proof | None:
+    def proof(self, plan: Plan) -> SupportBound | None:
         """Return what the proof of a plan that is infeasible says of other wrenches."""
         found = plan.certificate
         if found is None or found.utilisation is not None:
             return None
         # the part of wrenches that hands are given stays as it is
         given = found.needed - float(found.direction @ plan.body_wrench)
-        return Proof(found.direction, found.supremum - given)
+        return SupportBound(found.direction, found.supremum - given)
 
     def loads_of(self, plan: Plan) -> Array:
         """Return the loads (hands, m) of a plan."""

@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import SKEW, Array, Indices
 from hand_models.hand import FINGERS, HandModel
 from hand_models.tile import HalfPlane, Surface, inner_half_planes
-from planner.prepare import KEPT, Places, Same, Stacked
+from planner.prepare import KEPT, HandBatch, IdentityKey, TileIndex
 from planner.verification.equilibrium import tendons_of
 from planner.verification.limit_surface import LimitCurves
 from planner.verification.sentences import DRIVES
@@ -25,8 +25,8 @@ __all__ = [
     "TIP",
     "UTILISATION",
     "WINCH",
-    "Limits",
     "Roles",
+    "TileLimits",
     "Uses",
     "arms_of",
     "limits_of",
@@ -76,7 +76,7 @@ class Roles(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def roles_of(places: Places) -> Roles:
+def roles_of(places: TileIndex) -> Roles:
     """Return what the numbers of a plan are."""
     tiles, fingers, hands = places.shape
     drives, others = len(DRIVES) * fingers, tiles + 2 * hands
@@ -91,7 +91,7 @@ def roles_of(places: Places) -> Roles:
     )
 
 
-class Limits(NamedTuple):
+class TileLimits(NamedTuple):
     """What the tiles of some hands hold on their surfaces.
 
     Attributes
@@ -108,7 +108,7 @@ class Limits(NamedTuple):
     curves: LimitCurves
 
 
-def limits_of(surfaces: Same, known: Stacked) -> Limits:
+def limits_of(surfaces: IdentityKey, known: HandBatch) -> TileLimits:
     """Return the limits of tiles of hands on these surfaces."""
     limits = _limits_of(surfaces, known.places)
     if len(known.touch.touching) == len(known.places.hand):
@@ -117,14 +117,14 @@ def limits_of(surfaces: Same, known: Stacked) -> Limits:
 
 
 @lru_cache(maxsize=KEPT)
-def _limits_of(key: Same, places: Places) -> Limits:
+def _limits_of(key: IdentityKey, places: TileIndex) -> TileLimits:
     """Return the limits of tiles that all touch; ``key``: the surfaces."""
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
     pieces = tuple(inner_half_planes(surface) for surface in surfaces)
-    return Limits(pieces, _planes(pieces, places), LimitCurves(surfaces, places.hand))
+    return TileLimits(pieces, _planes(pieces, places), LimitCurves(surfaces, places.hand))
 
 
-def planes_of(pieces: Sequence[Sequence[HalfPlane]], known: Stacked) -> Array:
+def planes_of(pieces: Sequence[Sequence[HalfPlane]], known: HandBatch) -> Array:
     """Return hands' half-planes over their capacities, of each tile, shape (T, 2 p, 3).
 
     For lateral loads of either sign. Zero for tiles that touch nothing, and where a hand has fewer
@@ -133,7 +133,7 @@ def planes_of(pieces: Sequence[Sequence[HalfPlane]], known: Stacked) -> Array:
     return np.asarray(_planes(pieces, known.places) * known.touch.touches[:, None, None])
 
 
-def _planes(pieces: Sequence[Sequence[HalfPlane]], places: Places) -> Array:
+def _planes(pieces: Sequence[Sequence[HalfPlane]], places: TileIndex) -> Array:
     most = max(map(len, pieces))
     tables = [
         [
@@ -184,13 +184,13 @@ class Uses(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def uses_of(places: Places, key: Same, strength: float) -> Uses:
+def uses_of(places: TileIndex, key: IdentityKey, strength: float) -> Uses:
     """Return what tensions do.
 
     Parameters
     ----------
-    places : Places
-    key : Same
+    places : TileIndex
+    key : IdentityKey
         The `HandModel` that all hands are.
     strength : float
         What every tendon may hold [N].

@@ -22,9 +22,9 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS, SettledHand
-from planner.prepare import Posture, Same, stacked
+from planner.prepare import IdentityKey, Posture, batch_of
 from planner.question import Question
-from planner.result import Carried, HandPlan
+from planner.result import HandPlan, PlanArrays
 from planner.verification.arrays import CROSS, LOAD, UTILISATION, roles_of
 from planner.verification.limbs import LimbUse, check_asked, check_limbs, force_use
 from planner.verification.recomputation import STOP, recomputing_of
@@ -76,7 +76,7 @@ def problems(
         for place, hand in zip(question.stance.hands, hands, strict=True)
         if place.limb != hand.limb
     ]
-    return found + check.problems(Carried.of(hands), utilisation, body_wrench, effort)
+    return found + check.problems(PlanArrays.of(hands), utilisation, body_wrench, effort)
 
 
 class Check:
@@ -98,11 +98,11 @@ class Check:
         hands = tuple(settled)
         stance, limits = question.stance, question.limits
         self.question, self.where = question, where
-        self.known = known = stacked(hands)
+        self.known = known = batch_of(hands)
         self.limbs = tuple([place.limb for place in stance.hands])
         cap, most = limits.tendon_tension, hands[0].hand.maximum_tension
         self.strength = most if cap is None else min(most, cap)
-        preloads = Same(*[place.tendon_preload for place in stance.hands])
+        preloads = IdentityKey(*[place.tendon_preload for place in stance.hands])
         self.again = recomputing_of(known, self.limbs, self.strength, preloads)
         self.floating = [h for h, place in enumerate(stance.hands) if place.wrist == "floating"]
         self.asked = [
@@ -129,7 +129,7 @@ class Check:
 
     def problems(
         self,
-        carried: Carried,
+        arrays: PlanArrays,
         utilisation: float,
         body_wrench: Array,
         effort: float | None = None,
@@ -138,7 +138,7 @@ class Check:
 
         Parameters
         ----------
-        carried : Carried
+        arrays : PlanArrays
             The plan's numbers.
         utilisation : float
             The plan's.
@@ -152,9 +152,9 @@ class Check:
         # numbers that are not finite are off, too
         with np.errstate(invalid="ignore", over="ignore"):
             if self.where is not None or self.question.stance.joints is not None:
-                wrenches = dict(zip(self.limbs, carried.wrenches, strict=True))
+                wrenches = dict(zip(self.limbs, arrays.wrenches, strict=True))
                 limbs = check_limbs(found, self.question, wrenches, body_wrench, self.where)
-            again = self.again.of(found, carried, self._asked_for(found, carried, limbs))
+            again = self.again.of(found, arrays, self._asked_for(found, arrays, limbs))
             if not self.again.near(again):
                 self._look(found, again)
             if self.drawing:
@@ -162,11 +162,11 @@ class Check:
             worst = max([float(np.maximum.reduce(again.hands)), *limbs.utilisation.values()])
             if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
-            error, size = self._off_balance(carried.wrenches, body_wrench)
+            error, size = self._off_balance(arrays.wrenches, body_wrench)
             if not error <= BALANCE * max(size, 1.0):
                 found.append(f"balance is off by {error:.3g} of {size:.3g}")
             if effort is not None:
-                relative = float(carried.tensions.dot(carried.tensions)) / self.strength**2
+                relative = float(arrays.tensions.dot(arrays.tensions)) / self.strength**2
                 relative += sum(limbs.effort[limb] for limb in self.limbs if limb in limbs.effort)
                 if not abs(relative - effort) <= EFFORT * max(1.0, relative):
                     found.append(f"plan: effort is {relative:.8g}, not {effort:.8g}")
@@ -175,8 +175,8 @@ class Check:
     def _look(self, found: list[str], again: Recomputed) -> None:
         """Say what is off by more than it may be."""
         again = self.again.solved(again)
-        carried, roles = again.carried, roles_of(self.known.places)
-        most = self.again.allowed(carried).take(roles.hand)
+        arrays, roles = again.arrays, roles_of(self.known.places)
+        most = self.again.allowed(arrays).take(roles.hand)
         beyond = np.flatnonzero(~(again.off <= most))
         found.extend(again.loads_off(beyond, roles.ends))
         used, told = again.used, again.told
@@ -186,15 +186,15 @@ class Check:
         found.extend(map(again.stop, np.flatnonzero(~(again.stops >= -STOP)).tolist()))
         found.extend(again.idle())
         for h, hand in enumerate(self.known.hands):
-            if carried.tiles[h] is not hand.tiles or carried.engaged[h] != hand.palm.engaged:
+            if arrays.tiles[h] is not hand.tiles or arrays.engaged[h] != hand.palm.engaged:
                 found.extend(again.contacts_told(h))
 
     def _stick(self, found: list[str], again: Recomputed) -> None:
         """Say which tendons friction would hold, where they were slackened."""
-        allowed = self.again.allowed(again.carried)
+        allowed = self.again.allowed(again.arrays)
         for finger in self.drawing:
             hand = self.known.hands[finger // COUNT]
-            slack = hand.closing_tension - again.carried.tensions[finger]
+            slack = hand.closing_tension - again.arrays.tensions[finger]
             if not slack <= allowed[finger // COUNT]:
                 found.append(again.slack(finger))
 
@@ -208,10 +208,10 @@ class Check:
         error = off.ravel()
         return math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
 
-    def _asked_for(self, found: list[str], carried: Carried, limbs: LimbUse) -> Array | None:
+    def _asked_for(self, found: list[str], arrays: PlanArrays, limbs: LimbUse) -> Array | None:
         """Check what a question asks of its hands; return how much of joints and caps they use."""
         places = self.question.stance.hands
-        floats = [h for h, wrist in enumerate(carried.wrists) if wrist is not None]
+        floats = [h for h, wrist in enumerate(arrays.wrists) if wrist is not None]
         if floats != self.floating:
             found.extend(
                 f"{place.limb}: the wrist is not {place.wrist}"
@@ -221,10 +221,10 @@ class Check:
         if not (self.asked or limbs.utilisation):
             return None
         used = np.array([limbs.utilisation.get(limb, 0.0) for limb in self.limbs])
-        allowed = self.again.allowed(carried)
+        allowed = self.again.allowed(arrays)
         for h in self.asked:
-            wrench, error = carried.wrenches[h], float(allowed[h])
-            tensions = carried.tensions[COUNT * h : COUNT * (h + 1)]
+            wrench, error = arrays.wrenches[h], float(allowed[h])
+            tensions = arrays.tensions[COUNT * h : COUNT * (h + 1)]
             check_asked(found, self.question, places[h], wrench, tensions, error)
             used[h] = max(used[h], force_use(found, self.question, places[h], wrench, error))
         return used

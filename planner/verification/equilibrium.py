@@ -18,9 +18,19 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import FINGERS, HandModel, SettledHand
-from planner.prepare import KEPT, NONE, NOTHING, TOUCHING, Places, Same, Stacked, joined, stacked
+from planner.prepare import (
+    KEPT,
+    NONE,
+    NOTHING,
+    TOUCHING,
+    HandBatch,
+    IdentityKey,
+    TileIndex,
+    batch_of,
+    concatenated,
+)
 
-__all__ = ["JOINTS", "SIDES", "Equilibrium", "Tendons", "equilibrium", "tendons_of"]
+__all__ = ["JOINTS", "SIDES", "Equilibrium", "TendonEffects", "equilibrium", "tendons_of"]
 
 JOINTS: Final = len(PHALANGES)
 
@@ -70,9 +80,9 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
     numpy.linalg.LinAlgError
         If contacts do not hold the joints that are free.
     """
-    known = stacked(hands)
+    known = batch_of(hands)
     places = known.places
-    tendons = tendons_of(places, Same(hands[0].hand))
+    tendons = tendons_of(places, IdentityKey(hands[0].hand))
     contacts = known.touch.contacts[places.phalanges]
     closing = np.array([hand.closing_tension for hand in hands])
     loads, left = _solved(known, contacts, tendons, closing.repeat(len(FINGERS))[:, None])
@@ -103,7 +113,7 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
     return Equilibrium(rows, owners, shear, planar[:, 1], drawn, stops, fingers, joints)
 
 
-class Tendons(NamedTuple):
+class TendonEffects(NamedTuple):
     """What the fingers' tendons do at their joints and tiles, all of which touch.
 
     Attributes
@@ -143,7 +153,7 @@ class Tendons(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def tendons_of(places: Places, key: Same) -> Tendons:
+def tendons_of(places: TileIndex, key: IdentityKey) -> TendonEffects:
     """Return what the tendons of hands do; ``key``: the `HandModel` that all of them are."""
     (hand,) = key.each
     assert isinstance(hand, HandModel)
@@ -165,7 +175,7 @@ def tendons_of(places: Places, key: Same) -> Tendons:
     strands[places.base_fingers] += 1.0
     drawn = np.zeros((2, len(local)))
     drawn[1] = travel * drive.pulley_ratio * strands
-    return Tendons(
+    return TendonEffects(
         per_newton=per_newton,
         at_closing=at_closing,
         stiffness=np.array(model.joint_stiffness),
@@ -181,7 +191,7 @@ def tendons_of(places: Places, key: Same) -> Tendons:
 
 
 def _solved(
-    known: Stacked, contacts: Indices, tendons: Tendons, closing: Array
+    known: HandBatch, contacts: Indices, tendons: TendonEffects, closing: Array
 ) -> tuple[Array, Array]:
     """Return what A f_c = b gives.
 
@@ -194,7 +204,7 @@ def _solved(
         out where a phalanx bears nothing.
     """
     model = known.hands[0].hand.finger
-    alongs = joined([hand.postures.alongs for hand in known.hands])
+    alongs = concatenated([hand.postures.alongs for hand in known.hands])
     u = np.exp(1j * known.angles)
     steps = model.joint_spacing * u
     joints = steps.cumsum(axis=1) - steps

@@ -22,7 +22,7 @@ from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, TendonState, share_load
 from planner.result import WristPlan
 
-__all__ = ["FingerCheck", "Said", "check_finger", "check_palm", "moved"]
+__all__ = ["ClaimedFinger", "FingerCheck", "check_finger", "check_palm", "moved"]
 
 PLACE: Final = 1e-9
 """How far a contact may be from its phalanx, or from the rock [m]."""
@@ -37,7 +37,7 @@ ROUND: Final = 1e-11
 """How far from a circle or a line rock may be that counts as one [m]."""
 
 
-class Said(NamedTuple):
+class ClaimedFinger(NamedTuple):
     """What a plan says of one finger.
 
     Attributes
@@ -92,7 +92,7 @@ def moved(place: Array, wrist: WristPlan) -> Array:
 def check_finger(
     hand: SettledHand,
     index: int,
-    planned: Said,
+    planned: ClaimedFinger,
     wrist: WristPlan,
     preload: float,
     at_rest: Array,
@@ -105,7 +105,7 @@ def check_finger(
         At rest.
     index : int
         Of the finger.
-    planned : Said
+    planned : ClaimedFinger
     wrist : WristPlan
     preload : float
         Of its tendon at rest [N].

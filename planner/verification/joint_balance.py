@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.hand import HandModel
-from planner.prepare import KEPT, NONE, NOTHING, Same, Stacked
+from planner.prepare import KEPT, NONE, NOTHING, HandBatch, IdentityKey
 from planner.verification.equilibrium import JOINTS, SIDES, tendons_of
 
 __all__ = ["LEVER", "JointBalance"]
@@ -46,7 +46,7 @@ class JointBalance:
 
     Parameters
     ----------
-    known : Stacked
+    known : HandBatch
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ class JointBalance:
         Joints that stand at a limit, of fingers that touch rock.
     """
 
-    def __init__(self, known: Stacked) -> None:
+    def __init__(self, known: HandBatch) -> None:
         hands, places, touch = known.hands, known.places, known.touch
-        self._places, body = places, Same(hands[0].hand)
+        self._places, body = places, IdentityKey(hands[0].hand)
         self._tendons = tendons = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
         self._shear = tendons.engaged * closing.take(places.hand) * touch.touches
@@ -129,7 +129,7 @@ class _Planes(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def _planes_of(key: Same, rotations: tuple[float, ...]) -> _Planes:
+def _planes_of(key: IdentityKey, rotations: tuple[float, ...]) -> _Planes:
     """Return the planes of hands turned so far; ``key``: the `HandModel` that all of them are."""
     (hand,) = key.each
     assert isinstance(hand, HandModel)

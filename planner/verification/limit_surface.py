@@ -16,7 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.tile import Surface
-from planner.prepare import KEPT_NAMES, Same
+from planner.prepare import KEPT_NAMES, IdentityKey
 
 __all__ = ["LimitCurves"]
 
@@ -37,7 +37,7 @@ class LimitCurves:
 
     def __init__(self, surfaces: Sequence[Surface], of_tile: Indices) -> None:
         self._numbers = _Numbers(
-            *[numbers.take(of_tile, -1) for numbers in _numbers(Same(*surfaces))]
+            *[numbers.take(of_tile, -1) for numbers in _numbers(IdentityKey(*surfaces))]
         )
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
@@ -86,7 +86,7 @@ class _Numbers(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _numbers(key: Same) -> _Numbers:
+def _numbers(key: IdentityKey) -> _Numbers:
     surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
     flat, loss = np.zeros((2, 2, len(surfaces)))
     for i, surface in enumerate(surfaces):

@@ -9,27 +9,31 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import CONTACTS, Stacked
-from planner.result import Carried
+from planner.prepare import CONTACTS, HandBatch
+from planner.result import PlanArrays
 
 __all__ = ["check_nails", "nail_angles"]
 
 COUNT: Final = len(FINGERS)
 
 
-def nail_angles(known: Stacked, carried: Carried) -> Array:
+def nail_angles(known: HandBatch, arrays: PlanArrays) -> Array:
     """Return how far each finger's nail has turned, by where it hooks, shape (F,) [rad]."""
     retraction = known.hands[0].hand.nail.retraction
-    angles = np.full(len(carried.tensions), retraction)
+    angles = np.full(len(arrays.tensions), retraction)
     for t in known.places.nails.tolist():
         if known.touch.contacts[t] == CONTACTS[NAIL]:
-            x, z = _arm(known, carried, t)
+            x, z = _arm(known, arrays, t)
             angles[known.places.finger[t]] = math.atan2(z, x)
     return angles
 
 
 def check_nails(
-    found: list[str], known: Stacked, limbs: tuple[str, ...], carried: Carried, allowed: Array
+    found: list[str],
+    known: HandBatch,
+    limbs: tuple[str, ...],
+    arrays: PlanArrays,
+    allowed: Array,
 ) -> Array:
     """Check all nails that hook; return the utilisation of each tile that is one, shape (T,).
 
@@ -37,9 +41,9 @@ def check_nails(
     ----------
     found : list of str
         What is wrong so far; more is appended.
-    known : Stacked
+    known : HandBatch
     limbs : tuple of str
-    carried : Carried
+    arrays : PlanArrays
     allowed : ndarray, shape (H,)
         Error of a load of each hand [N].
     """
@@ -47,22 +51,22 @@ def check_nails(
     for t in known.places.nails.tolist():
         if known.touch.contacts[t] == CONTACTS[NAIL]:
             h = int(known.places.hand[t])
-            used[t] = _check_nail(found, known, limbs[h], carried, t, float(allowed[h]))
+            used[t] = _check_nail(found, known, limbs[h], arrays, t, float(allowed[h]))
     return used
 
 
-def _arm(known: Stacked, carried: Carried, t: int) -> tuple[float, float]:
+def _arm(known: HandBatch, arrays: PlanArrays, t: int) -> tuple[float, float]:
     """Return where a nail hooks from its pin on the straight finger, in (x, z) of that."""
     hand = known.hands[int(known.places.hand[t])]
     frame = hand.hand.frames(hand.grasp.outer_rotation)[int(known.places.finger[t]) % COUNT]
     model = hand.hand.finger
-    arm = carried.points[t] - frame.joint
+    arm = arrays.points[t] - frame.joint
     arm = arm - len(model.pulley_radii) * model.joint_spacing * frame.along
     return float(arm @ frame.along), float(arm[2])
 
 
 def _check_nail(
-    found: list[str], known: Stacked, limb: str, carried: Carried, t: int, allowed: float
+    found: list[str], known: HandBatch, limb: str, arrays: PlanArrays, t: int, allowed: float
 ) -> float:
     """Check one nail; return its utilisation."""
     finger = int(known.places.finger[t])
@@ -70,10 +74,10 @@ def _check_nail(
     name = f"{limb}: nail of {FINGERS[index]}"
     frame, nail = hand.hand.frames(hand.grasp.outer_rotation)[index], hand.hand.nail
     model, structure = hand.hand.finger, hand.hand.structure
-    x, z = _arm(known, carried, t)
-    force = carried.forces[t]
+    x, z = _arm(known, arrays, t)
+    force = arrays.forces[t]
     along, into = float(force @ frame.along), float(force[2])
-    local = float(carried.tensions[finger])
+    local = float(arrays.tensions[finger])
     if FINGERS[index].startswith("outer"):
         local *= 1.0 - model.friction
     # about the joints from the base outward, then about the nail's pin

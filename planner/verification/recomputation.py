@@ -19,8 +19,8 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS, HELD
-from planner.prepare import KEPT, Same, Stacked
-from planner.result import Carried
+from planner.prepare import KEPT, HandBatch, IdentityKey
+from planner.result import PlanArrays
 from planner.verification.arrays import (
     DRIVEN,
     LOAD,
@@ -35,7 +35,7 @@ from planner.verification.arrays import (
     uses_of,
 )
 from planner.verification.equilibrium import equilibrium
-from planner.verification.floating import Said, check_finger, check_palm
+from planner.verification.floating import ClaimedFinger, check_finger, check_palm
 from planner.verification.joint_balance import LEVER, JointBalance
 from planner.verification.nails import check_nails, nail_angles
 from planner.verification.sentences import Recomputed
@@ -64,7 +64,7 @@ PALM_SIGNS: Final = PALM_SIDES[::2]
 
 @lru_cache(maxsize=KEPT)
 def recomputing_of(
-    known: Stacked, limbs: tuple[str, ...], strength: float, preloads: Same
+    known: HandBatch, limbs: tuple[str, ...], strength: float, preloads: IdentityKey
 ) -> Recomputing:
     """Return what recomputes plans of hands, made once for the same hands; see `Recomputing`."""
     return Recomputing(known, limbs, strength, preloads)
@@ -75,23 +75,23 @@ class Recomputing:
 
     Parameters
     ----------
-    known : Stacked
+    known : HandBatch
     limbs : tuple of str
     strength : float
         What every tendon may hold [N].
-    preloads : Same
+    preloads : IdentityKey
         Tensions (4,) to which the motors of each hand have tightened its tendons if its wrist
         floats [N]; None for the closing tension.
     """
 
     def __init__(
-        self, known: Stacked, limbs: tuple[str, ...], strength: float, preloads: Same
+        self, known: HandBatch, limbs: tuple[str, ...], strength: float, preloads: IdentityKey
     ) -> None:
-        hands, places, body = known.hands, known.places, Same(known.hands[0].hand)
+        hands, places, body = known.hands, known.places, IdentityKey(known.hands[0].hand)
         self.known, self.limbs, self._body = known, limbs, known.hands[0].hand
         self._preloads: tuple[Array | None, ...] = preloads.each  # type: ignore[assignment]
         self._balance = JointBalance(known)
-        self._limits = limits_of(Same(*[hand.surface for hand in hands]), known)
+        self._limits = limits_of(IdentityKey(*[hand.surface for hand in hands]), known)
         self._arms = arms_of(known.points)
         self._palm_shares = PALM_SIGNS / known.palm_limits
         self._uses = uses = uses_of(places, body, strength)
@@ -101,14 +101,14 @@ class Recomputing:
         self._engaged = tuple([hand.palm.engaged for hand in hands])
         self._off = [h for h, engaged in enumerate(self._engaged) if not engaged]
 
-    def allowed(self, carried: Carried) -> Array:
+    def allowed(self, arrays: PlanArrays) -> Array:
         """Return the error that loads of each hand may have, shape (H,), at least `LOAD` [N]."""
         first = roles_of(self.known.places).first_component
-        largest = np.fmax.reduceat(np.abs(carried.loads).ravel(), first)
-        most = np.fmax(largest, np.abs(carried.palms).max(axis=1))
+        largest = np.fmax.reduceat(np.abs(arrays.loads).ravel(), first)
+        most = np.fmax(largest, np.abs(arrays.palms).max(axis=1))
         return np.asarray(LOAD * np.fmax(most, 1.0))
 
-    def of(self, found: list[str], carried: Carried, bears: Array | None) -> Recomputed:
+    def of(self, found: list[str], arrays: PlanArrays, bears: Array | None) -> Recomputed:
         """Return what a plan's numbers do to the hands.
 
         The tiles' loads are what the plan says, as long as these balance; see `near`.
@@ -117,22 +117,22 @@ class Recomputing:
         ----------
         found : list of str
             What is wrong so far; what is found on the way is appended.
-        carried : Carried
+        arrays : PlanArrays
         bears : ndarray, shape (H,), or None
             Utilisation of each hand by what its stance adds: joints, caps.
         """
-        known, balance, f = self.known, self._balance, carried.tensions
-        places, loads, tiles = known.places, carried.loads, len(carried.loads)
-        shear, normal, floats = balance.shears(f), loads[:, 1], self._floats(carried)
-        same = carried.points is known.points
-        each = (self._arms if same else arms_of(carried.points)) @ carried.forces[:, :, None]
+        known, balance, f = self.known, self._balance, arrays.tensions
+        places, loads, tiles = known.places, arrays.loads, len(arrays.loads)
+        shear, normal, floats = balance.shears(f), loads[:, 1], self._floats(arrays)
+        same = arrays.points is known.points
+        each = (self._arms if same else arms_of(arrays.points)) @ arrays.forces[:, :, None]
         each = each[:, :, 0]
         left = balance.left(f, each)
         stops = balance.stops(left)
         drawn = np.add.reduceat(shear, places.first_of_finger)
         again = loads
         if floats:
-            shear, normal, stops, drawn = self._floated(found, carried, floats)
+            shear, normal, stops, drawn = self._floated(found, arrays, floats)
             again = np.column_stack((shear, normal, loads[:, 2]))
         uses = self._uses.per_newton * f
         uses += self._at_zero
@@ -144,7 +144,7 @@ class Recomputing:
                 shear, places.first_of_finger
             )
 
-        limits, told = self._limits, carried.half_planes
+        limits, told = self._limits, arrays.half_planes
         planes = limits.planes if told == limits.pieces else planes_of(told, known)
         used = most(planes @ again[:, :, None], axis=(1, 2))
         curve = limits.curves.excess(again[:, 0], again[:, 1], again[:, 2], UTILISATION)
@@ -152,18 +152,18 @@ class Recomputing:
             # beyond its half-planes a tile may be outside the surface, too
             curve[(used > 1.0) | known.touch.away] = -np.inf
         if len(places.nails):
-            used += check_nails(found, known, self.limbs, carried, self.allowed(carried))
-            turned = nail_angles(known, carried) - self._body.nail.retraction
+            used += check_nails(found, known, self.limbs, arrays, self.allowed(arrays))
+            turned = nail_angles(known, arrays) - self._body.nail.retraction
             uses[WINCH] += self._uses.per_nail * turned
         used = np.maximum(used, 0.0)
 
         wrenches = np.add.reduceat(each[:tiles], places.first)
         wrenches += each[tiles:]
-        wrenches[:, 3:] += carried.palm_moments
-        force = carried.wrenches[:, :3]
+        wrenches[:, 3:] += arrays.palm_moments
+        force = arrays.wrenches[:, :3]
         by_rows = most(HELD @ force.T)
         held = np.minimum(force, PULLING)
-        palms = carried.palms[:, ::2] * self._palm_shares
+        palms = arrays.palms[:, ::2] * self._palm_shares
         pressed = most(palms, axis=1)
         # of all four tendons, motors, fingers and tips
         whole = most(uses[DRIVEN:].reshape(-1, len(palms), COUNT), axis=(0, 2))
@@ -174,15 +174,15 @@ class Recomputing:
         return Recomputed(
             limbs=self.limbs,
             known=known,
-            carried=carried,
+            arrays=arrays,
             shear=shear,
             normal=normal,
             left=left,
             stops=stops,
             stop_fingers=balance.stop_fingers,
             curves=curve,
-            forces=carried.forces[:tiles] - (loads[:, None] @ carried.axes)[:, 0],
-            wrenches=wrenches - carried.wrenches,
+            forces=arrays.forces[:tiles] - (loads[:, None] @ arrays.axes)[:, 0],
+            wrenches=wrenches - arrays.wrenches,
             held=np.sqrt(np.add.reduce(held * held, axis=1)),
             by_rows=by_rows,
             drives=uses[:DRIVEN],
@@ -197,9 +197,9 @@ class Recomputing:
         By the Euclidean norm of all, which none of them exceeds. Numbers that are not finite are
         not near, nor are those of a plan that has tiles elsewhere than the hands.
         """
-        carried, touch, normal = again.carried, self.known.touch, again.normal
-        apart, left, palms = again.shear - carried.loads[:, 0], again.left, carried.palms
-        if self._floats(carried) or not self._at_home(carried):
+        arrays, touch, normal = again.arrays, self.known.touch, again.normal
+        apart, left, palms = again.shear - arrays.loads[:, 0], again.left, arrays.palms
+        if self._floats(arrays) or not self._at_home(arrays):
             return False
         if len(self.known.places.nails):
             apart[self.known.places.nails] = 0.0
@@ -212,15 +212,15 @@ class Recomputing:
                 normal.take(self.known.places.bases),
                 again.forces.ravel(),
                 again.wrenches.ravel(),
-                (again.drives - carried.drives).ravel(),
-                again.tiles - carried.tile_utilisations,
-                again.palms - carried.palm_utilisations,
-                again.hands - carried.utilisations,
+                (again.drives - arrays.drives).ravel(),
+                again.tiles - arrays.tile_utilisations,
+                again.palms - arrays.palm_utilisations,
+                again.hands - arrays.utilisations,
             )
         )
         return bool(
             math.sqrt(off.dot(off)) <= NEAR
-            and least(carried.tensions) >= 0.0
+            and least(arrays.tensions) >= 0.0
             and least(again.shear) >= -LOAD
             and most(again.curves) <= LOAD
             and least(again.by_rows - again.held) >= -LOAD
@@ -229,19 +229,19 @@ class Recomputing:
             and not (self._off and palms[self._off].any())
             and (
                 len(touch.touching) == len(touch.contacts)
-                or (least(normal * touch.framed) >= -LOAD and not carried.forces[touch.idle].any())
+                or (least(normal * touch.framed) >= -LOAD and not arrays.forces[touch.idle].any())
             )
             and (not len(again.stops) or least(again.stops) >= -STOP)
-            and carried.tiles == self._tiles
-            and carried.engaged == self._engaged
+            and arrays.tiles == self._tiles
+            and arrays.engaged == self._engaged
         )
 
     def solved(self, again: Recomputed) -> Recomputed:
         """Return the numbers with the loads that fixed hands' tensions give by Eq. 6."""
-        carried = again.carried
-        if self._floats(carried):
+        arrays = again.arrays
+        if self._floats(arrays):
             return again
-        shear, normal, _ = self._solved(carried.tensions)
+        shear, normal, _ = self._solved(arrays.tensions)
         return again._replace(shear=shear, normal=normal)
 
     def _solved(self, tensions: Array) -> tuple[Array, Array, Array]:
@@ -254,13 +254,13 @@ class Recomputing:
 
     # Floating wrists ----------------------------------------------------------------------------
 
-    def _at_home(self, carried: Carried) -> bool:
+    def _at_home(self, arrays: PlanArrays) -> bool:
         """Whether tiles and palms are where the settled hands have them, and turned so."""
-        pairs = (carried.points, self.known.points), (carried.axes, self.known.axes)
+        pairs = (arrays.points, self.known.points), (arrays.axes, self.known.axes)
         return all(told is own or np.array_equal(told, own) for told, own in pairs)
 
-    def _floats(self, carried: Carried) -> list[int]:
-        return [h for h, wrist in enumerate(carried.wrists) if wrist is not None]
+    def _floats(self, arrays: PlanArrays) -> list[int]:
+        return [h for h, wrist in enumerate(arrays.wrists) if wrist is not None]
 
     def _wound(self, tensions: Array, floats: Sequence[int]) -> Array:
         """Return to which tensions winches have drawn the tendons: of floating hands, preloads."""
@@ -272,24 +272,24 @@ class Recomputing:
         return wound
 
     def _floated(
-        self, found: list[str], carried: Carried, floats: Sequence[int]
+        self, found: list[str], arrays: PlanArrays, floats: Sequence[int]
     ) -> tuple[Array, Array, Array, Array]:
         """Return shears, normals and stops of hands of which some float, and sums of shears.
 
         The motors of those stand still where they have tightened their tendons; the sums are of
         these tensions.
         """
-        wound = self._wound(carried.tensions, floats)
+        wound = self._wound(arrays.tensions, floats)
         shear, normal, stops = self._solved(wound)
         drawn = np.add.reduceat(shear, self.known.places.first_of_finger)
         for h in floats:
-            self._float(found, carried, h, (wound, shear, normal, stops))
+            self._float(found, arrays, h, (wound, shear, normal, stops))
         return shear, normal, stops, drawn
 
     def _float(
         self,
         found: list[str],
-        carried: Carried,
+        arrays: PlanArrays,
         h: int,
         loads: tuple[Array, Array, Array, Array],
     ) -> None:
@@ -297,18 +297,18 @@ class Recomputing:
 
         ``loads``: the preloads, shears, normals and what presses on stops.
         """
-        hand, limb, wrist = self.known.hands[h], self.limbs[h], carried.wrists[h]
+        hand, limb, wrist = self.known.hands[h], self.limbs[h], arrays.wrists[h]
         assert wrist is not None
         (preloads, shear, normal, stops), eq = loads, equilibrium(self.known.hands)
-        allowed = float(self.allowed(carried)[h])
+        allowed = float(self.allowed(arrays)[h])
         for i, name in enumerate(FINGERS):
             finger = COUNT * h + i
             own = np.flatnonzero(self.known.places.finger == finger)
-            said = Said(
-                carried.loads[own],
-                carried.points[own],
-                carried.axes[own],
-                float(carried.tensions[finger]),
+            said = ClaimedFinger(
+                arrays.loads[own],
+                arrays.points[own],
+                arrays.axes[own],
+                float(arrays.tensions[finger]),
             )
             check = check_finger(hand, i, said, wrist, float(preloads[finger]), shear[own])
             shear[own], normal[own] = check.shear, check.normal
@@ -318,4 +318,4 @@ class Recomputing:
             off = float(np.abs(check.lateral - said.loads[:, 2]).max())
             if not max(off, abs(check.tension - said.tension)) <= allowed:
                 found.append(f"{limb}: {name} does not hold what the plan says")
-        found.extend(check_palm(hand, limb, carried.palms[h], wrist, allowed))
+        found.extend(check_palm(hand, limb, arrays.palms[h], wrist, allowed))

@@ -9,13 +9,13 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import Stacked
-from planner.result import Carried
+from planner.prepare import HandBatch
+from planner.result import PlanArrays
 
 __all__ = ["DRIVES", "Recomputed"]
 
 DRIVES: Final = ("motor torque", "motor current", "winch angle")
-"""Rows of `Carried.drives`."""
+"""Rows of `PlanArrays.drives`."""
 
 
 class Recomputed(NamedTuple):
@@ -24,8 +24,8 @@ class Recomputed(NamedTuple):
     Attributes
     ----------
     limbs : tuple of str
-    known : Stacked
-    carried : Carried
+    known : HandBatch
+    arrays : PlanArrays
         The plan's numbers.
     shear, normal : ndarray, shape (T,)
         Of each tile [N]; of nails zero.
@@ -49,8 +49,8 @@ class Recomputed(NamedTuple):
     """
 
     limbs: tuple[str, ...]
-    known: Stacked
-    carried: Carried
+    known: HandBatch
+    arrays: PlanArrays
     shear: Array
     normal: Array
     left: Array
@@ -76,16 +76,20 @@ class Recomputed(NamedTuple):
     @property
     def told(self) -> Array:
         """What the plan says of them."""
-        carried = self.carried
-        used = carried.tile_utilisations, carried.palm_utilisations, carried.utilisations
-        return np.concatenate((carried.drives.ravel(), *used))
+        arrays = self.arrays
+        used = (
+            arrays.tile_utilisations,
+            arrays.palm_utilisations,
+            arrays.utilisations,
+        )
+        return np.concatenate((arrays.drives.ravel(), *used))
 
     @property
     def off(self) -> Array:
         """By how much loads are off, as of `loads_off` [N]."""
-        carried, touch = self.carried, self.known.touch
-        f, palm = carried.tensions, carried.palms
-        apart = np.abs(carried.loads[:, :2].T - (self.shear, self.normal))
+        arrays, touch = self.arrays, self.known.touch
+        f, palm = arrays.tensions, arrays.palms
+        apart = np.abs(arrays.loads[:, :2].T - (self.shear, self.normal))
         apart[:, self.known.places.nails] = 0.0
         return np.concatenate(
             (
@@ -121,7 +125,7 @@ class Recomputed(NamedTuple):
     # Sentences ----------------------------------------------------------------------------------
 
     def tension(self, i: int) -> str:
-        return f"{self.of_finger('tension', i)} is {self.carried.tensions[i]:g} N"
+        return f"{self.of_finger('tension', i)} is {self.arrays.tensions[i]:g} N"
 
     def load(self, t: int) -> str:
         shear, normal = self.shear[t], self.normal[t]
@@ -140,7 +144,7 @@ class Recomputed(NamedTuple):
         return f"{self.tile(t)} is beyond its limit curve"
 
     def palm(self, h: int) -> str:
-        force = self.carried.palms[h].tolist()
+        force = self.arrays.palms[h].tolist()
         return f"{self.limbs[h]}: the palm cannot exert {force} N"
 
     def wrench(self, i: int) -> str:
@@ -151,7 +155,7 @@ class Recomputed(NamedTuple):
 
     def slack(self, finger: int) -> str:
         hand = self.known.hands[finger // len(FINGERS)]
-        slack = hand.closing_tension - self.carried.tensions[finger]
+        slack = hand.closing_tension - self.arrays.tensions[finger]
         return f"{self.of_finger('tendon', finger)} would stick, slackened {slack:.3g} N"
 
     def stop(self, i: int) -> str:
@@ -174,29 +178,29 @@ class Recomputed(NamedTuple):
 
     def idle(self) -> Iterator[str]:
         """Yield what carries a load that cannot."""
-        carried = self.carried
+        arrays = self.arrays
         for t in self.known.touch.idle.tolist():
-            if carried.forces[t].any():
+            if arrays.forces[t].any():
                 yield f"{self.tile(t)} carries a load but touches nothing"
         for h, hand in enumerate(self.known.hands):
-            if carried.palms[h, 1] != 0.0:
+            if arrays.palms[h, 1] != 0.0:
                 yield self.palm(h)
-            if not hand.palm.engaged and carried.palms[h].any():
+            if not hand.palm.engaged and arrays.palms[h].any():
                 yield f"{self.limbs[h]}: the palm carries a load but touches nothing"
 
     def contacts_told(self, h: int) -> Iterator[str]:
         """Yield what the plan says of the contacts of a hand that is not so."""
-        hand, carried = self.known.hands[h], self.carried
+        hand, arrays = self.known.hands[h], self.arrays
         first = int(self.known.places.first[h])
-        for t, (tile, said) in enumerate(zip(hand.tiles, carried.tiles[h], strict=True)):
+        for t, (tile, said) in enumerate(zip(hand.tiles, arrays.tiles[h], strict=True)):
             if tile != said:
                 name = self.tile(first + t)
-                if said.contact == "none" and carried.forces[first + t].any():
+                if said.contact == "none" and arrays.forces[first + t].any():
                     yield f"{name} carries a load but touches nothing"
                 yield f"{name} touches with {tile.contact}; the plan has {' '.join(said)}"
-        true, told = list(hand.palm.engaged), list(carried.engaged[h])
+        true, told = list(hand.palm.engaged), list(arrays.engaged[h])
         if true != told:
-            if not told and carried.palms[h].any():
+            if not told and arrays.palms[h].any():
                 yield f"{self.limbs[h]}: the palm carries a load but touches nothing"
             yield f"{self.limbs[h]}: the palm touches with tiles {true}, not {told}"
 

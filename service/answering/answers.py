@@ -110,9 +110,9 @@ def wrench_space_reply(
             )
         ],
         closing=[
-            replies.Closing(
+            replies.ClosingSequence(
                 closing.finger,
-                [replies.Stage(*stage) for stage in closing.stages],
+                [replies.ClosingStage(*stage) for stage in closing.stages],
                 closing.in_order,
             )
             for closing in closing_sequence(settled)

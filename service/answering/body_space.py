@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from planner.capability import COMPONENTS, BodySpace, End, Section
+from planner.capability import COMPONENTS, BodySection, BodySpace, End
 from planner.result import LimitName
 from service import replies
 from service.answering.answers import limit_reply, vector
@@ -35,7 +35,7 @@ class Explored(NamedTuple):
     """A body space, the plane of it that was asked for, and the reply."""
 
     space: BodySpace
-    section: Section
+    section: BodySection
     reply: BodySpaceReply
 
 
@@ -130,7 +130,7 @@ def _capability(more: End | None, pure: End | None, extent: End | None) -> repli
     )
 
 
-def _section(section: Section) -> replies.BodySection:
+def _section(section: BodySection) -> replies.BodySection:
     polygon = section.polygon
     return replies.BodySection(
         axes=list(section.axes),

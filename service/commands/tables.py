@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from planner.explanation import barrier_words
+from planner.explanation import constraint_words
 from planner.result import LimitName as PlannedLimit
 from service.replies import (
     AXES,
@@ -171,7 +171,7 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
     if proof.irreducible:
         title = "these leave no balance, each needed for that; others may be in the way, too"
         _show(title, _barrier_table(proof.irreducible), out)
-        words = {name.limit: barrier_words(_planned(name)) for name in proof.irreducible}
+        words = {name.limit: constraint_words(_planned(name)) for name in proof.irreducible}
         for limit, said in words.items():
             out.print(f"{limit}: {said}", markup=False)
         if proof.sufficient is not None:

@@ -18,7 +18,8 @@ __all__ = [
     "BodySection",
     "BodySpaceReply",
     "Certificate",
-    "Closing",
+    "ClosingSequence",
+    "ClosingStage",
     "Contact",
     "ErrorDetail",
     "ErrorReply",
@@ -34,7 +35,6 @@ __all__ = [
     "Row",
     "Seating",
     "Solver",
-    "Stage",
     "TensionLimit",
     "TensionPath",
     "Tile",
@@ -338,7 +338,7 @@ class Contact(Struct, kw_only=True):
     lateral_axis: Vector
 
 
-class Stage(Struct):
+class ClosingStage(Struct):
     """One part of a closing finger: from which tension it moves, at which it is at rest [N]."""
 
     part: str
@@ -346,14 +346,14 @@ class Stage(Struct):
     ends: float
 
 
-class Closing(Struct):
+class ClosingSequence(Struct):
     """How a finger has closed: its nail, its joints from the base outward, its tiles.
 
     ``in_order``: whether nail and joints move one after the other.
     """
 
     finger: str
-    stages: list[Stage]
+    stages: list[ClosingStage]
     in_order: bool
 
 
@@ -399,7 +399,7 @@ class WrenchSpaceReply(Reply, kw_only=True):
     wrist: Wrist
     seating: Seating
     contacts: list[Contact]
-    closing: list[Closing]
+    closing: list[ClosingSequence]
     tension_limits: list[TensionLimit]
     origin: Vector
     generators: list[Generator]

@@ -13,7 +13,7 @@ from service.replies import ErrorDetail, ErrorReply
 from service.requests import Identifier
 from service.wire.checks import check
 from service.wire.errors import MalformedError
-from service.wire.validation_errors import blame, leaves_open
+from service.wire.validation_errors import leaves_open, validation_error
 
 __all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error", "identifier"]
 
@@ -104,7 +104,7 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             with suppress(RecursionError):
                 check(_plain(payload, form))
         document = _plain(payload, form) if leaves_open(error) else None
-        field, message = blame(
+        field, message = validation_error(
             error, kind, document, lambda part: form.decode(form.encode(part), kind)
         )
         raise InvalidInputError(message, field=field) from None

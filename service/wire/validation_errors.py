@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 from msgspec import inspect
 
-__all__ = ["blame", "leaves_open"]
+__all__ = ["leaves_open", "validation_error"]
 
 WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
 ANY_KEY: Final = "[...]"
@@ -38,7 +38,7 @@ LONGEST: Final = 400
 """Characters of a message: it may quote the request."""
 
 
-def blame(
+def validation_error(
     error: msgspec.ValidationError, kind: type, document: Any, decode: Decoder
 ) -> tuple[str | None, str]:
     """Return the field's dotted path, or None for the whole message, and one line about it.

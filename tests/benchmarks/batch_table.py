@@ -60,11 +60,11 @@ def batches(rounds: int, tick: Callable[[], object]) -> Race:
         kept = [[request(i, twin=1) for i in numbers(k)] for k in range(rounds + WARM)]
 
         def one_core(number: int) -> None:
-            begin, beside.begin = beside.begin, lambda: None
+            begin, beside.begin_overlap = beside.begin_overlap, lambda: None
             try:
                 alone.plan_many(kept[number])
             finally:
-                beside.begin = begin
+                beside.begin_overlap = begin
 
         ways[ONE_CORE, 1] = one_core
         return race(ways, rounds, tick)

@@ -19,7 +19,7 @@ from race import TURN, WARM, Way, race
 from test_many_hands import crawler_in, question as crawler_question
 
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import Hands, Sets, gather
+from planner.prepare import HandSets, Sets, assemble
 from planner.programs import program
 from planner.question import Question
 from planner.solving import plan
@@ -131,8 +131,8 @@ def _sets(question: Question) -> Sets:
     return hands.sets(hands.at_rest(hands.idle))
 
 
-def _gathered(question: Question) -> Hands:
-    return gather(question, None, question.needed_wrench())[1]
+def _gathered(question: Question) -> HandSets:
+    return assemble(question, None, question.needed_wrench())[1]
 
 
 def _tiles(sizes: Sequence[int], rounds: int, tick: Callable[[], object]) -> Curve:

@@ -12,7 +12,7 @@ from race import TURN, WARM, race
 from results import Table, lines
 from whole_blocks import WholeBlocks
 
-from planner.prepare import gather
+from planner.prepare import assemble
 from planner.programs import WRENCH_UNIT, program
 from planner.result import SetPoints
 from planner.solving import KnownStance
@@ -35,7 +35,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     way *= STEP / np.linalg.norm(way) * WRENCH_UNIT / WRENCH_UNIT[0]
     places = [number if number < rounds else 0 for number in range(rounds + WARM)]
     wrenches = [needed + place * way for place in places]
-    _, hands = gather(question, None, needed)
+    _, hands = assemble(question, None, needed)
     sets = hands.sets(hands.at_rest(hands.idle))
     data, goals = scaled(sets), [wrench / WRENCH_UNIT for wrench in wrenches]
     raw = Clarabel(

@@ -16,7 +16,7 @@ from results import Line, Table, lines, span
 from whole_blocks import WholeBlocks
 
 from planner.deadline import DeadlineError
-from planner.prepare import Hands, Sets, gather
+from planner.prepare import HandSets, Sets, assemble
 from planner.programs import program
 from planner.question import Question
 from planner.solving import plan
@@ -43,7 +43,7 @@ class Known(NamedTuple):
     """All that is known of a measured stance before the clock starts."""
 
     question: Question
-    hands: Hands
+    hands: HandSets
     sets: Sets
     utilisation: float
 
@@ -51,7 +51,7 @@ class Known(NamedTuple):
 def known(number: int) -> Known:
     """A measured stance, its hands' sets and its utilisation."""
     asked = question_of(number)
-    _, hands = gather(asked, None, asked.needed_wrench())
+    _, hands = assemble(asked, None, asked.needed_wrench())
     sets = hands.sets(hands.at_rest(hands.idle))
     return Known(asked, hands, sets, program.unique(sets.data).value)
 
@@ -129,8 +129,8 @@ def _plans(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
     extras = ("load_factor", "prices")
     wanting = [question_of(number, twin=4, want=extras) for number in range(count)]
 
-    def sets(asked: Question) -> Hands:
-        return gather(asked, None, asked.needed_wrench())[1]
+    def sets(asked: Question) -> HandSets:
+        return assemble(asked, None, asked.needed_wrench())[1]
 
     timed = race(
         {

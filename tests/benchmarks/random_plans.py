@@ -18,7 +18,7 @@ from plain_programs import Clarabel, Conic, scaled, si, unique
 from results import Line, Table
 from stances import random_question
 
-from planner.prepare import Sets, gather
+from planner.prepare import Sets, assemble
 from planner.programs import LOAD_UNIT, program
 from planner.solving import plan
 
@@ -80,7 +80,7 @@ def answer(seed: int) -> Answer:
     tensions = np.array(
         [[finger.tendon_tension for finger in hand.fingers] for hand in found.hands or ()]
     )
-    _, hands = gather(question, None, question.needed_wrench())
+    _, hands = assemble(question, None, question.needed_wrench())
     sets = hands.sets(hands.at_rest(hands.idle))
     settings = program.Unique.settings[0]
     tolerances = {name: value for name, value in settings.items() if name.startswith("tol_")}

@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 from stances import SANDPAPER, ask, on_wall
 
 from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits
-from hand_models.finger import Closing, close_all
+from hand_models.finger import OpenFinger, close_all
 from hand_models.finger.contact_states import close
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import Placement
 from hand_models.tendon import share_load
 from hand_models.wrench_spaces import space as wrench_space
-from planner.prepare import gather
+from planner.prepare import assemble
 
 HOLDS = {
     "pinch on 300 mm": (Cylinder(0.3), math.pi),
@@ -125,7 +125,7 @@ def test_data_of_four_hands(benchmark, known):
             stance.robot.hand.settled.clear()
 
     def data():
-        _, hands = gather(question, None, wrench)
+        _, hands = assemble(question, None, wrench)
         return hands.sets(hands.at_rest(hands.idle)).data
 
     found = benchmark.pedantic(data, setup=forget, rounds=100)
@@ -139,7 +139,7 @@ def giving_way(hold, count):
     while len(found) < count:
         axes = random_axes(rng, 0.3)
         origin = np.array([*rng.uniform(-0.05, 0.0, 2), -rng.uniform(0.005, 0.02)])
-        closing = Closing(hold.section(origin, axes[:, 0], axes[:, 2]), SANDPAPER, 37.0)
+        closing = OpenFinger(hold.section(origin, axes[:, 0], axes[:, 2]), SANDPAPER, 37.0)
         closed = close(HAND.finger, *closing)
         if closed is not None and any(contact.stop for contact in closed.finger.contacts):
             found.append(closing)

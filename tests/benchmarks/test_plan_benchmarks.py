@@ -8,9 +8,9 @@ import pytest
 from stances import PLACES, ask, on_wall, program_data
 
 from hand_models.rock import Cylinder
-from planner.prepare import gather, stacked
+from planner.prepare import assemble, batch_of
 from planner.programs import program
-from planner.result import Reader
+from planner.result import LoadRecovery
 from planner.solving import plan
 from planner.solving.dual_bounds import unique_bound
 from planner.verification import Check
@@ -91,14 +91,14 @@ def solved_stance():
     """A question of four hands, its settled hands, sets and data, and the loads of its plan."""
     question = question_of()
     wrench = question.needed_wrench()
-    settled, hands = gather(question, None, wrench)
+    settled, hands = assemble(question, None, wrench)
     spaces, data = hands.sets(hands.at_rest(hands.idle))
     return question, settled, spaces, data, program.unique(data), wrench
 
 
 def forget():
     """Let go of what is kept of settled hands."""
-    stacked.cache_clear()
+    batch_of.cache_clear()
     equilibrium.cache_clear()
 
 
@@ -108,7 +108,7 @@ def test_reading_and_checking_hands_that_are_new(benchmark):
 
     def after():
         forget()
-        carried, _, effort = Reader(settled, spaces).read(outcome.loads)
+        carried, _, effort = LoadRecovery(settled, spaces).read(outcome.loads)
         used = float(carried.utilisations.max())
         return Check(question, settled).problems(carried, used, wrench, effort)
 
@@ -118,7 +118,7 @@ def test_reading_and_checking_hands_that_are_new(benchmark):
 @pytest.mark.benchmark(group="after the solver, four hands")
 def test_reading_and_checking_hands_that_are_known(benchmark):
     question, settled, spaces, _, outcome, wrench = solved_stance()
-    reader, check = Reader(settled, spaces), Check(question, settled)
+    reader, check = LoadRecovery(settled, spaces), Check(question, settled)
 
     def after():
         carried, _, effort = reader.read(outcome.loads)
