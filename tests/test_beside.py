@@ -13,7 +13,7 @@ from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
 from planner.deadline import Overlap, overlap as beside
-from planner.programs import program
+from planner.programs import solvers
 from planner.solving import KnownStance, solve
 
 
@@ -23,13 +23,13 @@ def me() -> str:
 
 def test_a_solver_that_runs_has_the_work_done_by_another_thread():
     data = program_data(ask(on_wall()))
-    program.unique(data)
+    solvers.unique(data)
     with Overlap(me) as work:
         assert work._begun is None
-        program.unique(data)
+        solvers.unique(data)
         begun = work._begun
         # the first solver has taken it
-        program.unique(data)
+        solvers.unique(data)
         assert work._begun is begun
     assert begun.result() == work.result() != me()
 

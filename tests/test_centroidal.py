@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.programs import WRENCH_UNIT, HandData, StanceData, program
+from planner.programs import WRENCH_UNIT, HandData, StanceData, solvers
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="its wheels are for Linux")
 
@@ -80,7 +80,7 @@ def stance_of(case: dict) -> StanceData:
 
 
 def our_margin(case: dict) -> float | None:
-    outcome = program.margin(stance_of(case))
+    outcome = solvers.margin(stance_of(case))
     # the distance from the sum of the unit generators to the pyramid's faces, per newton of b0
     edges = pyramid(np.array(case["normals"][-1]), case["friction"])
     per_newton = np.linalg.norm(np.cross(edges.sum(axis=1), edges[:, 0]))

@@ -18,9 +18,9 @@ from patience import PATIENCE
 from stances import PLACES, ask, on_wall, program_data
 
 from planner.deadline import clock as deadline
-from planner.programs import compiled, cvxpy_internals, program, stance_data
-from planner.programs.program import SETTINGS
+from planner.programs import compiled, cvxpy_internals, program, solvers, stance_data
 from planner.programs.stance_data import Shape
+from planner.programs.stance_program import SETTINGS, StanceProgram
 from planner.question import Load
 from planner.solving import plan
 
@@ -82,8 +82,8 @@ def is_the_same(ours, theirs):
 
 def test_every_program_is_compared():
     kinds = {kind for kind in vars(program).values() if isinstance(kind, type)}
-    programs = {kind for kind in kinds if issubclass(kind, program._Program)}
-    assert {k.__name__ for k in programs} - {"_Program"} == {n.partition(",")[0] for n in KINDS}
+    programs = {kind for kind in kinds if issubclass(kind, StanceProgram)} - {StanceProgram}
+    assert {kind.__name__ for kind in programs} == {name.partition(",")[0] for name in KINDS}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -271,7 +271,7 @@ def test_a_map_that_gives_other_data_is_noticed(monkeypatch):
 def test_infeasible_comes_with_its_proof():
     """Farkas: ν·(W − g) + λ·h < 0 with λ ≥ 0 and Gᵀν + Hᵀλ = 0, no weight on limits."""
     data = program_data(ask(on_wall(palm=False)))
-    outcome = program.unique(data)
+    outcome = solvers.unique(data)
     assert outcome.status == cp.INFEASIBLE
     nu = outcome.balance_dual
     value = float(nu @ data.offset)
@@ -332,14 +332,14 @@ def test_a_forked_process_builds_programs_of_its_own():
 
 
 def test_what_is_built_ahead_is_what_plans_need():
-    program._built.cache_clear()
-    program.build_ahead(4)
-    before = program._built.cache_info().misses
+    solvers._built.cache_clear()
+    solvers.build_ahead(4)
+    before = solvers._built.cache_info().misses
     for count in (4, 3):
         question = ask(on_wall(limbs=tuple(PLACES)[:count]), load=Load(50.0))
         answer = plan(replace(question, want=frozenset(["load_factor"])))
         assert answer.status == "optimal"
-    assert program._built.cache_info().misses == before
+    assert solvers._built.cache_info().misses == before
 
 
 @given(

@@ -28,7 +28,7 @@ from planner.deadline import Budget, DeadlineError, clock as deadline
 from planner.explanation import certificate as certificates
 from planner.explanation.infeasibility import vertex
 from planner.floating import continuation
-from planner.programs import WRENCH_UNIT, program
+from planner.programs import WRENCH_UNIT, program, solvers
 from planner.question import Limits, Question
 from planner.result import Plan
 from planner.robots import pose_search
@@ -180,7 +180,7 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(grounds, "gather", "the hands were closed"), (program, "unique", "a plan was found")],
+    [(grounds, "gather", "the hands were closed"), (solvers, "unique", "a plan was found")],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
@@ -198,7 +198,7 @@ def test_joint_angles_that_are_not_found_in_time_are_not_called_out_of_reach(mon
 
 
 def test_the_load_factor_is_left_out(monkeypatch, clock):
-    late_at(monkeypatch, clock, program, "load_factor")
+    late_at(monkeypatch, clock, solvers, "load_factor")
     answer = late(QUESTION)
     assert answer.unfinished == ("load_factor",)
     assert answer.load_factor is None
@@ -213,7 +213,7 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):
     monkeypatch.setattr(least_utilisation, "polished", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
-    late_at(monkeypatch, clock, program, "margin")
+    late_at(monkeypatch, clock, solvers, "margin")
     answer = late(QUESTION)
     assert answer.unfinished == ("least_utilisation", "load_factor")
     assert answer.verified
@@ -225,7 +225,7 @@ def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock)
 def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypatch, clock):
     monkeypatch.setattr(least_utilisation, "polished", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
-    late_at(monkeypatch, clock, program, "tie_break")
+    late_at(monkeypatch, clock, solvers, "tie_break")
     answer = late(QUESTION)
     assert answer.unfinished == ("tie_break", "load_factor")
     assert answer.verified
@@ -233,7 +233,7 @@ def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypat
 
 
 def test_instead_of_the_plan_of_least_effort_that_of_least_utilisation_leaves(monkeypatch, clock):
-    late_at(monkeypatch, clock, program, "effort")
+    late_at(monkeypatch, clock, solvers, "effort")
     answer = late(replace(QUESTION, objective="min_effort"))
     assert answer.unfinished == ("least_effort", "load_factor")
     assert answer.verified
@@ -243,7 +243,7 @@ def test_instead_of_the_plan_of_least_effort_that_of_least_utilisation_leaves(mo
     assert answer.effort > plan(replace(QUESTION, objective="min_effort")).effort
 
 
-@pytest.mark.parametrize(("module", "name"), [(program, "reach"), (program, "margin")])
+@pytest.mark.parametrize(("module", "name"), [(solvers, "reach"), (solvers, "margin")])
 def test_the_way_from_the_present_tensions_is_left_out(monkeypatch, clock, module, name):
     late_at(monkeypatch, clock, module, name)
     answer = late(replace(QUESTION, present=PRESENT))
@@ -265,7 +265,7 @@ def assert_proven(question: Question, answer: Plan, cap: float | None) -> None:
 
 
 def test_that_there_is_no_plan_is_proven_by_the_first_solve_already(monkeypatch, clock):
-    late_at(monkeypatch, clock, program, "nearest")
+    late_at(monkeypatch, clock, solvers, "nearest")
     answer = late(IMPOSSIBLE)
     assert answer.status == "infeasible"
     assert answer.verified
@@ -291,18 +291,18 @@ def test_a_proof_without_its_explanation(monkeypatch, clock):
 
 
 def test_neither_a_plan_nor_a_proof_of_none_is_an_error(monkeypatch, clock):
-    found = program.unique
+    found = solvers.unique
     monkeypatch.setattr(
-        program, "unique", lambda *asked: replace(found(*asked), balance_dual=None, loads=())
+        solvers, "unique", lambda *asked: replace(found(*asked), balance_dual=None, loads=())
     )
-    late_at(monkeypatch, clock, program, "margin")
+    late_at(monkeypatch, clock, solvers, "margin")
     with pytest.raises(DeadlineError, match="a plan was found"):
         late(IMPOSSIBLE)
 
 
 def test_what_is_in_the_way_of_a_plan_within_the_limits_is_left_out_or_proven(monkeypatch, clock):
     assert in_time("heavy").status == "overloaded"
-    late_at(monkeypatch, clock, program, "nearest_body")
+    late_at(monkeypatch, clock, solvers, "nearest_body")
     answer = late(TOO_HEAVY)
     assert answer.status == "overloaded"
     assert answer.utilisation == pytest.approx(in_time("heavy").utilisation, rel=1e-9)
@@ -411,7 +411,7 @@ def test_a_search_that_is_cut_short_after_its_first_plan_gives_that_plan(monkeyp
 
 
 def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock, monkeypatch):
-    gate, waits, built = threading.Event(), [], program._built
+    gate, waits, built = threading.Event(), [], solvers._built
 
     def waited_for(*asked):
         """The program that is being built, for which all the time that is allowed goes by."""
@@ -424,11 +424,11 @@ def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock
 
         return SimpleNamespace(result=result)
 
-    program._builders[0].submit(gate.wait, 2.0 * PATIENCE)
+    solvers._builders[0].submit(gate.wait, 2.0 * PATIENCE)
     built.cache_clear()
     try:
         with monkeypatch.context() as patch:
-            patch.setattr(program, "_built", waited_for)
+            patch.setattr(solvers, "_built", waited_for)
             with pytest.raises(DeadlineError, match="a plan was found"):
                 late(QUESTION)
         assert waits[0] == pytest.approx(LONG)

@@ -17,7 +17,7 @@ from planner.deadline import Budget
 from planner.explanation import far_wrists
 from planner.floating import continuation
 from planner.prepare import settle_hand
-from planner.programs import program
+from planner.programs import solvers, stance_program
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
@@ -52,9 +52,11 @@ SOLVED: list[int] = []
 @contextmanager
 def counted() -> Iterator[list[int]]:
     """Count the programs that are solved."""
-    run, solved = program._Program.run, []
+    run, solved = stance_program.StanceProgram.run, []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program._Program, "run", lambda *given: solved.append(1) or run(*given))
+        patch.setattr(
+            stance_program.StanceProgram, "run", lambda *given: solved.append(1) or run(*given)
+        )
         yield solved
 
 
@@ -84,7 +86,7 @@ def test_utilisation_and_load_factor_agree(preload):
     else:
         answer = plan(question(request(preload=preload, want=["load_factor"])))
     assert answer.load_factor is not None
-    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + program.SLACK)
+    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.SLACK)
 
 
 def test_budget_ends_a_search(monkeypatch):

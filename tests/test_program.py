@@ -11,7 +11,7 @@ from stances import CALIBRATION_LOAD, ask, on_wall, program_data, random_answer,
 
 from hand_models.hand import FINGERS
 from hand_models.rock import Cylinder, Plane, Sphere
-from planner.programs import program, stance_data
+from planner.programs import program, solvers, stance_data
 from planner.question import Load
 from planner.result import Plan
 from planner.solving import plan
@@ -93,9 +93,9 @@ def test_every_program_is_disciplined_in_its_parameters(kind):
 
 def test_stances_of_one_shape_share_their_programs():
     plan(ask(on_wall(), "load_factor"))
-    before = program._built.cache_info()
+    before = solvers._built.cache_info()
     plan(ask(on_wall(overhang=0.1, off=0.25), "load_factor"))
-    after = program._built.cache_info()
+    after = solvers._built.cache_info()
     assert after.misses == before.misses
     assert after.hits == before.hits + 2
 
@@ -200,7 +200,7 @@ def test_dual_bound_of_the_margin_proves_its_optimum(seeds):
         if answer.utilisation is None:
             continue
         data = program_data(question)
-        outcome = program.margin(data)
+        outcome = solvers.margin(data)
         weight = sum(duals.sum() for duals in outcome.limit_duals)
         assert weight == pytest.approx(1.0, abs=1e-6)
         stationary = [

@@ -96,21 +96,21 @@ def test_reaches_along_a_face_do_not_jump_with_rounding(shift, tilt):
     moved = HALF + np.outer(shift + tilt * HALF[:, 0], (0.0, 1.0, 0.0))
     directions = np.array([[1.0, 0, 0], [-1.0, 0, 0], [80.0, 0, 1.0], [0, -1.0, 0], [1.0, -1.0, 0]])
     expected = [40.0, 40.0, 0.5, 20.0, 20.0]
-    np.testing.assert_allclose(reach(moved, directions), expected, rtol=1e-11)
+    np.testing.assert_allclose(distance_along(moved, directions), expected, rtol=1e-11)
     # out of the face, there is nothing
-    assert reach(moved, np.array([[0.0, 1.0, 0.0]]))[0] == pytest.approx(0.0, abs=1e-7)
+    assert distance_along(moved, np.array([[0.0, 1.0, 0.0]]))[0] == pytest.approx(0.0, abs=1e-7)
 
 
 @pytest.mark.parametrize("shift", ROUNDING)
 def test_reaches_along_an_edge_and_from_a_corner_do_not_jump_with_rounding(shift):
     edge = HALF - (40.0, 0.0, 0.0) + shift
     directions = np.array([[0, 0, 1.0], [0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, -1.0, 0]])
-    np.testing.assert_allclose(reach(edge, directions), [1.0, 1.0, 80.0, 20.0, 20.0], rtol=1e-10)
+    np.testing.assert_allclose(distance_along(edge, directions), [1.0, 1.0, 80.0, 20.0, 20.0], rtol=1e-10)
     corner = HALF - (40.0, 0.0, 1.0) + shift
     directions = np.array([[0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, 0, -1.0]])
-    np.testing.assert_allclose(reach(corner, directions), [2.0, 80.0, 20.0, 2.0], rtol=1e-10)
+    np.testing.assert_allclose(distance_along(corner, directions), [2.0, 80.0, 20.0, 2.0], rtol=1e-10)
     # what is more than rounding beyond the face misses the hull
-    assert np.isnan(reach(HALF - (0.0, 1e-6, 0.0), np.array([[1.0, 0.0, 0.0]]))).all()
+    assert np.isnan(distance_along(HALF - (0.0, 1e-6, 0.0), np.array([[1.0, 0.0, 0.0]]))).all()
 
 
 @pytest.mark.parametrize("shift", ROUNDING)
@@ -131,9 +131,9 @@ def test_a_plane_that_touches_a_hull_meets_its_face_its_edge_or_its_corner(shift
 
 @pytest.mark.parametrize("shift", ROUNDING)
 def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
-    moved = np.sort(cut(np.add(HALF, (0.0, shift, 0.0))), axis=0)
+    moved = np.sort(clipped(np.add(HALF, (0.0, shift, 0.0))), axis=0)
     np.testing.assert_allclose(moved, np.sort(HALF, axis=0), atol=1e-11)
-    assert cut(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
+    assert clipped(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
 
 
 @settings(max_examples=20, deadline=None)
@@ -141,13 +141,13 @@ def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
 def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hull(points, seed):
     """The origin is inside the whole hull, where nothing is in doubt, and on the part's face."""
     normal = np.random.default_rng(seed).normal(size=3) * UNITS
-    below = cut(points, normal)
+    below = clipped(points, normal)
     along = np.cross(normal / UNITS, np.eye(3)) / UNITS
     ways = np.vstack([along, -along])
-    whole = reach(points, ways)
+    whole = distance_along(points, ways)
     for shift in ROUNDING:
         moved = below + shift / UNITS
-        np.testing.assert_allclose(reach(moved, ways), whole, rtol=1e-7)
+        np.testing.assert_allclose(distance_along(moved, ways), whole, rtol=1e-7)
     # its highest vertices are on the plane
     height = below @ normal / np.linalg.norm(normal / UNITS)
     assert (height < 1e-13).all()

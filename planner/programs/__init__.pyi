@@ -1,10 +1,16 @@
-from .program import (
+from .outcome import Outcome as Outcome, Reached as Reached
+from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
+from .row_scaling import (
+    JOINT_TORQUE as JOINT_TORQUE,
+    LOAD_UNIT as LOAD_UNIT,
+    TWIST_UNIT as TWIST_UNIT,
+    WRIST_RANGE as WRIST_RANGE,
+    Names as Names,
+    is_effort as is_effort,
+    scaled_rows as scaled_rows,
+)
+from .solvers import (
     SLACK as SLACK,
-    SOLVER as SOLVER,
-    TIE as TIE,
-    UNLIMITED as UNLIMITED,
-    Outcome as Outcome,
-    Reached as Reached,
     build_ahead as build_ahead,
     curved as curved,
     effort as effort,
@@ -15,17 +21,7 @@ from .program import (
     nearest_body as nearest_body,
     reach as reach,
     tie_break as tie_break,
-    tie_weight as tie_weight,
     unique as unique,
-)
-from .row_scaling import (
-    JOINT_TORQUE as JOINT_TORQUE,
-    LOAD_UNIT as LOAD_UNIT,
-    TWIST_UNIT as TWIST_UNIT,
-    WRIST_RANGE as WRIST_RANGE,
-    Names as Names,
-    is_effort as is_effort,
-    scaled_rows as scaled_rows,
 )
 from .stance_data import (
     WRENCH_UNIT as WRENCH_UNIT,
@@ -38,3 +34,4 @@ from .stance_data import (
     used_effort as used_effort,
     with_held as with_held,
 )
+from .stance_program import SOLVER as SOLVER

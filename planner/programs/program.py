@@ -22,247 +22,46 @@ Eight programs share these rows:
 =============  =============================================================================
 
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
-body wrenches over `WRENCH_UNIT`, limit rows over their capacities. Data enter as whole-block
-parameters (disciplined parametrised programming), so a program depends on the shape of a stance
-only, is compiled once and solved with new data after (`planner.programs.compiled`). Programs have
-room for more than a stance, and one serves nearly all stances of so many hands (`Shape.with_room`).
+body wrenches over `WRENCH_UNIT`, limit rows over their capacities.
 """
 
 from __future__ import annotations
 
-import math
-import os
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, ClassVar, Final, NamedTuple, Self
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
 import cvxpy as cp
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
-from planner import deadline
-from planner.programs.compiled import OUT_OF_TIME, Compiled
-from planner.programs.conic_extent import Extent
-from planner.programs.stance_data import ROOM, Shape, StanceData
+from planner.programs.outcome import Outcome, Reached
+from planner.programs.stance_data import Shape, StanceData
+from planner.programs.stance_program import CAREFUL, REFINED, SHARP, StanceProgram
 
 __all__ = [
-    "SETTINGS",
-    "SOLVER",
     "TIE",
+    "UNLIMITED",
     "Curved",
     "Effort",
     "LoadFactor",
     "Margin",
     "Nearest",
-    "Outcome",
     "Reach",
-    "Reached",
     "TieBreak",
     "Unique",
-    "build_ahead",
     "tie_weight",
 ]
-
-SOLVER: Final = "CLARABEL"
 
 UNLIMITED: Final = 1e4
 """Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
 
-SLACK: Final = 1e-6
-"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
-
 TIE: Final = 8e-6
 """Weight of the mean square of relative tensions beside the utilisation."""
 
-SHARP_SLACK: Final = 1e-9
-"""The same where the least utilisation has all its digits."""
 
-SETTINGS: Final[dict[str, Any]] = {
-    "equilibrate_enable": False,
-    "iterative_refinement_enable": False,
-    "presolve_enable": False,
-    "chordal_decomposition_enable": False,
-    "max_threads": 1,
-    "tol_gap_abs": 1e-9,
-    "tol_gap_rel": 1e-9,
-    "tol_feas": 1e-9,
-}
-"""One physical scaling instead of equilibration, and no refinement of solutions that are good."""
-
-SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11}
-"""Where a small term of the objective decides."""
-
-REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
-"""For a second try."""
-
-CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
-"""The solver's own defaults, for a third."""
-
-SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
-
-_builders = [ThreadPoolExecutor(1, "program-builder")]
-"""The one thread that builds programs: CVXPY counts its variables for all threads, and loses count
-where two build at a time. Who cannot wait for it goes on without."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """How a program ended.
-
-    Attributes
-    ----------
-    solved : bool
-        Whether the solver says so; the plan is checked apart from it.
-    status : str
-        CVXPY's word, or `planner.programs.compiled.OUT_OF_TIME`.
-    iterations : int
-    value : float
-        Objective, NaN if not solved.
-    loads : tuple of ndarray
-        y of each hand [N], of a floating one [m, rad]; empty if not solved.
-    limit_duals, hard_duals : tuple of ndarray
-        Multipliers of each hand's rows; where there is no solution, the proof of that. Empty if
-        the solver has neither.
-    balance_dual : ndarray or None
-        Multipliers of the balance, shape (nb,).
-    """
-
-    solved: bool
-    status: str
-    iterations: int
-    value: float
-    loads: tuple[Array, ...] = ()
-    limit_duals: tuple[Array, ...] = ()
-    hard_duals: tuple[Array, ...] = ()
-    balance_dual: Array | None = None
-
-
-LATE: Final = Outcome(False, OUT_OF_TIME, 0, math.nan)
-"""Of a program that is not built in time."""
-
-
-class _Program(ABC):
-    """A program for one shape of stance, compiled. Safe to call from several threads."""
-
-    settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED, CAREFUL)
-
-    def __init__(self, shape: Shape) -> None:
-        self.shape = shape
-        self.z = [cp.Variable(m) for m, _, _, _ in shape.hands]
-        self.G = [cp.Parameter((shape.balance, m)) for m, _, _, _ in shape.hands]
-        self.L: list[cp.Parameter] = []
-        self.l0: list[cp.Parameter] = []
-        self.H = [cp.Parameter((nh, m)) for m, _, nh, _ in shape.hands]
-        self.h = [cp.Parameter(nh) for _, _, nh, _ in shape.hands]
-        self.offset = cp.Parameter(shape.balance)
-        """W − Σ g, or −Σ g where W is scaled apart."""
-        self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
-        self.hard = [H @ z <= h for H, z, h in zip(self.H, self.z, self.h, strict=True)]
-        self.limits: list[cp.Constraint] = []
-        self.own: list[cp.Parameter] = []
-        """Parameters beside the stance's."""
-        self.further: list[cp.Variable] = []
-        """Variables beside the loads whose values are wanted."""
-        self.balance: cp.Constraint
-        self.problem = self.define()
-        self.compiled = Compiled(
-            self.problem,
-            [*self.G, *self.L, *self.l0, *self.H, *self.h, self.offset, *self.own],
-            [*self.z, *self.further],
-            [self.balance, *self.limits, *self.hard],
-            self.settings,
-        )
-
-    @abstractmethod
-    def define(self) -> cp.Problem:
-        """Return the problem, with `limits`, `balance`, `own` and `further` set."""
-
-    @classmethod
-    def built(cls, shape: Shape, *further: int) -> Self | None:
-        """Return a program for a shape, built on first use and kept.
-
-        It has room for other shapes, if there is a map to leave out what is not there. None if the
-        deadline comes before: it will be there for a later question.
-        """
-        program = cls._awaited(shape.with_room(), *further)
-        if program is not None and program.compiled.map is None:
-            program = cls._awaited(shape, *further)
-        return program
-
-    @classmethod
-    def _awaited(cls, shape: Shape, *further: int) -> Self | None:
-        """Return the program for that very shape; None if the deadline comes before."""
-        try:
-            program = _built(cls, shape, *further).result(deadline.left())
-        except TimeoutError:
-            return None
-        assert isinstance(program, cls)
-        return program
-
-    def utilisations(self) -> list[cp.Expression]:
-        """Return each hand's limit rows as load over capacity."""
-        self.L = [cp.Parameter((nl, m)) for m, nl, _, _ in self.shape.hands]
-        self.l0 = [cp.Parameter(nl) for _, nl, _, _ in self.shape.hands]
-        return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
-
-    def values(self, data: StanceData, *own: Any) -> list[Any]:
-        """Return what the parameters are given."""
-        hands = data.hands
-        limits = [*(hand.L for hand in hands), *(hand.l0 for hand in hands)] if self.L else []
-        return [
-            *(hand.G for hand in hands),
-            *limits,
-            *(hand.H for hand in hands),
-            *(hand.h for hand in hands),
-            data.offset,
-            *own,
-        ]
-
-    def run(self, data: StanceData, *own: Any) -> tuple[Outcome, list[Array]]:
-        """Solve with the stance's data and the values of `own`.
-
-        Returns
-        -------
-        outcome : Outcome
-        further : list of ndarray
-            Values of the variables `further`; empty where there is no solution.
-        """
-        hands = data.hands
-        found = self.compiled.solve(self.values(data, *own), self._extent(data.shape))
-        solved = found.status in SOLVED and math.isfinite(found.value)
-        duals, first = found.multipliers, 1 + len(self.limits)
-        outcome = Outcome(
-            solved=solved,
-            status=found.status,
-            iterations=found.iterations,
-            value=found.value if solved else math.nan,
-            loads=tuple(z * hand.unit for z, hand in zip(found.variables, hands, strict=False))
-            if solved
-            else (),
-            limit_duals=duals[1:first],
-            hard_duals=duals[first:],
-            balance_dual=duals[0] if duals else None,
-        )
-        return outcome, list(found.variables[len(hands) :]) if solved else []
-
-    def _extent(self, shape: Shape) -> Extent:
-        """Return how much there is of variables and constraints for a shape."""
-        loads, limits, hard = [], [], []
-        for m, nl, nh, _ in shape.hands:
-            loads.append(m)
-            limits.append(nl)
-            hard.append(nh)
-        if not self.limits:
-            limits = []
-        further = [variable.size for variable in self.further]
-        return Extent((*loads, *further), (shape.balance, *limits, *hard), shape)
-
-
-class Margin(_Program):
+class Margin(StanceProgram):
     """min u: the least utilisation."""
 
     def define(self) -> cp.Problem:
@@ -276,7 +75,7 @@ class Margin(_Program):
         return self.run(data)[0]
 
 
-class Unique(_Program):
+class Unique(StanceProgram):
     """min u + `TIE` · mean (tension / maximum)²: the plan that is meant, in one solve.
 
     A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
@@ -314,7 +113,7 @@ def tie_weight(shape: Shape) -> float:
     return TIE / (len(FINGERS) * len(shape.hands))
 
 
-class Curved(_Program):
+class Curved(StanceProgram):
     """min u + ½ ‖R (z − z₀)‖²: least utilisation where sets are curved, or near to loads."""
 
     def define(self) -> cp.Problem:
@@ -337,7 +136,7 @@ class Curved(_Program):
         return self.run(data, *parts, root @ np.concatenate(z))[0]
 
 
-class TieBreak(_Program):
+class TieBreak(StanceProgram):
     """min Σ (tension / maximum)² under a cap on the utilisation: which plan is meant of those."""
 
     def define(self) -> cp.Problem:
@@ -359,7 +158,7 @@ class TieBreak(_Program):
         return self.run(data, cap, *(hand.tie / largest for hand in data.hands))[0]
 
 
-class Effort(_Program):
+class Effort(StanceProgram):
     """min Σ ‖E z + e₀‖² under a cap: the least sum of squared relative tensions and torques.
 
     Small weights make loads unique that are neither: palms, lateral reactions, wrists.
@@ -386,7 +185,7 @@ class Effort(_Program):
         return self.run(data, cap, *efforts, *(hand.rest for hand in hands))[0]
 
 
-class LoadFactor(_Program):
+class LoadFactor(StanceProgram):
     """max s: how many times the body wrench could be held at utilisation 1."""
 
     def define(self) -> cp.Problem:
@@ -407,7 +206,7 @@ class LoadFactor(_Program):
         return replace(outcome, value=outcome.value / size)
 
 
-class Reach(_Program):
+class Reach(StanceProgram):
     """max c·t: how far along the columns of B the balance can go, under a cap.
 
     The limit rows may change with t, too, as those of joints do with the body's acceleration:
@@ -447,14 +246,7 @@ class Reach(_Program):
         return Reached(outcome, further[0] if further else np.full(self.directions, np.nan))
 
 
-class Reached(NamedTuple):
-    """How `Reach` ended, and the t it came to, shape (k,), NaN if it was not solved."""
-
-    outcome: Outcome
-    t: Array
-
-
-class Nearest(_Program):
+class Nearest(StanceProgram):
     """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give.
 
     The last ``kept`` rows of the balance, of wrenches that hands are given, are kept exactly; the
@@ -477,96 +269,3 @@ class Nearest(_Program):
     def solve(self, data: StanceData) -> Outcome:
         """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""
         return self.run(data)[0]
-
-
-@lru_cache(maxsize=128)
-def _built(kind: type[_Program], shape: Shape, *further: int) -> Future[_Program]:
-    return _builders[0].submit(kind, shape, *further)
-
-
-def build_ahead(hands: int) -> None:
-    """Begin to build what plans of up to so many hands with fixed wrists need; do not wait for it.
-
-    So the first of them need not wait for it either.
-    """
-    for count in range(hands, 0, -1):
-        room = Shape(6, (ROOM,) * count)
-        for kind in (Unique, LoadFactor):
-            _built(kind, room)
-
-
-def _after_fork() -> None:
-    """Begin anew in a forked process: threads, and what they held, did not come along."""
-    _builders[0] = ThreadPoolExecutor(1, "program-builder")
-    _built.cache_clear()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
-
-
-def _ask(kind: Any, data: StanceData, *question: Any, further: Sequence[int] = ()) -> Outcome:
-    """Solve a program of that kind, if it is there in time."""
-    program = kind.built(data.shape, *further)
-    outcome: Outcome = LATE if program is None else program.solve(data, *question)
-    return outcome
-
-
-def margin(data: StanceData) -> Outcome:
-    """Solve `Margin`, built once for each shape."""
-    return _ask(Margin, data)
-
-
-def unique(data: StanceData, share: float = 1.0) -> Outcome:
-    """Solve `Unique`, built once for each shape."""
-    return _ask(Unique, data, share)
-
-
-def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-    """Solve `Curved`, built once for each shape."""
-    return _ask(Curved, data, root, near)
-
-
-def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve `TieBreak`, built once for each shape."""
-    return _ask(TieBreak, data, cap)
-
-
-def least_tensions(data: StanceData, utilisation: float) -> Outcome:
-    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
-    outcome = LATE
-    for slack in (SHARP_SLACK, SLACK):
-        outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
-        if outcome.solved or deadline.expired():
-            break
-    return outcome
-
-
-def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve `Effort`, built once for each shape."""
-    return _ask(Effort, data, cap)
-
-
-def load_factor(data: StanceData) -> Outcome:
-    """Solve `LoadFactor`, built once for each shape."""
-    return _ask(LoadFactor, data)
-
-
-def reach(
-    data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
-) -> Reached:
-    """Solve `Reach`, built once for each shape."""
-    program = Reach.built(data.shape, len(goal))
-    if program is None:
-        return Reached(LATE, np.full(len(goal), np.nan))
-    return program.solve(data, goal, B, cap, K)
-
-
-def nearest(data: StanceData) -> Outcome:
-    """Solve `Nearest`, built once for each shape."""
-    return _ask(Nearest, data)
-
-
-def nearest_body(data: StanceData) -> Outcome:
-    """Solve `Nearest` with all given wrenches of hands kept, built once for each shape."""
-    return _ask(Nearest, data, further=(len(data.wrench) - 6,))

@@ -120,7 +120,7 @@ class ActiveSetOptimum(NamedTuple):
 def active_set_optimum(
     data: StanceData, outcome: Outcome, share: float = 1.0
 ) -> ActiveSetOptimum | None:
-    """Return the exact optimum of `program.unique` from its outcome; None if that is not found.
+    """Return the exact optimum of `programs.unique` from its outcome; None if that is not found.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def active_set_optimum(
     outcome : Outcome
         Solved.
     share : float, optional
-        Of the weight of its second term, as in `program.unique`.
+        Of the weight of its second term, as in `programs.unique`.
     """
     assert outcome.balance_dual is not None
     hands, rows = data.hands, _Rows.of(data)

@@ -23,7 +23,7 @@ def is_least(value: float, bound: float) -> bool:
 
 
 class LeastUtilisation(NamedTuple):
-    """What came of `program.unique`.
+    """What came of `programs.unique`.
 
     Attributes
     ----------

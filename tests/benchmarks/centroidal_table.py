@@ -10,7 +10,7 @@ from race import race
 from results import Line, Table, span, times
 from test_centroidal import EDGES, our_margin, random_case, stance_of
 
-from planner.programs import program
+from planner.programs import solvers
 
 __all__ = ["centroidal_tables"]
 
@@ -28,7 +28,7 @@ def centroidal_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
         return our_margin(cases[number % CASES])
 
     def margin(number: int) -> None:
-        program.margin(stances[number % CASES])
+        solvers.margin(stances[number % CASES])
 
     for case, other in zip(cases, margins, strict=True):
         mine = our_margin(case)

@@ -20,7 +20,7 @@ from test_many_hands import crawler_in, question as crawler_question
 
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandSets, Sets, assemble
-from planner.programs import program
+from planner.programs import program, solvers
 from planner.question import Question
 from planner.solving import plan
 
@@ -108,7 +108,7 @@ def _curve(
 
 def _programs(size: int, sets: Sequence[Sets]) -> dict[tuple[str, int], Way]:
     raw = Clarabel([unique(scaled(each)) for each in sets], program.Unique.settings[0])
-    return {(OURS, size): lambda k: program.unique(sets[k].data), (RAW, size): raw.updated}
+    return {(OURS, size): lambda k: solvers.unique(sets[k].data), (RAW, size): raw.updated}
 
 
 def _raced(

@@ -17,7 +17,7 @@ from whole_blocks import WholeBlocks
 
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
-from planner.programs import program
+from planner.programs import program, solvers, stance_program
 from planner.question import Question
 from planner.solving import plan
 from service.answering import dispatch
@@ -53,7 +53,7 @@ def known(number: int) -> Known:
     asked = question_of(number)
     _, hands = assemble(asked, None, asked.needed_wrench())
     sets = hands.sets(hands.at_rest(hands.idle))
-    return Known(asked, hands, sets, program.unique(sets.data).value)
+    return Known(asked, hands, sets, solvers.unique(sets.data).value)
 
 
 class Rivals:
@@ -67,9 +67,9 @@ class Rivals:
         settings = program.Unique.settings[0]
         self.unique = Clarabel([unique(data) for data in own], settings)
         self.whole = WholeBlocks([each.sets.data for each in stances])
-        self.least = Clarabel([least(data) for data in own], program.SETTINGS)
+        self.least = Clarabel([least(data) for data in own], stance_program.SETTINGS)
         self.tie = Clarabel(
-            [tie(data, u) for data, u in zip(own, used, strict=True)], program.SETTINGS
+            [tie(data, u) for data, u in zip(own, used, strict=True)], stance_program.SETTINGS
         )
         self.si = Clarabel([unique(data) for data in plain], {})
         self.qoco = Qoco([unique(data) for data in own])
@@ -181,7 +181,7 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         return replace(question, stance=replace(question.stance, hands=hands))
 
     def compiled(number: int) -> None:
-        program._built.cache_clear()
+        solvers._built.cache_clear()
         plan(late[number])
 
     def heavy(number: int, twin: int, deadline: float | None) -> Question:
@@ -237,7 +237,7 @@ def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
 
     def ours(number: int) -> None:
         hands = stances[number]
-        program.unique(hands.sets(hands.at_rest(hands.idle)).data)
+        solvers.unique(hands.sets(hands.at_rest(hands.idle)).data)
 
     ways: dict[str, Way] = {
         "floor": rivals.unique.updated,
