@@ -1,37 +1,31 @@
-from .messages import (
-    AXES as AXES,
+from .body_space import (
     Acceleration as Acceleration,
-    AxisCapability as AxisCapability,
     BodyCapability as BodyCapability,
     BodySection as BodySection,
     BodySpaceReply as BodySpaceReply,
-    Certificate as Certificate,
-    ClosingSequence as ClosingSequence,
-    ClosingStage as ClosingStage,
-    Contact as Contact,
-    ErrorDetail as ErrorDetail,
-    ErrorReply as ErrorReply,
+)
+from .hand import (
     Finger as Finger,
-    Generator as Generator,
-    HalfSpaceEquations as HalfSpaceEquations,
-    HalfSpaces as HalfSpaces,
     Hand as Hand,
-    LimitName as LimitName,
     Palm as Palm,
     PlacedFrame as PlacedFrame,
-    PlanReply as PlanReply,
-    Price as Price,
-    Reply as Reply,
-    Row as Row,
     Seating as Seating,
-    Solver as Solver,
-    TensionLimit as TensionLimit,
-    TensionPath as TensionPath,
     Tile as Tile,
-    Time as Time,
-    WrenchSet as WrenchSet,
-    WrenchSpaceReply as WrenchSpaceReply,
     Wrist as Wrist,
+)
+from .limits import LimitName as LimitName, Price as Price
+from .plan import (
+    Certificate as Certificate,
+    PlanReply as PlanReply,
+    Solver as Solver,
+    TensionPath as TensionPath,
+)
+from .reply import (
+    AXES as AXES,
+    ErrorDetail as ErrorDetail,
+    ErrorReply as ErrorReply,
+    Reply as Reply,
+    Time as Time,
 )
 from .stream import (
     HandColumns as HandColumns,
@@ -40,4 +34,15 @@ from .stream import (
     SetPointsRequest as SetPointsRequest,
     StreamReply as StreamReply,
     StreamRequest as StreamRequest,
+)
+from .wrench_set import Generator as Generator, Row as Row, WrenchSet as WrenchSet
+from .wrench_space import (
+    AxisCapability as AxisCapability,
+    ClosingSequence as ClosingSequence,
+    ClosingStage as ClosingStage,
+    Contact as Contact,
+    HalfSpaceEquations as HalfSpaceEquations,
+    HalfSpaces as HalfSpaces,
+    TensionLimit as TensionLimit,
+    WrenchSpaceReply as WrenchSpaceReply,
 )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from service.replies.messages import Reply, Vector
+from service.replies.reply import Reply, Vector
 from service.requests import Limits, Load, Name, Request, Stance, Wrench
 
 __all__ = [

@@ -1,29 +1,32 @@
-from .messages import (
-    Axis as Axis,
-    AxisForce as AxisForce,
-    BodySpaceRequest as BodySpaceRequest,
+from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,
     Ellipsoid as Ellipsoid,
-    ForceCap as ForceCap,
-    Grasp as Grasp,
-    Hand as Hand,
     Hold as Hold,
-    Identifier as Identifier,
+    Mesh as Mesh,
+    Plane as Plane,
+    Profile as Profile,
+    Sphere as Sphere,
+    Surface as Surface,
+)
+from .limits import (
+    AxisForce as AxisForce,
+    ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,
-    Mesh as Mesh,
+)
+from .plan import PlanRequest as PlanRequest, Want as Want
+from .request import (
+    Identifier as Identifier,
     Name as Name,
-    Plane as Plane,
-    PlanRequest as PlanRequest,
     Pose as Pose,
-    Profile as Profile,
     Request as Request,
-    RouteRequest as RouteRequest,
-    Sphere as Sphere,
-    Stance as Stance,
-    Surface as Surface,
-    Want as Want,
     Wrench as Wrench,
+)
+from .route import RouteRequest as RouteRequest
+from .spaces import (
+    Axis as Axis,
+    BodySpaceRequest as BodySpaceRequest,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
+from .stance import Grasp as Grasp, Hand as Hand, Stance as Stance

@@ -1,0 +1,108 @@
+"""One hand of a plan: where it is, what its fingers and its palm carry, and its set."""
+
+from __future__ import annotations
+
+from msgspec import UNSET, Struct, UnsetType
+
+from service.replies.reply import Vector
+from service.replies.wrench_set import WrenchSet
+
+__all__ = [
+    "Finger",
+    "Hand",
+    "Palm",
+    "PlacedFrame",
+    "Seating",
+    "Tile",
+    "Wrist",
+]
+
+
+class Tile(Struct, kw_only=True):
+    """One finger tile. The last three fields come with ``"want": ["model"]``.
+
+    The first two of them only where the wrist is fixed.
+    """
+
+    phalanx: str
+    contact: str
+    position: Vector
+    force: Vector
+    shear: float
+    normal: float
+    lateral: float
+    shear_axis: Vector
+    normal_axis: Vector
+    lateral_axis: Vector
+    utilisation: float
+    load_at_zero: Vector | UnsetType = UNSET
+    load_per_newton: Vector | UnsetType = UNSET
+    half_planes: list[Vector] | UnsetType = UNSET
+
+
+class Finger(Struct, kw_only=True):
+    """One finger: its tendon, its motor while it tightens that, its tiles from the base outward.
+
+    The winch's angle is from the open finger [rad].
+    """
+
+    name: str
+    tendon_tension: float
+    motor_torque: float
+    motor_current: float
+    winch_angle: float
+    tiles: list[Tile]
+
+
+class Palm(Struct, kw_only=True):
+    """The palm: where it acts, its force there, and its moment about that point."""
+
+    position: Vector
+    force: Vector
+    moment: Vector
+    engaged: list[int]
+    utilisation: float
+
+
+class PlacedFrame(Struct):
+    """A frame in another, the quaternion as [x, y, z, w]."""
+
+    position: Vector
+    orientation: Vector
+
+
+class Seating(Struct):
+    """Where the hold is in H, and how that was found."""
+
+    rule: str
+    pose: PlacedFrame
+
+
+class Wrist(Struct, kw_only=True):
+    """How a hand's wrist is; all but ``mode`` are null where it is fixed.
+
+    ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
+    ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
+    were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
+    0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
+    farthest along the axes.
+    """
+
+    mode: str
+    twist: Vector | None = None
+    palm: str | None = None
+    rounds: int | None = None
+    error: float | None = None
+
+
+class Hand(Struct, kw_only=True):
+    """One hand of a plan. Its wrench space comes with ``"want": ["model"]``."""
+
+    limb: str
+    wrench: Vector
+    fingers: list[Finger]
+    palm: Palm
+    utilisation: float
+    seating: Seating
+    wrist: Wrist
+    wrench_space: WrenchSet | UnsetType = UNSET

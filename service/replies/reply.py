@@ -1,0 +1,58 @@
+"""What every reply has, and the reply to a request that failed.
+
+Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
+moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
+was not asked for with ``want`` is left out.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from msgspec import Struct
+
+__all__ = [
+    "AXES",
+    "ErrorDetail",
+    "ErrorReply",
+    "Reply",
+    "Time",
+    "Vector",
+]
+
+AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Components of a wrench, and keys of a capability after their signs."""
+
+Vector = list[float]
+
+
+class Reply(Struct, kw_only=True):
+    """What every reply has."""
+
+    v: int = 1
+
+
+class Time(Struct):
+    """Where the time went [s]."""
+
+    model: float
+    solve: float
+    total: float
+
+
+class ErrorDetail(Struct):
+    """What is wrong, and with which field."""
+
+    kind: str
+    field: str | None
+    message: str
+
+
+class ErrorReply(Reply, kw_only=True):
+    """A request that could not be understood, or a service that failed on it.
+
+    ``id``: the request's, where it could be read.
+    """
+
+    id: str | None = None
+    error: ErrorDetail

@@ -1,0 +1,109 @@
+"""The reply to what one hand can carry."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from service.replies.hand import Seating, Wrist
+from service.replies.reply import Reply, Vector
+from service.replies.wrench_set import Generator, Row
+
+__all__ = [
+    "AxisCapability",
+    "ClosingSequence",
+    "ClosingStage",
+    "Contact",
+    "HalfSpaceEquations",
+    "HalfSpaces",
+    "TensionLimit",
+    "WrenchSpaceReply",
+]
+
+
+class Contact(Struct, kw_only=True):
+    """Where a finger tile meets the rock, and the axes of its loads.
+
+    ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
+    where tendon and springs hold it without contact; null where contacts hold it.
+    """
+
+    finger: str
+    phalanx: str
+    contact: str
+    stop: str | None
+    position: Vector
+    shear_axis: Vector
+    normal_axis: Vector
+    lateral_axis: Vector
+
+
+class ClosingStage(Struct):
+    """One part of a closing finger: from which tension it moves, at which it is at rest [N]."""
+
+    part: str
+    starts: float
+    ends: float
+
+
+class ClosingSequence(Struct):
+    """How a finger has closed: its nail, its joints from the base outward, its tiles.
+
+    ``in_order``: whether nail and joints move one after the other.
+    """
+
+    finger: str
+    stages: list[ClosingStage]
+    in_order: bool
+
+
+class TensionLimit(Struct):
+    """The tension at which a finger's first tile lets go [N]; null where none ever does."""
+
+    finger: str
+    tension: float | None
+    phalanx: str | None
+
+
+class HalfSpaceEquations(Struct):
+    """``normals · w = offsets``."""
+
+    normals: list[Vector]
+    offsets: Vector
+
+
+class HalfSpaces(Struct):
+    """``normals · w ≤ offsets``, and what holds with equality where the set is flat."""
+
+    normals: list[Vector]
+    offsets: Vector
+    equations: HalfSpaceEquations
+
+
+class AxisCapability(Struct):
+    """How far a set reaches along an axis.
+
+    ``pure``: the most of it with every other component zero, null where there is none. ``extent``:
+    the most of it with whatever else.
+    """
+
+    pure: float | None
+    extent: float
+
+
+class WrenchSpaceReply(Reply, kw_only=True):
+    """What one hand can carry, at utilisation 1: if nothing, no vertices, and null for the rest."""
+
+    robot: str
+    limb: str
+    wrist: Wrist
+    seating: Seating
+    contacts: list[Contact]
+    closing: list[ClosingSequence]
+    tension_limits: list[TensionLimit]
+    origin: Vector
+    generators: list[Generator]
+    rows: list[Row]
+    vertices: list[Vector]
+    half_spaces: HalfSpaces | None
+    dimension: int | None
+    capability: dict[str, AxisCapability] | None

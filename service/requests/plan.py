@@ -1,0 +1,57 @@
+"""The question who carries what in a stance.
+
+Fields that the contract knows but this version does not are declared, so that they are refused by
+name (`service.wire.checks`) and not as unknown.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from service.requests.limits import Limits, Load
+from service.requests.request import Identifier, Later, Name, Request, Tensions, Wrench
+from service.requests.stance import Stance
+
+__all__ = [
+    "ObjectiveName",
+    "PlanRequest",
+    "Want",
+]
+
+Duration = Annotated[float, Meta(gt=0.0, le=1e6, description="[s]")]
+ObjectiveName = Annotated[
+    Literal["max_margin", "min_effort", "max_reliability"],
+    Meta(
+        description="least utilisation, or least effort within limits.utilisation; "
+        "max_reliability is not supported in this version"
+    ),
+]
+Want = Literal["load_factor", "prices", "model"]
+
+
+class PlanRequest(Request, frozen=True, kw_only=True):
+    """Asks who carries what in a stance."""
+
+    id: Identifier | None = None
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions],
+        Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
+    ] = {}
+    confidence: Later = None
+    deadline: Annotated[
+        Duration | None,
+        Meta(
+            description="how long the answer may take, from where the service takes the question "
+            "on: then what is verified so far is the answer [s]"
+        ),
+    ] = None
+    want: list[Want] = []

@@ -1,0 +1,74 @@
+"""What every request is made of: strict structs, names, and numbers within bounds.
+
+Bounds are far beyond any climbing robot; they keep arithmetic finite.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+
+__all__ = [
+    "Acceleration",
+    "AccelerationEntry",
+    "Coordinate",
+    "Force",
+    "Identifier",
+    "Later",
+    "Name",
+    "Pose",
+    "Position",
+    "PreloadEntry",
+    "Request",
+    "Strict",
+    "Tension",
+    "Tensions",
+    "Wrench",
+    "WrenchEntry",
+]
+
+Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="[m]")]
+QuaternionEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Quaternion = Annotated[
+    tuple[QuaternionEntry, QuaternionEntry, QuaternionEntry, QuaternionEntry],
+    Meta(description="[x, y, z, w], of norm 1 within 1e-3"),
+]
+AccelerationEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Acceleration = Annotated[
+    tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+    Meta(description="in W [m/s²]"),
+]
+WrenchEntry = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Wrench = Annotated[
+    tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry],
+    Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]"),
+]
+Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
+PreloadEntry = Annotated[float, Meta(ge=0.0, le=1e4)]
+Tensions = Annotated[
+    tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry],
+    Meta(description="of a hand's tendons [N]"),
+]
+Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
+Name = Annotated[str, Meta(max_length=64)]
+Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
+Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
+
+
+class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A part of a request: an unknown field in it is an error."""
+
+
+class Pose(Strict, frozen=True, kw_only=True):
+    """A frame in another."""
+
+    position: Position
+    orientation: Quaternion
+
+
+class Request(Strict, frozen=True, kw_only=True):
+    """What every request has."""
+
+    v: Literal[1]
