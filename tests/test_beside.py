@@ -12,9 +12,10 @@ import pytest
 from patience import PATIENCE
 from stances import ask, on_wall, program_data
 
+from planner import deadline
 from planner.deadline import Overlap, overlap as beside
 from planner.programs import solvers
-from planner.solving import KnownStance, solve
+from planner.solving import KnownStance, answer as answering, solve
 
 
 def me() -> str:
@@ -96,7 +97,7 @@ def test_plans_are_made_while_the_interpreter_ends():
 
 def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):
     threads = []
-    prepare, begin = solve.prepare, beside.begin
+    prepare, begin = answering.prepare_checks, deadline.begin_overlap
     taken = threading.Event()
 
     def noted(*given):
@@ -110,8 +111,8 @@ def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monke
         begin()
         assert not waiting or taken.wait(PATIENCE)
 
-    monkeypatch.setattr(solve, "prepare", noted)
-    monkeypatch.setattr(beside, "begin", begun)
+    monkeypatch.setattr(answering, "prepare_checks", noted)
+    monkeypatch.setattr(deadline, "begin_overlap", begun)
     question = ask(on_wall())
     answer = solve.plan(question)
     assert answer.verified

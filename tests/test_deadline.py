@@ -36,6 +36,7 @@ from planner.solving import (
     dual_bounds,
     plan,
     prepared_stance as grounds,
+    reading,
     solve,
     unique_plan as least_utilisation,
 )
@@ -71,7 +72,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch) -> Clock:
     clock = Clock()
-    for module in (deadline, solve):
+    for module in (deadline, solve, reading):
         monkeypatch.setattr(module, "time", clock)
     return clock
 
@@ -320,7 +321,8 @@ def held(question: Question, ticks: int, monkeypatch) -> tuple[Plan | None, int]
     clock = Clock(tick=1.0)
     with monkeypatch.context() as patch:
         patch.setattr(deadline, "time", clock)
-        patch.setattr(solve, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+        for module in (solve, reading):
+            patch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
         begun = clock.now
         try:
             return plan(replace(question, deadline=float(ticks))), round(clock.now - begun)

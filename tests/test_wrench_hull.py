@@ -105,10 +105,14 @@ def test_reaches_along_a_face_do_not_jump_with_rounding(shift, tilt):
 def test_reaches_along_an_edge_and_from_a_corner_do_not_jump_with_rounding(shift):
     edge = HALF - (40.0, 0.0, 0.0) + shift
     directions = np.array([[0, 0, 1.0], [0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, -1.0, 0]])
-    np.testing.assert_allclose(distance_along(edge, directions), [1.0, 1.0, 80.0, 20.0, 20.0], rtol=1e-10)
+    np.testing.assert_allclose(
+        distance_along(edge, directions), [1.0, 1.0, 80.0, 20.0, 20.0], rtol=1e-10
+    )
     corner = HALF - (40.0, 0.0, 1.0) + shift
     directions = np.array([[0, 0, -1.0], [-1.0, 0, 0], [0, -1.0, 0], [-1.0, 0, -1.0]])
-    np.testing.assert_allclose(distance_along(corner, directions), [2.0, 80.0, 20.0, 2.0], rtol=1e-10)
+    np.testing.assert_allclose(
+        distance_along(corner, directions), [2.0, 80.0, 20.0, 2.0], rtol=1e-10
+    )
     # what is more than rounding beyond the face misses the hull
     assert np.isnan(distance_along(HALF - (0.0, 1e-6, 0.0), np.array([[1.0, 0.0, 0.0]]))).all()
 

@@ -1,4 +1,4 @@
-"""The answer to a question about a stance: data, as `planner.solving.solve.plan` returns it."""
+"""The answer to a question about a stance: data, as `planner.solving.plan` returns it."""
 
 from __future__ import annotations
 

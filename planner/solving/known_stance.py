@@ -44,7 +44,7 @@ class KnownStance:
         self.prepared = prepared
 
     def plan(self, body_wrench: Array) -> Plan:
-        """Answer for another body wrench, as `planner.solving.solve.plan` would.
+        """Answer for another body wrench, as `planner.solving.plan` would.
 
         Parameters
         ----------
