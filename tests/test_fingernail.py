@@ -27,9 +27,9 @@ from hand_models import (
     SettledHand,
 )
 from hand_models.base import wrench_transport
+from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import closing_sequence
 from hand_models.rock import Hold
-from hand_models.wrench_spaces import space as wrench_space
 from planner.explanation import warnings
 from planner.pictures import plot_plan, plot_wrench_space
 from planner.prepare import settle_hand

@@ -10,9 +10,9 @@ from hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at, without_ha
 from hypothesis import given, settings, strategies as st
 
 from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, SpinyHand
+from hand_models.fixed_wrist import wrench_space
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from hand_models.tile import inner_half_planes
-from hand_models.wrench_spaces import space as wrench_space
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -12,8 +12,8 @@ from rocks import cylinder_mesh
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.compliance import CompliantHand, FloatingWrist
+from hand_models.fixed_wrist import wrench_space
 from hand_models.rock import Mesh, Profile
-from hand_models.wrench_spaces import space as wrench_space
 from planner.pictures import hand_plots
 
 HOLDS = {

@@ -22,7 +22,7 @@ from hand_models import (
     Surface,
     tension_limits,
 )
-from hand_models.wrench_spaces import space as wrench_space
+from hand_models.fixed_wrist import wrench_space
 
 ROCK = Surface.named("rock")
 SIZES = [1e-3, 1e-2, 1.0, 30.0, 1e3]

@@ -8,8 +8,8 @@ import pytest
 from hands import HAND, ROCK, pinch, without_hand_load
 
 from hand_models import Cylinder, EmptySetError, Grasp, Surface, tension_limits
+from hand_models.fixed_wrist import wrench_space
 from hand_models.fixed_wrist.tension_box import parallelepiped
-from hand_models.wrench_spaces import space as wrench_space
 
 
 def test_its_vertices_are_the_sums_of_each_finger_at_its_least_and_its_largest_tension():

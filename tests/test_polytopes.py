@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
 from hand_models.base import SolverError, UnsupportedError
 from hand_models.wrench_spaces import SCALE, Row
+from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import Faces
-from hand_models.wrench_spaces.polytopes import clipped
 
 seeds = st.integers(0, 2**32 - 1)
 

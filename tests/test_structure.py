@@ -10,8 +10,8 @@ from stances import CALIBRATION_LOAD, ask, on_wall
 
 from hand_models import InvalidInputError
 from hand_models.base import Pose
+from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import HELD
-from hand_models.wrench_spaces import space as wrench_space
 from planner.result import LimitName
 from planner.solving import plan
 

@@ -9,7 +9,7 @@ from hands import HAND, ROCK, pinch, settled_at
 from hypothesis import given, settings, strategies as st
 
 from hand_models import FINGERS, Cylinder, Pose, Surface, tension_limits
-from hand_models.wrench_spaces import space as wrench_space
+from hand_models.fixed_wrist import wrench_space
 
 seeds = st.integers(0, 2**32 - 1)
 

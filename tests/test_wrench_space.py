@@ -10,7 +10,8 @@ from hands import HAND, ROCK, pinch, settled_at, without_hand_load
 from scipy.optimize import linprog
 
 from hand_models import Cylinder, EmptySetError, Grasp, Plane
-from hand_models.wrench_spaces import SCALE, space as wrench_space
+from hand_models.fixed_wrist import wrench_space
+from hand_models.wrench_spaces import SCALE
 
 EXACT = {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9}
 SEEDS = range(240)

@@ -26,11 +26,10 @@ from hand_models import (
     Surface,
     WrenchSpace,
 )
-from hand_models.fixed_wrist import wrench_spaces
+from hand_models.fixed_wrist import wrench_space, wrench_spaces
 from hand_models.fixed_wrist.space import KEPT
 from hand_models.hand import HELD
 from hand_models.tile import inner_half_planes
-from hand_models.wrench_spaces import space as wrench_space
 
 Row = tuple[dict[str, float], float, float]
 """Coefficients by column, and of a limit l0 and s, of a hard row zero and h."""

@@ -1,2 +1,4 @@
 from .polytopes import TOLERANCE as TOLERANCE, hull as hull, hull_facets as hull_facets
-from .space import SCALE as SCALE, Row as Row, WrenchSpace as WrenchSpace
+from .row import Row as Row
+from .scaled_wrench import SCALE as SCALE
+from .space import WrenchSpace as WrenchSpace

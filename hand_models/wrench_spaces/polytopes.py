@@ -1,60 +1,26 @@
-"""Small polytopes and their Minkowski sums, without double description.
-
-The facets of a sum of segments and polygons are spanned by edges of these: every choice of them
-gives a candidate normal, by a cross product, and those that make each edge extreme in its polygon
-are the facets. Other summands go through a hull of the sums of their vertices.
-"""
+"""Small polytopes: their vertices from their rows, and hulls of points."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from scipy.optimize import linprog
-from scipy.sparse import csr_array, hstack, vstack
 from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
 from hand_models.base import Array, Indices, SolverError
-from hand_models.wrench_spaces.cross_products import Expansion, cross_products, expansion
-from hand_models.wrench_spaces.half_spaces import Faces
 
-__all__ = [
-    "TOLERANCE",
-    "Summand",
-    "clipped",
-    "extreme_points",
-    "hull",
-    "hull_facets",
-    "polytope_vertices",
-    "sum_normals",
-    "sum_vertices",
-    "sums",
-]
+__all__ = ["TOLERANCE", "distinct", "hull", "hull_facets", "polytope_vertices"]
 
 TOLERANCE: Final = 1e-9
-"""Relative tolerance of the geometry in this module."""
-
+"""Relative tolerance of the geometry of polytopes."""
 
 TIGHT: Final = 1e-10
 """Tolerance of linear programs that measure a polytope."""
 
 BEYOND: Final = 1e-6
 """By how much a row must clear a bounding box to be left out at once."""
-
-TOLERANCES: Final = ("primal_feasibility_tolerance", "dual_feasibility_tolerance")
-
-SPANNING: Final = 1e-13
-"""Squares of unit normals that span a direction sum to more than this in it."""
-
-
-class Summand(NamedTuple):
-    """Extreme points (n, 6) of one block's image in scaled wrenches; polygons are in order."""
-
-    points: Array
-    dimension: int
 
 
 def polytope_vertices(A: Array, b: Array) -> Array:
@@ -88,7 +54,7 @@ def polytope_vertices(A: Array, b: Array) -> Array:
         )
         # each row by its own size: one that is far away must not loosen the others
         points = points[(points @ A.T <= b + TOLERANCE * (1.0 + np.abs(b))).all(axis=1)]
-        return _distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
+        return distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
     box = _bounding_box(A, b)
     if box is None:
         return np.zeros((0, d))
@@ -116,7 +82,7 @@ def polytope_vertices(A: Array, b: Array) -> Array:
     if ball.x[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
     cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
-    return middle + half * _distinct(cut.intersections, TOLERANCE)
+    return middle + half * distinct(cut.intersections, TOLERANCE)
 
 
 def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
@@ -164,7 +130,7 @@ def _irredundant(A: Array, b: Array) -> Indices:
     return np.array(rows, dtype=np.intp)
 
 
-def _distinct(points: Array, slack: float) -> Array:
+def distinct(points: Array, slack: float) -> Array:
     """Return the points that differ by more than ``slack`` in some coordinate."""
     if len(points) < 2:
         return points
@@ -172,206 +138,6 @@ def _distinct(points: Array, slack: float) -> Array:
     keep = np.ones(len(points), dtype=bool)
     keep[pairs[:, 1]] = False
     return points[keep]
-
-
-def clipped(
-    vertices: Array, faces: Faces, cuts: Faces, rounding: float
-) -> tuple[Array, Faces] | None:
-    """Return the vertices (n, r) and facets of a polytope that is cut with half-spaces.
-
-    One after another: vertices beyond a cut go, and every edge that crosses it gets a new one. Two
-    vertices are the ends of an edge where the normals of the facets that both lie on span all
-    directions but one.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (n, r)
-    faces : Faces
-        All facets of the polytope.
-    cuts : Faces
-    rounding : float
-        How far rounding may move points.
-
-    Returns
-    -------
-    tuple or None
-        None if nothing, or nothing with an interior, is left.
-    """
-    if not len(cuts.offsets):
-        return vertices, faces
-    slack = 10.0 * rounding * (1.0 + float(np.abs(faces.offsets).max()))
-    lies = _incidence(vertices, faces, slack)
-    beyond = vertices @ cuts.normals.T > cuts.offsets
-    # those that take most away first: what is gone need not be cut again
-    for k in np.argsort(-beyond.sum(axis=0)):
-        normal, offset = cuts.normals[k], cuts.offsets[k]
-        height = vertices @ normal - offset
-        inside, outside = np.flatnonzero(height < -slack), np.flatnonzero(height > slack)
-        if not len(outside):
-            continue
-        if not len(inside):
-            return None
-        near, far = _edges(lies, inside, outside, faces)
-        part = (height[near] / (height[near] - height[far]))[:, None]
-        crossings = _distinct(vertices[near] + part * (vertices[far] - vertices[near]), slack)
-        kept = height <= slack
-        vertices = np.vstack([vertices[kept], crossings])
-        on_cut = np.append(height[kept] >= -slack, np.ones(len(crossings)))[:, None]
-        lies = vstack([lies[kept], _incidence(crossings, faces, slack)])
-        lies = hstack([lies, csr_array(on_cut)], format="csr")
-        met = np.asarray(lies.sum(axis=0)).ravel() >= vertices.shape[1]
-        lies = lies[:, met]
-        normals, offsets = np.vstack([faces.normals, normal]), np.append(faces.offsets, offset)
-        faces = Faces(normals[met], offsets[met])
-    return vertices, faces
-
-
-def _edges(
-    lies: csr_array, starts: Indices, ends: Indices, faces: Faces
-) -> tuple[Indices, Indices]:
-    """Return the ends of all edges that lead from some vertices to some others."""
-    r = faces.normals.shape[1]
-    if r == 1:
-        return starts, ends
-    one, other = lies[starts], lies[ends]
-    shared = (one @ other.T).tocoo()
-    enough = shared.data >= r - 1
-    i, j = shared.row[enough], shared.col[enough]
-    squares = np.einsum("kr,ks->krs", faces.normals, faces.normals).reshape(-1, r * r)
-    spans = np.linalg.eigvalsh((one[i].multiply(other[j]) @ squares).reshape(-1, r, r))
-    edge = spans[:, 1] > SPANNING
-    return starts[i[edge]], ends[j[edge]]
-
-
-def _incidence(points: Array, faces: Faces, slack: float) -> csr_array:
-    """Return which points (rows) lie on which facets (columns), as ones."""
-    chunk = max(1, 2_000_000 // len(faces.offsets))
-    parts = [
-        csr_array((points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack).astype(float))
-        for k in range(0, max(len(points), 1), chunk)
-    ]
-    lies: csr_array = vstack(parts, format="csr")
-    return lies
-
-
-def extreme_points(image: Array) -> Summand:
-    """Return the extreme points of a few points (n, 6), in order around a polygon."""
-    centred = image - image.mean(axis=0)
-    size = 1.0 + float(np.abs(image).max())
-    if len(image) == 2:
-        apart = float(np.linalg.norm(centred)) > TOLERANCE * size
-        return Summand(image, 1) if apart else Summand(image[:1], 0)
-    _, values, basis = np.linalg.svd(centred, full_matrices=False)
-    rank = int((values > TOLERANCE * size).sum())
-    if rank == 0:
-        return Summand(image[:1], 0)
-    flat = centred @ basis[:rank].T
-    if rank == 1:
-        return Summand(image[[flat[:, 0].argmin(), flat[:, 0].argmax()]], 1)
-    return Summand(image[hull(flat).vertices], rank)
-
-
-def sum_normals(parts: list[Summand], r: int, rounding: float) -> Array:
-    """Return the unit facet normals (k, r) of a sum of segments and polygons.
-
-    A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
-    plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon.
-    """
-    if r == 1:
-        return np.array([[1.0], [-1.0]])
-    edges = []
-    for part in parts:
-        around = np.diff(np.vstack([part.points, part.points[:1]]), axis=0)
-        edges.append(around[:1] if part.dimension == 1 else around)
-    shapes = tuple((len(e), part.dimension) for e, part in zip(edges, parts, strict=True))
-    spanning, chosen = _choices(shapes, r)
-    directions = np.vstack(edges)
-    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    normals = cross_products(directions, spanning)
-    lengths = np.linalg.norm(normals, axis=1)
-    independent = lengths > 1e-8
-    normals = normals[independent] / lengths[independent, None]
-    normals = np.vstack([normals, -normals])
-    chosen = np.vstack([chosen[independent]] * 2)
-    keep = np.ones(len(normals), dtype=bool)
-    for k, part in enumerate(parts):
-        if part.dimension == 2:
-            one_edge = np.flatnonzero(chosen[:, k] >= 0)
-            # thin products: a threaded BLAS would spend more on waking its threads
-            heights = np.einsum("nr,pr->pn", normals[one_edge], part.points)
-            here = heights[chosen[one_edge, k], np.arange(len(one_edge))]
-            top = heights.max(axis=0)
-            keep[one_edge] &= here >= top - rounding * (1.0 + np.abs(top))
-    normals = normals[keep]
-    _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
-    return np.asarray(normals[np.sort(first)])
-
-
-@lru_cache(maxsize=16)
-def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Expansion, Indices]:
-    """List every choice of r − 1 edges from parts of given (edges, dimension).
-
-    Returns
-    -------
-    spanning : Expansion
-        Of the cross products of all parts' edges, one after another.
-    chosen : ndarray of int, shape (n, parts)
-        Which edge of a part is used alone; −1 where none, or its whole plane, is.
-    """
-    firsts = np.cumsum([0, *(count for count, _ in shapes)])
-    spanning, chosen = [], []
-    for use in itertools.product(*(range(dimension + 1) for _, dimension in shapes)):
-        if sum(use) != r - 1:
-            continue
-        options = [
-            range(count) if u == 1 else (-1,) for u, (count, _) in zip(use, shapes, strict=True)
-        ]
-        picks = np.array(list(itertools.product(*options)))
-        columns = []
-        for k, u in enumerate(use):
-            if u == 1:
-                columns.append(firsts[k] + picks[:, k])
-            elif u == 2:
-                columns += [np.full(len(picks), firsts[k] + i) for i in range(2)]
-        spanning.append(np.column_stack(columns))
-        chosen.append(picks)
-    return expansion(np.vstack(spanning), r), np.vstack(chosen)
-
-
-def sums(parts: list[Summand]) -> Array:
-    """Return every sum of one point of each part, shape (n, r)."""
-    total = np.zeros((1, parts[0].points.shape[1]))
-    for part in parts:
-        total = (total[:, None, :] + part.points[None, :, :]).reshape(-1, total.shape[1])
-    return total
-
-
-def sum_vertices(parts: list[Summand], normals: Array, offsets: Array, rounding: float) -> Array:
-    """Return the vertices (n, r) of a sum, given its facets.
-
-    A sum of points is a vertex if the mean normal of the facets it lies on makes each of them the
-    only highest point of its part.
-    """
-    candidates = sums(parts)
-    choice = np.indices([len(part.points) for part in parts]).reshape(len(parts), -1)
-    size = 1.0 + float(np.abs(offsets).max())
-    chunk = max(1, 2_000_000 // max(1, len(normals)))
-    chosen = []
-    for start in range(0, len(candidates), chunk):
-        piece = candidates[start : start + chunk]
-        active = piece @ normals.T >= offsets - 10.0 * rounding * size
-        outer = np.flatnonzero(active.any(axis=1))
-        piece, mine = piece[outer], choice[:, start + outer]
-        outward = active[outer].astype(float) @ normals
-        keep = np.ones(len(piece), dtype=bool)
-        for k, part in enumerate(parts):
-            heights = np.einsum("pr,nr->pn", part.points, outward)
-            index = np.arange(len(piece))
-            here = heights[mine[k], index]
-            heights[mine[k], index] = -np.inf
-            keep &= here > heights.max(axis=0) + 1e-9 * size
-        chosen.append(piece[keep])
-    return np.vstack(chosen)
 
 
 def hull(points: Array, options: str | None = None) -> ConvexHull:

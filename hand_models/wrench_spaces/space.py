@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal, NamedTuple, Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,62 +31,19 @@ from hand_models.base import (
     Indices,
     InvalidInputError,
     SolverError,
-    UnsupportedError,
     finite_vector,
 )
-from hand_models.wrench_spaces import zonotope
-from hand_models.wrench_spaces.half_spaces import FLATNESS, Faces, HalfSpaces, affine_hull, lifted
-from hand_models.wrench_spaces.polytopes import (
-    TOLERANCE,
-    Summand,
-    clipped,
-    extreme_points,
-    hull,
-    hull_facets,
-    polytope_vertices,
-    sum_normals,
-    sum_vertices,
-    sums,
-)
+from hand_models.wrench_spaces.block_sum import BlockSum
+from hand_models.wrench_spaces.clipping import clipped
+from hand_models.wrench_spaces.half_spaces import FLATNESS, Faces, HalfSpaces, lifted
+from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope_vertices
+from hand_models.wrench_spaces.row import Row
+from hand_models.wrench_spaces.scaled_wrench import SCALE
 
-__all__ = ["MOMENT_ARM", "SCALE", "HalfSpaces", "Row", "WrenchSpace"]
-
-MOMENT_ARM: Final = 0.1
-"""Makes newton-metres commensurate with newtons: about the size of a hand [m]."""
-
-SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
-"""From a wrench to a scaled wrench [N]."""
-
-MOST_CANDIDATES: Final = 500_000
-"""How many sums of the blocks' vertices are looked through; that many take some 20 s."""
-
+__all__ = ["WrenchSpace"]
 
 EXACT: Final = 1e-9
 """Tolerance of the linear program of a support function [N]."""
-
-
-class Row(NamedTuple):
-    """The name of an inequality.
-
-    Attributes
-    ----------
-    finger, phalanx : str or None
-        Whose it is; None where it is the palm's, or a whole finger's.
-    limit : str
-        What it limits.
-    kind : {'limit', 'hard'}
-    label : str
-        Unique in its set.
-    joint : str or None
-        Of the limb that carries the hand, where the limit is that joint's.
-    """
-
-    finger: str | None
-    phalanx: str | None
-    limit: str
-    kind: Literal["limit", "hard"]
-    label: str
-    joint: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,62 +181,22 @@ class WrenchSpace:
             blocks.append((columns, vertices))
         return tuple(blocks)
 
+    @cached_property
+    def _sum(self) -> BlockSum:
+        """The sum of the blocks, without wrench rows."""
+        return BlockSum(self.origin, self.generators, self._blocks)
+
     def _empty(self, columns: Indices | None = None) -> EmptySetError:
         names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
         return EmptySetError(
             f"no wrench is left at utilisation 1: the limits{names} contradict the hard rows"
         )
 
-    @cached_property
-    def _summands(self) -> tuple[Summand, ...]:
-        """The blocks' images that are more than a point, about `_base`."""
-        summands = []
-        for columns, vertices in self._blocks:
-            image = (vertices @ self.generators[:, columns].T) * SCALE
-            summands.append(extreme_points(image))
-        return tuple(summands)
-
-    @cached_property
-    def _base(self) -> Array:
-        """A scaled wrench of the set."""
-        start = self.origin * SCALE
-        return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
-
-    @cached_property
-    def _axes(self) -> tuple[Array, Array]:
-        """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
-
-        Facets and vertices are found in coordinates along these, divided by the reach.
-        """
-        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
-        return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
-
-    @cached_property
-    def _parts(self) -> list[Summand]:
-        """The summands that are more than a point, about `_base`, in the coordinates of `_axes`."""
-        directions, reach = self._axes
-        summands = [s for s in self._summands if s.dimension]
-        candidates = math.prod(len(s.points) for s in summands)
-        if candidates > MOST_CANDIDATES:
-            raise UnsupportedError(
-                f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
-                "use fewer half_planes, or leave lateral out"
-            )
-        return [
-            Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
-        ]
-
-    @property
-    def _rounding(self) -> float:
-        """How far rounding may move points in the coordinates of `_axes`: more in a thin set."""
-        reach = self._axes[1]
-        return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
-
     @property
     def dimension(self) -> int:
         """Of the set's affine hull, from 0 to 6."""
         _ = self._cuts  # an empty set has none
-        return len(self._axes[1])
+        return len(self._sum.axes[1])
 
     @cached_property
     def _cuts(self) -> Indices:
@@ -290,18 +207,11 @@ class WrenchSpace:
             reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
         cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
         # where the sum reaches least far along the cuts is most often a wrench of the set
-        within = not len(cuts) or self._obeys(self._extreme(-slopes[cuts].sum(axis=0)))
+        within = not len(cuts) or self._obeys(self._sum.extreme(-slopes[cuts].sum(axis=0)))
         if not within and self._farthest(np.zeros(6)) is None:
             row = self.rows[len(self.s) - len(self.D) + cuts[0]]
             raise EmptySetError(f"no wrench is left at utilisation 1: all exceed {row.limit}")
         return cuts
-
-    def _extreme(self, slopes: Array) -> Array:
-        """Return the loads y, shape (m,), with the largest slopes · y in the sum of the blocks."""
-        y = np.zeros(len(self.columns))
-        for columns, vertices in self._blocks:
-            y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
-        return y
 
     def _obeys(self, y: Array) -> bool:
         """Whether loads of the sum of the blocks also keep to the wrench rows."""
@@ -331,40 +241,23 @@ class WrenchSpace:
     @cached_property
     def _clipped(self) -> tuple[Array, Faces]:
         """Vertices (n, r) and facets where wrench rows cut the sum of the blocks."""
-        directions, reach = self._axes
+        directions, reach = self._sum.axes
         rows, held = self.D[self._cuts] / SCALE, self._held[self._cuts]
         normals = rows @ directions.T * reach
         lengths = np.linalg.norm(normals, axis=1)
         # what is constant on the set, and yet beyond its capacity, is so by rounding
         turns = lengths > FLATNESS * held
-        room = held - np.asarray(rows @ self._base)
+        room = held - np.asarray(rows @ self._sum.base)
         cuts = Faces(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
-        found = clipped(self._sum_vertices, self._sum_facets, cuts, self._rounding)
+        found = clipped(self._sum.vertices, self._sum.facets, cuts, self._sum.rounding)
         if found is None:
             raise self._empty()
         return found
 
     @property
     def _facets(self) -> Faces:
-        """In the coordinates of `_axes`, about `_base`."""
-        return self._clipped[1] if len(self._cuts) else self._sum_facets
-
-    @cached_property
-    def _sum_facets(self) -> Faces:
-        """Facets of the sum of the blocks, without wrench rows."""
-        parts, r = self._parts, len(self._axes[1])
-        if r == 0:
-            return Faces(np.zeros((0, 0)), np.zeros(0))
-        if all(part.dimension == 1 for part in parts):
-            return zonotope.facets(np.array([part.points[1] for part in parts]))
-        if all(part.dimension <= 2 for part in parts):
-            normals = sum_normals(parts, r, self._rounding)
-            offsets = sum(
-                ((part.points @ normals.T).max(axis=0) for part in parts),
-                start=np.zeros(len(normals)),
-            )
-            return Faces(normals, np.asarray(offsets))
-        return Faces(*hull_facets(sums(parts)))
+        """In the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
+        return self._clipped[1] if len(self._cuts) else self._sum.facets
 
     def half_spaces(self) -> HalfSpaces:
         """Return the set at u = 1 as inequalities and, where it is flat, equations.
@@ -374,7 +267,7 @@ class WrenchSpace:
         EmptySetError
             If nothing is left at u = 1.
         """
-        scaled = lifted(self._facets, *self._axes, self._base)
+        scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
             normals=scaled.normals * SCALE, equation_normals=scaled.equation_normals * SCALE
         )
@@ -387,20 +280,13 @@ class WrenchSpace:
         EmptySetError
             If nothing is left at u = 1.
         """
-        directions, reach = self._axes
-        return np.asarray(((self._vertices * reach) @ directions + self._base) / SCALE)
+        directions, reach = self._sum.axes
+        return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / SCALE)
 
     @property
     def _vertices(self) -> Array:
-        """Vertices (n, r) in the coordinates of `_axes`, about `_base`."""
-        return self._clipped[0] if len(self._cuts) else self._sum_vertices
-
-    @cached_property
-    def _sum_vertices(self) -> Array:
-        """Vertices of the sum of the blocks, without wrench rows."""
-        if not self._parts:
-            return np.zeros((1, 0))
-        return sum_vertices(self._parts, *self._sum_facets, self._rounding)
+        """Vertices (n, r) in the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
+        return self._clipped[0] if len(self._cuts) else self._sum.vertices
 
     def support(self, direction: ArrayLike) -> float:
         """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
@@ -413,7 +299,7 @@ class WrenchSpace:
             If a linear program fails.
         """
         d = finite_vector(direction, 6, "direction")
-        y = self._extreme(self.generators.T @ d)
+        y = self._sum.extreme(self.generators.T @ d)
         if not len(self._cuts) or self._obeys(y):
             return float(d @ self.wrench(y))
         farthest = self._farthest(d)
@@ -486,7 +372,7 @@ class WrenchSpace:
             If the hull of the vertices cannot be found.
         """
         r = self.dimension
-        stretch = float(np.prod(self._axes[1]))
+        stretch = float(np.prod(self._sum.axes[1]))
         if r == 0:
             return 0.0, 0
         if r == 1:

@@ -16,10 +16,9 @@ from stances import SANDPAPER, ask, on_wall
 from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits
 from hand_models.finger import OpenFinger, close_all
 from hand_models.finger.contact_states import close
-from hand_models.fixed_wrist import wrench_spaces
+from hand_models.fixed_wrist import wrench_space, wrench_spaces
 from hand_models.hand import Placement
 from hand_models.tendon import share_load
-from hand_models.wrench_spaces import space as wrench_space
 from planner.prepare import assemble
 
 HOLDS = {

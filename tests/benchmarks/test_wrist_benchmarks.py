@@ -16,7 +16,7 @@ from hand_models.compliance import (
     search_box,
     wrist_pose,
 )
-from hand_models.wrench_spaces import space as wrench_space
+from hand_models.fixed_wrist import wrench_space
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 

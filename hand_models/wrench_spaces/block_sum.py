@@ -1,0 +1,123 @@
+"""The sum of a wrench space's blocks: its facets and vertices, wrench rows left aside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, Indices, UnsupportedError
+from hand_models.wrench_spaces import zonotope
+from hand_models.wrench_spaces.half_spaces import Faces, affine_hull
+from hand_models.wrench_spaces.minkowski_sums import (
+    Summand,
+    extreme_points,
+    sum_normals,
+    sum_vertices,
+    sums,
+)
+from hand_models.wrench_spaces.polytopes import TOLERANCE, hull_facets
+from hand_models.wrench_spaces.scaled_wrench import SCALE
+
+__all__ = ["BlockSum"]
+
+MOST_CANDIDATES: Final = 500_000
+"""How many sums of the blocks' vertices are looked through; that many take some 20 s."""
+
+
+class BlockSum:
+    """Minkowski sum of the images of blocks of coupled columns.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (6,)
+        o [N, N·m].
+    generators : ndarray, shape (6, m)
+        V.
+    blocks : sequence of tuple
+        Columns of each block and the vertices of its polytope, (indices, (n, d)).
+    """
+
+    def __init__(
+        self, origin: Array, generators: Array, blocks: Sequence[tuple[Indices, Array]]
+    ) -> None:
+        self.origin, self.generators, self.blocks = origin, generators, blocks
+
+    @cached_property
+    def _summands(self) -> tuple[Summand, ...]:
+        """The blocks' images that are more than a point, about `base`."""
+        summands = []
+        for columns, vertices in self.blocks:
+            image = (vertices @ self.generators[:, columns].T) * SCALE
+            summands.append(extreme_points(image))
+        return tuple(summands)
+
+    @cached_property
+    def base(self) -> Array:
+        """A scaled wrench of the set."""
+        start = self.origin * SCALE
+        return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
+
+    @cached_property
+    def axes(self) -> tuple[Array, Array]:
+        """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
+
+        Facets and vertices are found in coordinates along these, divided by the reach.
+        """
+        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
+        return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
+
+    @cached_property
+    def _parts(self) -> list[Summand]:
+        """The summands that are more than a point, about `base`, in the coordinates of `axes`."""
+        directions, reach = self.axes
+        summands = [s for s in self._summands if s.dimension]
+        candidates = math.prod(len(s.points) for s in summands)
+        if candidates > MOST_CANDIDATES:
+            raise UnsupportedError(
+                f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
+                "use fewer half_planes, or leave lateral out"
+            )
+        return [
+            Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
+        ]
+
+    @property
+    def rounding(self) -> float:
+        """How far rounding may move points in the coordinates of `axes`: more in a thin set."""
+        reach = self.axes[1]
+        return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
+
+    def extreme(self, slopes: Array) -> Array:
+        """Return the loads y, shape (m,), with the largest slopes · y in the sum."""
+        y = np.zeros(self.generators.shape[1])
+        for columns, vertices in self.blocks:
+            y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
+        return y
+
+    @cached_property
+    def facets(self) -> Faces:
+        """Facets of the sum of the blocks, without wrench rows."""
+        parts, r = self._parts, len(self.axes[1])
+        if r == 0:
+            return Faces(np.zeros((0, 0)), np.zeros(0))
+        if all(part.dimension == 1 for part in parts):
+            return zonotope.facets(np.array([part.points[1] for part in parts]))
+        if all(part.dimension <= 2 for part in parts):
+            normals = sum_normals(parts, r, self.rounding)
+            offsets = sum(
+                ((part.points @ normals.T).max(axis=0) for part in parts),
+                start=np.zeros(len(normals)),
+            )
+            return Faces(normals, np.asarray(offsets))
+        return Faces(*hull_facets(sums(parts)))
+
+    @cached_property
+    def vertices(self) -> Array:
+        """Vertices of the sum of the blocks, without wrench rows."""
+        if not self._parts:
+            return np.zeros((1, 0))
+        return sum_vertices(self._parts, *self.facets, self.rounding)

@@ -1,0 +1,97 @@
+"""Polytopes cut with half-spaces, vertex by vertex and edge by edge."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.sparse import csr_array, hstack, vstack
+
+from hand_models.base import Array, Indices
+from hand_models.wrench_spaces.half_spaces import Faces
+from hand_models.wrench_spaces.polytopes import distinct
+
+__all__ = ["clipped"]
+
+SPANNING: Final = 1e-13
+"""Squares of unit normals that span a direction sum to more than this in it."""
+
+
+def clipped(
+    vertices: Array, faces: Faces, cuts: Faces, rounding: float
+) -> tuple[Array, Faces] | None:
+    """Return the vertices (n, r) and facets of a polytope that is cut with half-spaces.
+
+    One after another: vertices beyond a cut go, and every edge that crosses it gets a new one. Two
+    vertices are the ends of an edge where the normals of the facets that both lie on span all
+    directions but one.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, r)
+    faces : Faces
+        All facets of the polytope.
+    cuts : Faces
+    rounding : float
+        How far rounding may move points.
+
+    Returns
+    -------
+    tuple or None
+        None if nothing, or nothing with an interior, is left.
+    """
+    if not len(cuts.offsets):
+        return vertices, faces
+    slack = 10.0 * rounding * (1.0 + float(np.abs(faces.offsets).max()))
+    lies = _incidence(vertices, faces, slack)
+    beyond = vertices @ cuts.normals.T > cuts.offsets
+    # those that take most away first: what is gone need not be cut again
+    for k in np.argsort(-beyond.sum(axis=0)):
+        normal, offset = cuts.normals[k], cuts.offsets[k]
+        height = vertices @ normal - offset
+        inside, outside = np.flatnonzero(height < -slack), np.flatnonzero(height > slack)
+        if not len(outside):
+            continue
+        if not len(inside):
+            return None
+        near, far = _edges(lies, inside, outside, faces)
+        part = (height[near] / (height[near] - height[far]))[:, None]
+        crossings = distinct(vertices[near] + part * (vertices[far] - vertices[near]), slack)
+        kept = height <= slack
+        vertices = np.vstack([vertices[kept], crossings])
+        on_cut = np.append(height[kept] >= -slack, np.ones(len(crossings)))[:, None]
+        lies = vstack([lies[kept], _incidence(crossings, faces, slack)])
+        lies = hstack([lies, csr_array(on_cut)], format="csr")
+        met = np.asarray(lies.sum(axis=0)).ravel() >= vertices.shape[1]
+        lies = lies[:, met]
+        normals, offsets = np.vstack([faces.normals, normal]), np.append(faces.offsets, offset)
+        faces = Faces(normals[met], offsets[met])
+    return vertices, faces
+
+
+def _edges(
+    lies: csr_array, starts: Indices, ends: Indices, faces: Faces
+) -> tuple[Indices, Indices]:
+    """Return the ends of all edges that lead from some vertices to some others."""
+    r = faces.normals.shape[1]
+    if r == 1:
+        return starts, ends
+    one, other = lies[starts], lies[ends]
+    shared = (one @ other.T).tocoo()
+    enough = shared.data >= r - 1
+    i, j = shared.row[enough], shared.col[enough]
+    squares = np.einsum("kr,ks->krs", faces.normals, faces.normals).reshape(-1, r * r)
+    spans = np.linalg.eigvalsh((one[i].multiply(other[j]) @ squares).reshape(-1, r, r))
+    edge = spans[:, 1] > SPANNING
+    return starts[i[edge]], ends[j[edge]]
+
+
+def _incidence(points: Array, faces: Faces, slack: float) -> csr_array:
+    """Return which points (rows) lie on which facets (columns), as ones."""
+    chunk = max(1, 2_000_000 // len(faces.offsets))
+    parts = [
+        csr_array((points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack).astype(float))
+        for k in range(0, max(len(points), 1), chunk)
+    ]
+    lies: csr_array = vstack(parts, format="csr")
+    return lies
