@@ -6,8 +6,9 @@ import pytest
 from hand_models.compliance import gripper_table, search
 from hand_models.experiments import clipped, extents, in_paper_signs
 from hand_models.parameters import experiment_table, hand_table
-from hand_models.studies import calibrate
-from hand_models.studies.calibrate import HELD, Fit, pulled_pose
+from hand_models.studies import calibrate, gripper_fit
+from hand_models.studies.calibrate import HELD
+from hand_models.studies.gripper_fit import Fit, pulled_pose
 
 FIT = Fit(gripper_table())
 
@@ -69,7 +70,7 @@ def test_a_short_run_tells_residuals_numbers_and_what_is_excluded(monkeypatch, t
     monkeypatch.setattr(calibrate, "HELD", HELD[:excluded])
     monkeypatch.setattr(calibrate, "FITS", 1)
     monkeypatch.setattr(calibrate, "REFITS", 1)
-    monkeypatch.setattr(calibrate, "RAYS", 200)
+    monkeypatch.setattr(gripper_fit, "RAYS", 200)
     told = []
     result = calibrate.run(lambda done, total: told.append((done, total)), hand_table())
     assert told[-1][0] == told[-1][1]
