@@ -10,7 +10,15 @@ from scipy.spatial import ConvexHull
 from hand_models import InvalidInputError
 from hand_models.base import EmptySetError
 from hand_models.compliance import Gripper, gripper_table
-from hand_models.experiments import Axis, HullPoints, clipped, limit, rest_state, section, sharpened
+from hand_models.experiments import (
+    Axis,
+    HullPoints,
+    clipped_vertices,
+    limit,
+    rest_state,
+    section,
+    sharpened,
+)
 from hand_models.experiments.force_limits import force_limits, surface_named, unloaded_pose
 from hand_models.parameters import experiment_table
 from hand_models.tile import Surface
@@ -57,7 +65,7 @@ def test_a_limit_is_a_combination_of_its_corners_and_its_direction_bounds_it(see
         assert reached[found.corners] == pytest.approx(reached.max())
     sheared = limit(points, "shear")
     assert sheared.wrench[0] == pytest.approx(RATIO * sheared.wrench[2])
-    polygon = section(clipped(points), (1.0, 0.0, -RATIO))
+    polygon = section(clipped_vertices(points), (1.0, 0.0, -RATIO))
     assert sheared.value == pytest.approx(polygon[:, 0].max())
 
 

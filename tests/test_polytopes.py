@@ -14,7 +14,7 @@ from hand_models import EmptySetError, InvalidInputError, WrenchSpace
 from hand_models.base import SolverError, UnsupportedError
 from hand_models.wrench_spaces import SCALE, Row
 from hand_models.wrench_spaces.clipping import clipped
-from hand_models.wrench_spaces.half_spaces import Faces
+from hand_models.wrench_spaces.half_spaces import Facets
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -288,14 +288,14 @@ def test_a_limit_needs_a_capacity_above_zero(capacity):
 def cube(r):
     """Vertices and facets of [0, 1]^r."""
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=r)))
-    return corners, Faces(np.vstack([np.eye(r), -np.eye(r)]), np.repeat([1.0, 0.0], r))
+    return corners, Facets(np.vstack([np.eye(r), -np.eye(r)]), np.repeat([1.0, 0.0], r))
 
 
 @pytest.mark.parametrize("r", [1, 2, 3, 4, 5, 6])
 @pytest.mark.parametrize("part", [0.5, 1.0])
 def test_the_corner_of_a_cube_is_a_simplex(r, part):
     """Of sides ``part`` of the cube's: r + 1 vertices and facets, but r of each on the line."""
-    cut = Faces(np.full((1, r), r**-0.5), np.array([part * r**-0.5]))
+    cut = Facets(np.full((1, r), r**-0.5), np.array([part * r**-0.5]))
     vertices, faces = clipped(*cube(r), cut, 1e-9)
     expected = part * np.vstack([np.zeros(r), np.eye(r)])
     gaps = np.abs(vertices[:, None] - expected).max(axis=2)
@@ -307,15 +307,15 @@ def test_the_corner_of_a_cube_is_a_simplex(r, part):
 def test_a_cut_beyond_everything_leaves_nothing_and_one_that_misses_leaves_all():
     vertices, faces = cube(3)
     up = np.array([[0.0, 0.0, 1.0]])
-    assert clipped(vertices, faces, Faces(up, np.array([-0.1])), 1e-9) is None
-    kept, same = clipped(vertices, faces, Faces(up, np.array([1.1])), 1e-9)
+    assert clipped(vertices, faces, Facets(up, np.array([-0.1])), 1e-9) is None
+    kept, same = clipped(vertices, faces, Facets(up, np.array([1.1])), 1e-9)
     np.testing.assert_array_equal(kept, vertices)
     assert len(same.offsets) == 6
 
 
 def test_a_cut_through_vertices_keeps_them_and_adds_none_beside_them():
     """A cube halved along the diagonals of two faces is a prism."""
-    half = Faces(np.array([[1.0, 1.0, 0.0]]) / math.sqrt(2.0), np.array([1.0 / math.sqrt(2.0)]))
+    half = Facets(np.array([[1.0, 1.0, 0.0]]) / math.sqrt(2.0), np.array([1.0 / math.sqrt(2.0)]))
     vertices, faces = clipped(*cube(3), half, 1e-9)
     assert len(vertices) == 6
     assert set(map(tuple, vertices)) <= set(map(tuple, cube(3)[0]))
@@ -330,7 +330,7 @@ def test_cuts_leave_what_qhull_says_of_all_half_spaces_together(seed, r):
     normals = rng.normal(size=(rng.integers(1, 7), r))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     inside = rng.uniform(0.2, 0.8, r)
-    cuts = Faces(normals, normals @ inside + rng.uniform(0.05, 0.4, len(normals)))
+    cuts = Facets(normals, normals @ inside + rng.uniform(0.05, 0.4, len(normals)))
     found, left = clipped(vertices, faces, cuts, 1e-10)
     every = np.vstack([np.column_stack([n, -o]) for n, o in (faces, cuts)])
     corners = HalfspaceIntersection(every, inside).intersections

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from hand_models.experiments import (
     UNITS,
-    clipped,
+    clipped_vertices,
     distance_along,
     extents,
     in_paper_signs,
@@ -50,14 +50,14 @@ def test_the_papers_moment_is_minus_the_contracts():
 
 
 def test_a_box_cut_at_no_pull_keeps_its_lower_part():
-    below = clipped(np.vstack([BOX, BOX.mean(axis=0)]))
+    below = clipped_vertices(np.vstack([BOX, BOX.mean(axis=0)]))
     assert {tuple(v) for v in below} == {
         (x, z, m) for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)
     }
     assert extents(below) == (40.0, -20.0, 1.0)
     assert volume(below) == pytest.approx(80.0 * 20.0 * 2.0)
-    assert clipped(BOX, offset=50.0).shape == (8, 3)
-    assert clipped(BOX, offset=-21.0).shape == (0, 3)
+    assert clipped_vertices(BOX, offset=50.0).shape == (8, 3)
+    assert clipped_vertices(BOX, offset=-21.0).shape == (0, 3)
 
 
 def test_a_box_in_the_plane_of_a_cable():
@@ -135,9 +135,9 @@ def test_a_plane_that_touches_a_hull_meets_its_face_its_edge_or_its_corner(shift
 
 @pytest.mark.parametrize("shift", ROUNDING)
 def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
-    moved = np.sort(clipped(np.add(HALF, (0.0, shift, 0.0))), axis=0)
+    moved = np.sort(clipped_vertices(np.add(HALF, (0.0, shift, 0.0))), axis=0)
     np.testing.assert_allclose(moved, np.sort(HALF, axis=0), atol=1e-11)
-    assert clipped(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
+    assert clipped_vertices(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
 
 
 @settings(max_examples=20, deadline=None)
@@ -145,7 +145,7 @@ def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
 def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hull(points, seed):
     """The origin is inside the whole hull, where nothing is in doubt, and on the part's face."""
     normal = np.random.default_rng(seed).normal(size=3) * UNITS
-    below = clipped(points, normal)
+    below = clipped_vertices(points, normal)
     along = np.cross(normal / UNITS, np.eye(3)) / UNITS
     ways = np.vstack([along, -along])
     whole = distance_along(points, ways)
@@ -166,7 +166,7 @@ def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hul
 def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=3) * UNITS
-    below = clipped(points, normal, offset)
+    below = clipped_vertices(points, normal, offset)
     assert (below @ normal <= offset + 1e-9).all()
     assert all(inside(points, vertex) for vertex in below)
     for wrench in rng.dirichlet(np.ones(len(points)), 10) @ points:

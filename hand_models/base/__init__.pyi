@@ -15,4 +15,5 @@ from .frames import (
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
+from .progress import Progress as Progress
 from .recent import Recent as Recent

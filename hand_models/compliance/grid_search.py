@@ -8,7 +8,6 @@ lie on the boundary, and each tells which phalanx of which finger fails there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -19,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from hand_models.base import Array, EmptySetError, Indices, InvalidInputError
+from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
 from hand_models.compliance.grasp import CompliantGrasp, Verdict
 from hand_models.compliance.pose_box import SearchBox, search_box
 from hand_models.wrench_spaces import SCALE, Row
@@ -28,8 +27,6 @@ __all__ = ["PLANAR", "WristSearch", "boundary", "search"]
 
 PLANAR: Final = (0, 2, 4)
 """Components F_x, F_z, M_y of a wrench, of a grasp that moves in a plane."""
-
-Progress = Callable[[int, int], None]
 
 CHUNK: Final = 50_000
 """Poses that are evaluated at once."""

@@ -8,14 +8,13 @@ program that is linear in each set may choose the one that serves it best.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, EmptySetError
+from hand_models.base import Array, EmptySetError, Progress
 from hand_models.compliance.directional_limit import farthest, linear_extreme
 from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.grid_search import WristSearch, boundary
@@ -23,8 +22,6 @@ from hand_models.compliance.pose_box import search_box
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["Piece", "PieceList", "pieces"]
-
-Progress = Callable[[int, int], None]
 
 RAYS: Final = 1024
 """Of the search that limiting poses are looked for from."""

@@ -20,7 +20,6 @@ from .pulling import (
 )
 from .study_result import (
     Claim as Claim,
-    Progress as Progress,
     StudyResult as StudyResult,
     save_picture as save_picture,
 )
@@ -42,7 +41,7 @@ from .sweep_picture import (
 from .wrench_hull import (
     UNITS as UNITS,
     Extents as Extents,
-    clipped as clipped,
+    clipped_vertices as clipped_vertices,
     distance_along as distance_along,
     extents as extents,
     in_paper_signs as in_paper_signs,

@@ -24,7 +24,7 @@ from hand_models.compliance import (
     sandpaper,
     search_box,
 )
-from hand_models.experiments.wrench_hull import PULL_OFF, clipped, in_paper_signs, volume
+from hand_models.experiments.wrench_hull import PULL_OFF, clipped_vertices, in_paper_signs, volume
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.tile import Surface
 from hand_models.wrench_spaces import Row
@@ -288,7 +288,7 @@ def force_limits(
         points, end = sharpened(grasp, points, measure, cuts, starts)
         found[measure] = end.value
     if "volume" in measures:
-        below = clipped(points.wrenches)
+        below = clipped_vertices(points.wrenches)
         found["volume"] = volume(below) if len(below) else 0.0
     return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,10 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Claim", "Progress", "StudyResult", "save_picture"]
-
-Progress = Callable[[int, int], None]
-"""Told how many steps are done, of how many."""
+__all__ = ["Claim", "StudyResult", "save_picture"]
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import EmptySetError, InvalidInputError
+from hand_models.base import EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments.force_limits import MEASURES, Measure, force_limits, rest_state
-from hand_models.experiments.study_result import Progress, StudyResult, save_picture
+from hand_models.experiments.study_result import StudyResult, save_picture
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.sweep_picture import NO_GRASP, conditions_title, draw_map, legend
 from hand_models.parameters import ParameterTable, experiment_table

@@ -24,7 +24,7 @@ __all__ = [
     "PULL_OFF",
     "UNITS",
     "Extents",
-    "clipped",
+    "clipped_vertices",
     "distance_along",
     "extents",
     "in_paper_signs",
@@ -82,7 +82,7 @@ def volume(points: Array) -> float:
     return float(hull(points * UNITS).volume / np.prod(UNITS))
 
 
-def clipped(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
+def clipped_vertices(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
     """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
 
     None, shape (0, 3), if no vertex of the hull is below the plane.

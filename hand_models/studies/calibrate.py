@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments import Claim, Progress, StudyResult, save_picture
+from hand_models.experiments import Claim, StudyResult, save_picture
 from hand_models.parameters import ParameterTable, hand_table
 from hand_models.studies.gripper_fit import Fit
 from hand_models.tile import Surface

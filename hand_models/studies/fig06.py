@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from hand_models.experiments import Claim, PalmExperiment, Progress, StudyResult, save_picture
+from hand_models.base import Progress
+from hand_models.experiments import Claim, PalmExperiment, StudyResult, save_picture
 from hand_models.parameters import ParameterTable
 from hand_models.tendon import share_load
 

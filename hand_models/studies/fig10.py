@@ -17,8 +17,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from hand_models.base import Array
-from hand_models.experiments import Claim, Progress, StudyResult, save_picture
+from hand_models.base import Array, Progress
+from hand_models.experiments import Claim, StudyResult, save_picture
 from hand_models.parameters import ParameterTable
 from hand_models.studies.fig10_picture import draw_curve, draw_surface, draw_table
 from hand_models.tile import (

@@ -14,12 +14,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
 from hand_models.experiments import (
     BALANCED,
     Claim,
-    Progress,
     StudyResult,
     pull,
     save_picture,

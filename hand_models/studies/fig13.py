@@ -16,15 +16,14 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from hand_models.base import Array
+from hand_models.base import Array, Progress
 from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
 from hand_models.experiments import (
     UNITS,
     Claim,
     Extents,
-    Progress,
     StudyResult,
-    clipped,
+    clipped_vertices,
     distance_along,
     even_pulls,
     extents,
@@ -82,7 +81,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     unloaded(gripper)
     found = search(gripper, PER_AXIS, lambda i, n: progress(SEARCHED * i // n, STEPS))
     whole = in_paper_signs(found.wrenches)
-    full, shown = vertices(whole), clipped(whole)
+    full, shown = vertices(whole), clipped_vertices(whole)
     size = np.abs(shown).max(axis=0)
     held = whole[whole[:, 1] <= 0.0]
     directions = even_pulls(DIRECTIONS, size)
@@ -225,7 +224,7 @@ def _linearised(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
             "mean_size_of_error": float(np.abs(error).mean()),
             "error_pulling": _spread(error[pulling]),
             "mean_size_of_error_pulling": float(np.abs(error[pulling]).mean()),
-            "extents": extents(clipped(points))._asdict(),
+            "extents": extents(clipped_vertices(points))._asdict(),
         }
     return result
 

@@ -17,16 +17,15 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, Progress
 from hand_models.compliance import Gripper, gripper_table, search
 from hand_models.experiments import (
     DRAGGED,
     UNBALANCED,
     Claim,
-    Progress,
     Pulled,
     StudyResult,
-    clipped,
+    clipped_vertices,
     even_pulls,
     extents,
     in_paper_signs,
@@ -112,7 +111,7 @@ def _surface(gripper: Gripper, tell: Callable[[float], None]) -> dict[str, Any]:
     unloaded(gripper)
     found = search(gripper, PER_AXIS)
     tell(0.1)
-    shown = clipped(in_paper_signs(found.wrenches))
+    shown = clipped_vertices(in_paper_signs(found.wrenches))
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
     directions = even_pulls(DIRECTIONS, np.abs(shown).max(axis=0))

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import bisect
 
-from hand_models.base import Array, EmptySetError, InvalidInputError
+from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     PARAMETER_STUDIES,
@@ -23,9 +23,8 @@ from hand_models.experiments import (
     Conditions,
     HullPoints,
     Limit,
-    Progress,
     StudyResult,
-    clipped,
+    clipped_vertices,
     distance_along,
     limit,
     rest_state,
@@ -123,7 +122,7 @@ def _at(grasp: Gripper, rays: int) -> dict[str, Any]:
         "shear": shear.value,
         "pure_shear": pure if np.isfinite(pure) else None,
         "normal": normal.value,
-        "volume": volume(clipped(points.wrenches)),
+        "volume": volume(clipped_vertices(points.wrenches)),
         "pressed_share": _pressed_share(grasp, points, shear),
         "shear_phalanges": _phalanges(points, shear),
         "normal_phalanges": _phalanges(points, normal),

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     Axis,
@@ -23,7 +23,6 @@ from hand_models.experiments import (
     Claim,
     Conditions,
     Measure,
-    Progress,
     StudyResult,
     conditions_title,
     draw_map,

@@ -10,11 +10,11 @@ from scipy.optimize import brentq, least_squares
 
 from hand_models.base import Array, CruxError, SolverError
 from hand_models.compliance import Gripper, boundary, linear_box
-from hand_models.experiments import clipped, extents, in_paper_signs
+from hand_models.experiments import clipped_vertices, extents, in_paper_signs
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, Quantity, experiment_table
 
-__all__ = ["Fit", "Number", "numbers", "pulled_pose"]
+__all__ = ["Fit", "FreeParameter", "numbers", "pulled_pose"]
 
 FORCE_TOLERANCE: Final = 0.3
 RELATIVE_TOLERANCE: Final = 0.1
@@ -35,7 +35,7 @@ HOPELESS: Final = 30.0
 
 
 @dataclass(frozen=True)
-class Number:
+class FreeParameter:
     """One number to be found: its entry in the gripper's table, and its plausible range."""
 
     label: str
@@ -47,15 +47,15 @@ class Number:
     unit: str
 
 
-def numbers() -> tuple[Number, ...]:
+def numbers() -> tuple[FreeParameter, ...]:
     """Return the numbers to be found."""
     ranges = experiment_table().sections["calibration"]
 
-    def of(label: str, section: str, entry: str, index: int | None, name: str) -> Number:
+    def of(label: str, section: str, entry: str, index: int | None, name: str) -> FreeParameter:
         quantity = ranges[name]
         assert isinstance(quantity.value, list)
         low, high = quantity.value
-        return Number(label, section, entry, index, low, high, quantity.unit)
+        return FreeParameter(label, section, entry, index, low, high, quantity.unit)
 
     found = [
         of(name, "gripper", name, None, name)
@@ -134,7 +134,7 @@ class Fit:
             loads, _ = gripper.finger_loads(pulled_pose(gripper, pull)[None])
             found += [*loads.shears[0], *loads.normals[0]]
         space = boundary(gripper, linear_box(gripper), RAYS)
-        return np.array([*found, *extents(clipped(in_paper_signs(space.wrenches)))])
+        return np.array([*found, *extents(clipped_vertices(in_paper_signs(space.wrenches)))])
 
     def residuals(self, x: Array) -> Array:
         """Return how many tolerances each datum is off, shape (15,)."""
@@ -196,13 +196,13 @@ def pulled_pose(gripper: Gripper, pull: float) -> Array:
     raise SolverError(f"no pose of the gripper balances a pull of {pull:g} N")
 
 
-def _value(table: ParameterTable, number: Number) -> float:
+def _value(table: ParameterTable, number: FreeParameter) -> float:
     if number.index is None:
         return table.scalar(number.section, number.entry)
     return table.vector(number.section, number.entry)[number.index]
 
 
-def _with(table: ParameterTable, number: Number, value: float) -> ParameterTable:
+def _with(table: ParameterTable, number: FreeParameter, value: float) -> ParameterTable:
     old = table.quantity(number.section, number.entry)
     new: float | list[float] = value
     if number.index is not None:

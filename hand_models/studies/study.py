@@ -16,8 +16,8 @@ from typing import Any, Final, Protocol, cast
 
 import msgspec
 
-from hand_models.base import InvalidInputError
-from hand_models.experiments import Progress, StudyResult
+from hand_models.base import InvalidInputError, Progress
+from hand_models.experiments import StudyResult
 from hand_models.parameters import ParameterTable, hand_table
 
 __all__ = [

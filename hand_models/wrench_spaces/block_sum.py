@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, UnsupportedError
 from hand_models.wrench_spaces import zonotope
-from hand_models.wrench_spaces.half_spaces import Faces, affine_hull
+from hand_models.wrench_spaces.half_spaces import Facets, affine_hull
 from hand_models.wrench_spaces.minkowski_sums import (
     Summand,
     extreme_points,
@@ -99,11 +99,11 @@ class BlockSum:
         return y
 
     @cached_property
-    def facets(self) -> Faces:
+    def facets(self) -> Facets:
         """Facets of the sum of the blocks, without wrench rows."""
         parts, r = self._parts, len(self.axes[1])
         if r == 0:
-            return Faces(np.zeros((0, 0)), np.zeros(0))
+            return Facets(np.zeros((0, 0)), np.zeros(0))
         if all(part.dimension == 1 for part in parts):
             return zonotope.facets(np.array([part.points[1] for part in parts]))
         if all(part.dimension <= 2 for part in parts):
@@ -112,8 +112,8 @@ class BlockSum:
                 ((part.points @ normals.T).max(axis=0) for part in parts),
                 start=np.zeros(len(normals)),
             )
-            return Faces(normals, np.asarray(offsets))
-        return Faces(*hull_facets(sums(parts)))
+            return Facets(normals, np.asarray(offsets))
+        return Facets(*hull_facets(sums(parts)))
 
     @cached_property
     def vertices(self) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array, hstack, vstack
 
 from hand_models.base import Array, Indices
-from hand_models.wrench_spaces.half_spaces import Faces
+from hand_models.wrench_spaces.half_spaces import Facets
 from hand_models.wrench_spaces.polytopes import distinct
 
 __all__ = ["clipped"]
@@ -18,8 +18,8 @@ SPANNING: Final = 1e-13
 
 
 def clipped(
-    vertices: Array, faces: Faces, cuts: Faces, rounding: float
-) -> tuple[Array, Faces] | None:
+    vertices: Array, faces: Facets, cuts: Facets, rounding: float
+) -> tuple[Array, Facets] | None:
     """Return the vertices (n, r) and facets of a polytope that is cut with half-spaces.
 
     One after another: vertices beyond a cut go, and every edge that crosses it gets a new one. Two
@@ -65,12 +65,12 @@ def clipped(
         met = np.asarray(lies.sum(axis=0)).ravel() >= vertices.shape[1]
         lies = lies[:, met]
         normals, offsets = np.vstack([faces.normals, normal]), np.append(faces.offsets, offset)
-        faces = Faces(normals[met], offsets[met])
+        faces = Facets(normals[met], offsets[met])
     return vertices, faces
 
 
 def _edges(
-    lies: csr_array, starts: Indices, ends: Indices, faces: Faces
+    lies: csr_array, starts: Indices, ends: Indices, faces: Facets
 ) -> tuple[Indices, Indices]:
     """Return the ends of all edges that lead from some vertices to some others."""
     r = faces.normals.shape[1]
@@ -86,7 +86,7 @@ def _edges(
     return starts[i[edge]], ends[j[edge]]
 
 
-def _incidence(points: Array, faces: Faces, slack: float) -> csr_array:
+def _incidence(points: Array, faces: Facets, slack: float) -> csr_array:
     """Return which points (rows) lie on which facets (columns), as ones."""
     chunk = max(1, 2_000_000 // len(faces.offsets))
     parts = [

@@ -12,13 +12,13 @@ import numpy as np
 
 from hand_models.base import Array
 
-__all__ = ["FLATNESS", "Faces", "HalfSpaces", "affine_hull", "lifted"]
+__all__ = ["FLATNESS", "Facets", "HalfSpaces", "affine_hull", "lifted"]
 
 FLATNESS: Final = 1e-9
 """A set is flat in a direction in which it reaches less than this times its longest reach."""
 
 
-class Faces(NamedTuple):
+class Facets(NamedTuple):
     """Facets of a polytope: unit outward normals (k, r), and offsets (k,)."""
 
     normals: Array
@@ -51,7 +51,7 @@ def affine_hull(edges: Array) -> tuple[Array, Array]:
     return directions[:rank], reach[:rank]
 
 
-def lifted(faces: Faces, directions: Array, reach: Array, base: Array) -> HalfSpaces:
+def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfSpaces:
     """Return half-spaces of facets known in the coordinates of `affine_hull` about a point.
 
     Parameters

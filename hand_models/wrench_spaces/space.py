@@ -35,7 +35,7 @@ from hand_models.base import (
 )
 from hand_models.wrench_spaces.block_sum import BlockSum
 from hand_models.wrench_spaces.clipping import clipped
-from hand_models.wrench_spaces.half_spaces import FLATNESS, Faces, HalfSpaces, lifted
+from hand_models.wrench_spaces.half_spaces import FLATNESS, Facets, HalfSpaces, lifted
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope_vertices
 from hand_models.wrench_spaces.row import Row
 from hand_models.wrench_spaces.scaled_wrench import SCALE
@@ -239,7 +239,7 @@ class WrenchSpace:
         return float(direction @ self.wrench(result.x))
 
     @cached_property
-    def _clipped(self) -> tuple[Array, Faces]:
+    def _clipped(self) -> tuple[Array, Facets]:
         """Vertices (n, r) and facets where wrench rows cut the sum of the blocks."""
         directions, reach = self._sum.axes
         rows, held = self.D[self._cuts] / SCALE, self._held[self._cuts]
@@ -248,14 +248,14 @@ class WrenchSpace:
         # what is constant on the set, and yet beyond its capacity, is so by rounding
         turns = lengths > FLATNESS * held
         room = held - np.asarray(rows @ self._sum.base)
-        cuts = Faces(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
+        cuts = Facets(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
         found = clipped(self._sum.vertices, self._sum.facets, cuts, self._sum.rounding)
         if found is None:
             raise self._empty()
         return found
 
     @property
-    def _facets(self) -> Faces:
+    def _facets(self) -> Facets:
         """In the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
         return self._clipped[1] if len(self._cuts) else self._sum.facets
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, UnsupportedError
 from hand_models.wrench_spaces.cross_products import Expansion, cross_products, expansion
-from hand_models.wrench_spaces.half_spaces import Faces, HalfSpaces, affine_hull, lifted
+from hand_models.wrench_spaces.half_spaces import Facets, HalfSpaces, affine_hull, lifted
 from hand_models.wrench_spaces.polytopes import TOLERANCE
 
 __all__ = ["facets", "half_spaces"]
@@ -86,7 +86,7 @@ def half_spaces(
     return lifted(facets(edges @ directions.T / reach), directions, reach, o + G @ low)
 
 
-def facets(edges: Array) -> Faces:
+def facets(edges: Array) -> Facets:
     """Return the facets of the sum of segments from zero to each edge, which span R^r.
 
     Parameters
@@ -102,7 +102,7 @@ def facets(edges: Array) -> Faces:
     edges = edges[lengths > TOLERANCE * lengths.max(initial=0.0)]
     n, r = edges.shape
     if r == 0:
-        return Faces(np.zeros((0, 0)), np.zeros(0))
+        return Facets(np.zeros((0, 0)), np.zeros(0))
     if r == 1:
         normals = np.ones((1, 1))
     else:
@@ -116,7 +116,7 @@ def facets(edges: Array) -> Faces:
     slopes = normals @ edges.T
     up = np.maximum(slopes, 0.0).sum(axis=1)
     down = up - slopes.sum(axis=1)
-    return Faces(np.vstack([normals, -normals]), np.concatenate([up, down]))
+    return Facets(np.vstack([normals, -normals]), np.concatenate([up, down]))
 
 
 def _normals(edges: Array, choices: Expansion) -> Array:

@@ -15,11 +15,11 @@ from hand_models.rock import Hold
 from hand_models.tile import Surface
 from planner.robots import Robot, robosimian
 
-__all__ = ["EARTH", "SOLVE", "HandOnHold", "Stance", "Wrist", "known_limbs", "moderate"]
+__all__ = ["EARTH", "SOLVE", "HandOnHold", "Stance", "WristMode", "known_limbs", "moderate"]
 
-Wrist = Literal["fixed", "floating"]
+WristMode = Literal["fixed", "floating"]
 
-WRISTS: Final = get_args(Wrist)
+WRISTS: Final = get_args(WristMode)
 """How a wrist may be."""
 
 SOLVE: Final = "solve"
@@ -126,7 +126,7 @@ class HandOnHold:
     hold_pose: Pose | None = None
     hold_in_hand: Pose | None = None
     grasp: Grasp = field(default_factory=Grasp)
-    wrist: Wrist = "fixed"
+    wrist: WristMode = "fixed"
     tendon_preload: Array | None = None
     wrench: tuple[float | None, ...] | None = None
 

@@ -12,4 +12,8 @@ from .plan import (
     Times as Times,
 )
 from .plan_arrays import PlanArrays as PlanArrays
-from .set_points import SetPoints as SetPoints, Source as Source, no_set_points as no_set_points
+from .set_points import (
+    SetPoints as SetPoints,
+    SetPointSource as SetPointSource,
+    no_set_points as no_set_points,
+)

@@ -9,9 +9,9 @@ from hand_models.base import Array
 from hand_models.tendon import TendonDrive
 from planner.result.plan import Status
 
-__all__ = ["SetPoints", "Source", "no_set_points"]
+__all__ = ["SetPointSource", "SetPoints", "no_set_points"]
 
-Source = Literal["interpolated", "blended", "solved"]
+SetPointSource = Literal["interpolated", "blended", "solved"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,7 +52,7 @@ class SetPoints:
     wrenches: Array | None
     loads: Array | None
     verified: bool
-    source: Source
+    source: SetPointSource
     drive: TendonDrive | None = None
     reason: str | None = None
 

@@ -26,7 +26,7 @@ from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from planner.programs import SLACK
 from planner.question import Question, moderate
-from planner.result import SetPoints, Source, no_set_points
+from planner.result import SetPoints, SetPointSource, no_set_points
 from planner.streaming.prefetch import Mixture, Prefetch
 from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
 
@@ -187,7 +187,7 @@ class WrenchStream:
         return points if points.verified else self._without(wrench)
 
     def _told(
-        self, wrench: Array, loads: Array, read: LoadEffects, bound: float, source: Source
+        self, wrench: Array, loads: Array, read: LoadEffects, bound: float, source: SetPointSource
     ) -> SetPoints:
         """Return loads, and what they do, as set-points, checked."""
         stance, check = self._stance, self._stance.check
