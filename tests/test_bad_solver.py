@@ -8,8 +8,9 @@ import pytest
 from stances import CALIBRATION_LOAD, ask, on_wall, program_data
 
 from hand_models.rock import Cylinder, Plane
+from planner import programs
 from planner.prepare import hand_space
-from planner.programs import Outcome, solvers
+from planner.programs import Outcome
 from planner.question import Question
 from planner.solving import plan
 
@@ -23,11 +24,11 @@ def honest_outcome() -> Outcome:
         found["outcome"] = original(data, share)
         return found["outcome"]
 
-    original, solvers.unique = solvers.unique, keep
+    original, programs.unique = programs.unique, keep
     try:
         plan(QUESTION)
     finally:
-        solvers.unique = original
+        programs.unique = original
     return found["outcome"]
 
 
@@ -48,7 +49,7 @@ LIES = {
 def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
     outcome = lie(honest_outcome())
     for name in ("unique", "margin"):
-        monkeypatch.setattr(solvers, name, lambda *_: outcome)
+        monkeypatch.setattr(programs, name, lambda *_: outcome)
     answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
     assert answer.status == "failed"
     assert not answer.verified
@@ -89,13 +90,13 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
         hard_duals=tuple(np.zeros(len(hand.h)) for hand in hands),
     )
     for name in ("unique", "margin"):
-        monkeypatch.setattr(solvers, name, lambda *_: lie)
+        monkeypatch.setattr(programs, name, lambda *_: lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is
     truth = plan(question)
     assert truth.status == "infeasible"
     assert truth.certificate.supremum < truth.certificate.needed
     gave_up = Outcome(False, "solver_error", 0, float("nan"))
-    monkeypatch.setattr(solvers, "nearest", lambda data: gave_up)
+    monkeypatch.setattr(programs, "nearest", lambda data: gave_up)
     answer = plan(question)
     assert answer.status == "failed"
     assert words in answer.reason
@@ -105,7 +106,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
     nothing = Outcome(False, word, 0, float("nan"))
     for name in ("unique", "margin"):
-        monkeypatch.setattr(solvers, name, lambda *_: nothing)
+        monkeypatch.setattr(programs, name, lambda *_: nothing)
     answer = plan(QUESTION)
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -116,7 +117,7 @@ def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, wo
 
 def test_an_infeasible_stance_whose_distance_is_not_found_gets_failed(monkeypatch):
     nothing = Outcome(False, "solver_error", 0, float("nan"))
-    monkeypatch.setattr(solvers, "nearest", lambda *_: nothing)
+    monkeypatch.setattr(programs, "nearest", lambda *_: nothing)
     answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -127,8 +128,8 @@ def test_a_distance_that_is_made_up_gets_no_certificate(monkeypatch):
     loads = tuple(0.0 * y for y in honest_outcome().loads)
     far = Outcome(True, "optimal", 1, 3.0, loads=loads)
     for name in ("unique", "margin"):
-        monkeypatch.setattr(solvers, name, lambda d: Outcome(False, "infeasible", 0, float("nan")))
-    monkeypatch.setattr(solvers, "nearest", lambda data: far)
+        monkeypatch.setattr(programs, name, lambda d: Outcome(False, "infeasible", 0, float("nan")))
+    monkeypatch.setattr(programs, "nearest", lambda data: far)
     answer = plan(QUESTION)
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -141,7 +142,7 @@ def test_a_tie_break_that_fails_or_lies_leaves_the_plan_of_least_utilisation(mon
         replace(honest_outcome(), loads=tuple(1.01 * y for y in honest_outcome().loads)),
     )
     for lie in lies:
-        monkeypatch.setattr(solvers, "effort", lambda data, cap, lie=lie: lie)
+        monkeypatch.setattr(programs, "effort", lambda data, cap, lie=lie: lie)
         answer = plan(QUESTION)
         assert answer.status == "optimal"
         assert answer.verified
@@ -151,7 +152,7 @@ def test_a_tie_break_that_fails_or_lies_leaves_the_plan_of_least_utilisation(mon
 @pytest.mark.parametrize("value", [0.0, 5.0, float("nan")])
 def test_a_load_factor_that_its_loads_do_not_give_is_left_out(monkeypatch, value):
     lie = replace(honest_outcome(), value=value)
-    monkeypatch.setattr(solvers, "load_factor", lambda *_: lie)
+    monkeypatch.setattr(programs, "load_factor", lambda *_: lie)
     answer = plan(replace(QUESTION, want=frozenset({"load_factor"})))
     assert answer.load_factor is None
     assert not answer.load_factor_unbounded

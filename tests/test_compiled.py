@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 from patience import PATIENCE
 from stances import PLACES, ask, on_wall, program_data
 
-from planner.deadline import clock as deadline
+from planner import deadline
 from planner.programs import compiled, cvxpy_internals, program, solvers, stance_data
 from planner.programs.stance_data import Shape
 from planner.programs.stance_program import SETTINGS, StanceProgram

@@ -24,6 +24,7 @@ from test_service import Served, client_config, free_endpoint, plan_request
 
 from hand_models.base import InvalidInputError
 from hand_models.rock import Plane
+from planner import programs
 from planner.deadline import Budget, DeadlineError, clock as deadline
 from planner.explanation import certificate as certificates
 from planner.explanation.infeasibility import vertex
@@ -181,7 +182,7 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(grounds, "gather", "the hands were closed"), (solvers, "unique", "a plan was found")],
+    [(grounds, "gather", "the hands were closed"), (programs, "unique", "a plan was found")],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
@@ -199,7 +200,7 @@ def test_joint_angles_that_are_not_found_in_time_are_not_called_out_of_reach(mon
 
 
 def test_the_load_factor_is_left_out(monkeypatch, clock):
-    late_at(monkeypatch, clock, solvers, "load_factor")
+    late_at(monkeypatch, clock, programs, "load_factor")
     answer = late(QUESTION)
     assert answer.unfinished == ("load_factor",)
     assert answer.load_factor is None
@@ -212,9 +213,9 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
 
 
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):
-    monkeypatch.setattr(least_utilisation, "polished", lambda *_: None)
+    monkeypatch.setattr(least_utilisation, "active_set_optimum", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
-    late_at(monkeypatch, clock, solvers, "margin")
+    late_at(monkeypatch, clock, programs, "margin")
     answer = late(QUESTION)
     assert answer.unfinished == ("least_utilisation", "load_factor")
     assert answer.verified
@@ -224,7 +225,7 @@ def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock)
 
 
 def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypatch, clock):
-    monkeypatch.setattr(least_utilisation, "polished", lambda *_: None)
+    monkeypatch.setattr(least_utilisation, "active_set_optimum", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
     late_at(monkeypatch, clock, solvers, "tie_break")
     answer = late(QUESTION)
@@ -234,7 +235,7 @@ def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypat
 
 
 def test_instead_of_the_plan_of_least_effort_that_of_least_utilisation_leaves(monkeypatch, clock):
-    late_at(monkeypatch, clock, solvers, "effort")
+    late_at(monkeypatch, clock, programs, "effort")
     answer = late(replace(QUESTION, objective="min_effort"))
     assert answer.unfinished == ("least_effort", "load_factor")
     assert answer.verified
@@ -244,7 +245,7 @@ def test_instead_of_the_plan_of_least_effort_that_of_least_utilisation_leaves(mo
     assert answer.effort > plan(replace(QUESTION, objective="min_effort")).effort
 
 
-@pytest.mark.parametrize(("module", "name"), [(solvers, "reach"), (solvers, "margin")])
+@pytest.mark.parametrize(("module", "name"), [(programs, "reach"), (programs, "margin")])
 def test_the_way_from_the_present_tensions_is_left_out(monkeypatch, clock, module, name):
     late_at(monkeypatch, clock, module, name)
     answer = late(replace(QUESTION, present=PRESENT))
@@ -266,7 +267,7 @@ def assert_proven(question: Question, answer: Plan, cap: float | None) -> None:
 
 
 def test_that_there_is_no_plan_is_proven_by_the_first_solve_already(monkeypatch, clock):
-    late_at(monkeypatch, clock, solvers, "nearest")
+    late_at(monkeypatch, clock, programs, "nearest")
     answer = late(IMPOSSIBLE)
     assert answer.status == "infeasible"
     assert answer.verified
@@ -292,18 +293,18 @@ def test_a_proof_without_its_explanation(monkeypatch, clock):
 
 
 def test_neither_a_plan_nor_a_proof_of_none_is_an_error(monkeypatch, clock):
-    found = solvers.unique
+    found = programs.unique
     monkeypatch.setattr(
-        solvers, "unique", lambda *asked: replace(found(*asked), balance_dual=None, loads=())
+        programs, "unique", lambda *asked: replace(found(*asked), balance_dual=None, loads=())
     )
-    late_at(monkeypatch, clock, solvers, "margin")
+    late_at(monkeypatch, clock, programs, "margin")
     with pytest.raises(DeadlineError, match="a plan was found"):
         late(IMPOSSIBLE)
 
 
 def test_what_is_in_the_way_of_a_plan_within_the_limits_is_left_out_or_proven(monkeypatch, clock):
     assert in_time("heavy").status == "overloaded"
-    late_at(monkeypatch, clock, solvers, "nearest_body")
+    late_at(monkeypatch, clock, programs, "nearest_body")
     answer = late(TOO_HEAVY)
     assert answer.status == "overloaded"
     assert answer.utilisation == pytest.approx(in_time("heavy").utilisation, rel=1e-9)

@@ -41,8 +41,8 @@ from hand_models.base import (
     UnsupportedError,
     wrench_transport,
 )
+from planner import solving
 from planner.robots import robosimian
-from planner.solving import solve
 from service.answering import dispatch
 from service.answering.questions import question
 from service.replies import ErrorReply, PlanReply, WrenchSpaceReply
@@ -720,7 +720,7 @@ def test_whatever_the_planner_does_the_caller_gets_an_error(
     def fail(_: object) -> None:
         raise error
 
-    monkeypatch.setattr(solve, "plan", fail)
+    monkeypatch.setattr(solving, "plan", fail)
     got, _, message = refusal(wall_request())
     assert got == kind
     assert ("Traceback" in caplog.text) == (kind == "internal")

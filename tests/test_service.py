@@ -34,9 +34,9 @@ from test_messages import check_answer
 from zenoh.handlers import FifoChannel
 
 from hand_models.base import InvalidInputError
+from planner import solving
 from planner.prepare import settled_stance as settling
 from planner.robots import RobotFile
-from planner.solving import solve
 from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest
 from service.answering import dispatch
 from service.answering.dispatch import Answer
@@ -296,7 +296,7 @@ def test_a_fault_is_the_callers_error_and_the_service_goes_on(
     client = CruxClient(alone, timeout=PATIENCE)
     with PlanService(alone):
         with monkeypatch.context() as patch:
-            patch.setattr(solve, "plan", lambda _: 1 / 0)
+            patch.setattr(solving, "plan", lambda _: 1 / 0)
             with pytest.raises(ServiceError, match=r"the service failed \(ZeroDivisionError\)"):
                 client.plan(plan_request())
         assert "Traceback" in caplog.text
@@ -332,7 +332,7 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         assert turn.owner == threading.get_ident()
         raise InvalidInputError("done", field="stance")
 
-    monkeypatch.setattr(solve, "plan", exclusive)
+    monkeypatch.setattr(solving, "plan", exclusive)
     monkeypatch.setattr(settling, "resting_hand", exclusive)
     monkeypatch.setattr(dispatch, "explore", exclusive)
     stance = wall_request()["stance"]
@@ -367,7 +367,7 @@ def test_a_stop_does_not_wait_for_a_long_question(
         ended.set()
         raise InvalidInputError("too late")
 
-    monkeypatch.setattr(solve, "plan", long_question)
+    monkeypatch.setattr(solving, "plan", long_question)
     with PlanService(alone):
         payload = msgspec.json.encode(wall_request())
         channel = alone.get(PLAN, payload=payload, timeout=PATIENCE)
