@@ -182,7 +182,7 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(grounds, "gather", "the hands were closed"), (programs, "unique", "a plan was found")],
+    [(grounds, "assemble", "the hands were closed"), (programs, "unique", "a plan was found")],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
