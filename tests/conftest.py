@@ -1,4 +1,4 @@
-"""Puts this folder on the path, for the helpers that the tests and benchmarks share."""
+"""Settings of all tests."""
 
 from hypothesis import settings
 

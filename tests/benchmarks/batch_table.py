@@ -7,13 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 
-from measured_stances import question_of, request
-from race import WARM, Race, Way, race
-from results import Line, Table, times
-
 from planner.deadline import overlap as beside
 from planner.solving import plan
 from service.processes import Planners
+from tests.benchmarks.measured_stances import question_of, request
+from tests.benchmarks.race import WARM, Race, Way, race
+from tests.benchmarks.results import Line, Table, times
 
 __all__ = ["batch_tables", "batches", "rates"]
 

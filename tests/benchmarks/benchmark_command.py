@@ -15,17 +15,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import click
-from batch_table import batch_tables, batches, rates
-from centroidal_table import CASES, centroidal_tables
-from growth import draw, growth, steps as growth_steps
-from known_table import known_tables
-from plan_table import plan_tables
-from race import Race
-from random_plans import answers, iteration_tables
-from results import Table, into, markdown, print_tables
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from set_table import set_tables
+
+from tests.benchmarks.batch_table import batch_tables, batches, rates
+from tests.benchmarks.centroidal_table import CASES, centroidal_tables
+from tests.benchmarks.growth import draw, growth, steps as growth_steps
+from tests.benchmarks.known_table import known_tables
+from tests.benchmarks.plan_table import plan_tables
+from tests.benchmarks.race import Race
+from tests.benchmarks.random_plans import answers, iteration_tables
+from tests.benchmarks.results import Table, into, markdown, print_tables
+from tests.benchmarks.set_table import set_tables
 
 
 class Size(NamedTuple):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import centroidal_peer
 import numpy as np
-from race import race
-from results import Line, Table, span, times
-from test_centroidal import EDGES, our_margin, random_case, stance_of
 
 from planner.programs import solvers
+from tests.benchmarks.race import race
+from tests.benchmarks.results import Line, Table, span, times
+from tests.planner.programs.test_centroidal import EDGES, our_margin, random_case, stance_of
+from tests.suite.helpers import centroidal_peer
 
 __all__ = ["centroidal_tables"]
 

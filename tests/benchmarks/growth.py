@@ -13,16 +13,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from measured_stances import question_of, twin_of
-from plain_programs import Clarabel, scaled, unique
-from race import TURN, WARM, Way, race
-from test_many_hands import crawler_in, question as crawler_question
 
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandSets, Sets, assemble
 from planner.programs import program, solvers
 from planner.question import Question
 from planner.solving import plan
+from tests.benchmarks.measured_stances import question_of, twin_of
+from tests.benchmarks.plain_programs import Clarabel, scaled, unique
+from tests.benchmarks.race import TURN, WARM, Way, race
+from tests.planner.prepare.test_many_hands import crawler_in, question as crawler_question
 
 __all__ = ["Curve", "draw", "growth", "steps"]
 

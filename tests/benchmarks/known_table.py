@@ -6,17 +6,17 @@ from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
-from measured_stances import question_of
-from plain_programs import Clarabel, scaled, unique
-from race import TURN, WARM, race
-from results import Table, lines
-from whole_blocks import WholeBlocks
 
 from planner.prepare import assemble
 from planner.programs import WRENCH_UNIT, program
 from planner.result import SetPoints
 from planner.solving import KnownStance
 from planner.streaming import WrenchStream
+from tests.benchmarks.measured_stances import question_of
+from tests.benchmarks.plain_programs import Clarabel, scaled, unique
+from tests.benchmarks.race import TURN, WARM, race
+from tests.benchmarks.results import Table, lines
+from tests.benchmarks.whole_blocks import WholeBlocks
 
 __all__ = ["known_tables"]
 

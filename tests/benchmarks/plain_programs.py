@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 import clarabel
 import numpy as np
-import peer
 import scipy.sparse as sp
 
 from planner.prepare import Sets
 from planner.programs import SLACK, tie_weight
 from planner.question import Question
+from tests.suite.helpers import peer
 
 __all__ = ["Clarabel", "Conic", "Data", "Qoco", "highs", "least", "scaled", "si", "tie", "unique"]
 

@@ -8,12 +8,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from cvxpy_users import Parametrised, Query, rebuilt
-from measured_stances import payload, question_of, request
-from plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
-from race import TURN, WARM, Way, race
-from results import Line, Table, lines, span
-from whole_blocks import WholeBlocks
 
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
@@ -23,6 +17,12 @@ from planner.solving import plan
 from service.answering import dispatch
 from service.answering.questions import question
 from service.wire import PLAN
+from tests.benchmarks.cvxpy_users import Parametrised, Query, rebuilt
+from tests.benchmarks.measured_stances import payload, question_of, request
+from tests.benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
+from tests.benchmarks.race import TURN, WARM, Way, race
+from tests.benchmarks.results import Line, Table, lines, span
+from tests.benchmarks.whole_blocks import WholeBlocks
 
 __all__ = ["plan_tables"]
 

@@ -14,13 +14,13 @@ from multiprocessing import get_context
 from typing import Any, NamedTuple
 
 import numpy as np
-from plain_programs import Clarabel, Conic, scaled, si, unique
-from results import Line, Table
-from stances import random_question
 
 from planner.prepare import Sets, assemble
 from planner.programs import LOAD_UNIT, program
 from planner.solving import plan
+from tests.benchmarks.plain_programs import Clarabel, Conic, scaled, si, unique
+from tests.benchmarks.results import Line, Table
+from tests.suite.helpers.stances import random_question
 
 __all__ = ["Answer", "answer", "answers", "iteration_tables"]
 

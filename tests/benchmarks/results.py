@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from race import Race
 from rich.console import Console
 from rich.table import Table as Grid
+
+from tests.benchmarks.race import Race
 
 __all__ = [
     "BEGIN",

@@ -6,16 +6,16 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
-from hands import pinch
-from paper_search import searched
 from pycapacity.algorithms import hyper_plane_shift_method
-from race import race
-from results import Table, lines
 from scipy.spatial import KDTree
 
 from hand_models.fixed_wrist import wrench_space
 from hand_models.fixed_wrist.tension_box import parallelepiped
 from hand_models.wrench_spaces import SCALE, zonotope
+from tests.benchmarks.paper_search import searched
+from tests.benchmarks.race import race
+from tests.benchmarks.results import Table, lines
+from tests.suite.helpers.hands import pinch
 
 __all__ = ["set_tables"]
 

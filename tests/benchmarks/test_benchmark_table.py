@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from race import race
-from results import BEGIN, END, Line, Table, into, markdown, span, times
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from tests.benchmarks.race import race
+from tests.benchmarks.results import BEGIN, END, Line, Table, into, markdown, span, times
+from tests.suite.helpers.checkout import ROOT
 
 
 def test_ways_take_turns_and_ratios_are_of_the_same_round():

@@ -4,12 +4,12 @@
 """
 
 import numpy as np
-import peer
 import pytest
-from stances import ask, on_wall
 
 from planner.capability import BodySpace
 from planner.question import Load
+from tests.suite.helpers import peer
+from tests.suite.helpers.stances import ask, on_wall
 
 WAY = np.array([0.0, 0.6, 0.8, 0.0, 0.0, 0.0])
 

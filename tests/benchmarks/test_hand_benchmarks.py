@@ -8,10 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from hands import HAND, ROCK, pinch
-from rocks import random_axes
 from scipy.spatial.transform import Rotation
-from stances import SANDPAPER, ask, on_wall
 
 from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits
 from hand_models.finger import OpenFinger, close_all
@@ -20,6 +17,9 @@ from hand_models.fixed_wrist import wrench_space, wrench_spaces
 from hand_models.hand import Placement
 from hand_models.tendon import share_load
 from planner.prepare import assemble
+from tests.suite.helpers.hands import HAND, ROCK, pinch
+from tests.suite.helpers.rocks import random_axes
+from tests.suite.helpers.stances import SANDPAPER, ask, on_wall
 
 HOLDS = {
     "pinch on 300 mm": (Cylinder(0.3), math.pi),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from measured_stances import request
 
 from service.processes import Planners
 from service.processes.workers import cores
+from tests.benchmarks.measured_stances import request
 
 MANY = 200
 """New stances of four hands."""

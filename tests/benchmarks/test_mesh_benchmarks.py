@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from hands import HAND, ROCK
 
 from hand_models import Grasp
 from hand_models.rock import Mesh
+from tests.suite.helpers.hands import HAND, ROCK
 
 
 def scan(triangles: int = 200_000, roughness: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:

@@ -3,9 +3,7 @@
 ``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
 """
 
-import peer
 import pytest
-from stances import PLACES, ask, on_wall, program_data
 
 from hand_models.rock import Cylinder
 from planner.prepare import assemble, batch_of
@@ -16,6 +14,8 @@ from planner.solving.dual_bounds import unique_bound
 from planner.verification import Check
 from planner.verification.equilibrium import equilibrium
 from service.answering.answers import plan_reply
+from tests.suite.helpers import peer
+from tests.suite.helpers.stances import PLACES, ask, on_wall, program_data
 
 LIMBS = tuple(PLACES)
 HOLDS = {"held": Cylinder(0.3), "overloaded": Cylinder(0.7)}

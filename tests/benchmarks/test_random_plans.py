@@ -6,7 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from random_plans import answer
+
+from tests.benchmarks.random_plans import answer
 
 MINUTES = 3.0
 """What the test may take."""

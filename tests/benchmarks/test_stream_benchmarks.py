@@ -8,8 +8,6 @@ from itertools import cycle
 import msgspec
 import numpy as np
 import pytest
-from stances import ask, on_wall
-from test_stream_service import stream_request
 
 from planner.solving import KnownStance
 from planner.streaming import WrenchStream
@@ -18,6 +16,8 @@ from planner.streaming.stream_stance import StreamStance
 from service.answering import Streams, dispatch
 from service.replies import SetPointsReply, SetPointsRequest, StreamReply
 from service.wire import SET_POINTS, STREAM
+from tests.service.serving.test_stream_service import stream_request
+from tests.suite.helpers.stances import ask, on_wall
 
 QUESTION = ask(on_wall())
 CENTRE = QUESTION.needed_wrench()

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hands import HAND, ROCK
 
 from hand_models import Cylinder, Grasp
 from hand_models.compliance import (
@@ -17,6 +16,7 @@ from hand_models.compliance import (
     wrist_pose,
 )
 from hand_models.fixed_wrist import wrench_space
+from tests.suite.helpers.hands import HAND, ROCK
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 

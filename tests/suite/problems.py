@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from suite.comparison import Difference, differences
+from tests.suite.comparison import Difference, differences
 
 __all__ = ["Problem", "problem", "problems"]
 

@@ -11,10 +11,10 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from suite.adapter import ask
-from suite.answers import read_answers, told, write_answers
-from suite.comparison import Difference, differences, worst
-from suite.problems import Problem, problems
+from tests.suite.adapter import ask
+from tests.suite.answers import read_answers, told, write_answers
+from tests.suite.comparison import Difference, differences, worst
+from tests.suite.problems import Problem, problems
 
 __all__ = ["answer", "main", "status_of"]
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from suite.answers import read_answers, told
-from suite.comparison import differences, worst
-from suite.problems import Problem, problem, problems
+from tests.suite.answers import read_answers, told
+from tests.suite.comparison import differences, worst
+from tests.suite.problems import Problem, problem, problems
 
 TOLERANCE = 1e-9
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from suite.answers import read_answers
-from suite.problems import Problem, problems
-from suite.table import answer
+from tests.suite.answers import read_answers
+from tests.suite.problems import Problem, problems
+from tests.suite.table import answer
 
 SLOW = (pytest.mark.slow, pytest.mark.timeout(1800))
 

@@ -1,0 +1,242 @@
+"""A hand whose wrist gives way: what it is at rest, and how stiff."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hand_models import InvalidInputError
+from hand_models.base import UnsupportedError
+from hand_models.compliance import PALM_MODES, CompliantHand, FloatingWrist
+from hand_models.fixed_wrist import wrench_space
+from hand_models.hand import FINGERS, Grasp
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
+from hand_models.tile import Surface
+from tests.suite.helpers.hands import HAND, changed_hand
+
+ROCK = Surface.named("rock")
+
+HOLDS = {
+    "pinch": (Cylinder(0.3), Grasp(outer_rotation=math.pi)),
+    "no lateral": (Cylinder(0.3), Grasp(outer_rotation=math.pi, lateral=False, palm=False)),
+    "oblique": (Cylinder(0.3), Grasp(outer_rotation=1.0)),
+    "plane": (Plane(), Grasp()),
+    "sphere": (Sphere(0.4), Grasp(outer_rotation=2.0)),
+    "ellipsoid": (Ellipsoid((0.2, 0.3, 0.1)), Grasp(outer_rotation=math.pi)),
+    "edge": (Edge(fillet_radius=0.02, angle=1.6), Grasp()),
+}
+
+
+def compliant(name, preload=None, scheme="held", hand=HAND):
+    hold, grasp = HOLDS[name]
+    return CompliantHand(hand.settle(hold, ROCK, grasp), preload, scheme)
+
+
+def slopes(function, at, small=1e-7):
+    """Central differences of a function of a twist, a column for each component."""
+    ends = [function(at + side * small * np.eye(6)) for side in (1.0, -1.0)]
+    return (ends[0] - ends[1]).T / (2.0 * small)
+
+
+@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize("tension", [37.0, 55.0])
+def test_at_rest_it_carries_what_the_fixed_wrist_carries(name, tension):
+    hand = compliant(name, [tension] * 4)
+    loads = hand.loads(np.zeros((1, 6)))
+    np.testing.assert_allclose(
+        loads.tile_loads[0], hand.settled.tile_loads(np.full(4, tension)), atol=1e-9
+    )
+    space = wrench_space(hand.settled)
+    y = np.zeros(len(space.columns))
+    y[: len(FINGERS)] = tension
+    np.testing.assert_allclose(hand.wrenches(loads)[0], space.wrench(y), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name in HOLDS if name != "edge"])
+@pytest.mark.parametrize("scheme", ["held", "tension"])
+def test_the_stiffness_is_what_finite_differences_give(name, scheme):
+    hand = compliant(name, scheme=scheme)
+    at = np.array([2e-5, -1e-5, -3e-5, 1e-4, -2e-4, 1e-4])
+    expected = slopes(lambda twists: hand.wrenches(hand.loads(twists)), at)
+    found = hand.stiffness(at)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["pinch", "oblique", "sphere"])
+@pytest.mark.parametrize("finger", [1, 2])
+def test_a_finger_stiffens_the_grasp_through_its_twist(name, finger):
+    """K_g = Σ J_fᵀ K_f J_f (Eqs. 11 and 12), with the lateral springs out of the plane."""
+    hand = compliant(name)
+    frame, own = hand.frames[finger], hand.tiles_of(finger)
+    up = np.array([0.0, 0.0, 1.0])
+    # the twist of the base in the finger's plane: x, z and the turn from x toward z
+    J = np.array(
+        [
+            [*frame.along, *np.cross(frame.joint, frame.along)],
+            [*up, *np.cross(frame.joint, up)],
+            [0.0, 0.0, 0.0, *-frame.across],
+        ]
+    )
+    across = np.array(
+        [[*frame.across, *np.cross(p, frame.across)] for p in hand.settled.positions[own]]
+    )
+    lateral = slopes(lambda twists: hand.lateral_loads(finger, twists), np.zeros(6))
+    expected = J.T @ hand.fingers[finger].stiffness() @ J + across.T @ lateral
+
+    def wrenches(twists):
+        loads = hand.loads(twists)
+        forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)[:, own]
+        moments = np.cross(loads.positions[:, own], forces)
+        return np.concatenate([forces.sum(axis=1), moments.sum(axis=1)], axis=1)
+
+    found = slopes(wrenches, np.zeros(6))
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_pulling_off_drags_the_tiles_and_takes_their_pressing():
+    hand = compliant("no lateral")
+    rest, pulled = (hand.loads(np.array([[0.0, 0.0, z, 0.0, 0.0, 0.0]])) for z in (0.0, -3e-4))
+    proximal = [hand.tiles_of(i)[-3] for i in range(4)]
+    assert (pulled.shears[0] - rest.shears[0])[hand.settled.touching].min() > -1e-9
+    assert (pulled.normals[0, proximal] < rest.normals[0, proximal] - 1.0).all()
+    assert hand.wrenches(pulled)[0, 2] < hand.wrenches(rest)[0, 2] - 5.0
+
+
+def test_a_held_motor_is_stiffer_than_one_that_keeps_its_tension():
+    tendons_free = changed_hand("tendon", "holding_friction", 0.0)
+    # without friction in the tendon, only the motor keeps it from running
+    held, kept = (compliant("pinch", scheme=s, hand=tendons_free) for s in ("held", "tension"))
+    assert held.stiffness()[0, 0] > 1.05 * kept.stiffness()[0, 0]
+    moved = np.array([[0.0, 0.0, -3e-4, 0.0, 0.0, 0.0]])
+    assert np.abs(kept.loads(moved).tensions - 37.0).max() < 1e-9
+    assert np.abs(held.loads(moved).tensions - 37.0).max() > 0.1
+
+
+def test_symmetric_hands_answer_mirrored_twists_with_mirrored_wrenches():
+    hand = compliant("pinch")
+    mirror = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    twists = np.random.default_rng(1).normal(size=(20, 6)) * [*[2e-4] * 3, *[4e-3] * 3]
+    straight = hand.wrenches(hand.loads(twists))
+    mirrored = hand.wrenches(hand.loads(twists * mirror))
+    np.testing.assert_allclose(mirrored, straight * mirror, atol=1e-9)
+
+
+def test_lateral_springs_are_the_beam_in_series_with_the_tiles():
+    soft = compliant("pinch", hand=changed_hand("beam", "bending_stiffness", 1.0))
+    stiff = compliant("pinch", hand=changed_hand("beam", "bending_stiffness", 1e9))
+    sideways = np.array([[0.0, 1e-4, 0.0, 0.0, 0.0, 0.0]])
+    own = stiff.tiles_of(1)
+    loads = stiff.lateral_loads(1, sideways)[0]
+    # a rigid beam: each tile's own stiffness, less what the twist of the finger takes
+    assert (loads[stiff.settled.touching[own]] <= 1e-4 * HAND.lateral_stiffness + 1e-12).all()
+    assert loads.sum() > 0.5 * len(own) * 1e-4 * HAND.lateral_stiffness
+    assert soft.lateral_loads(1, sideways)[0].sum() < loads.sum()
+
+
+@pytest.mark.parametrize("diameter", [0.2, 0.3, 0.7])
+def test_on_round_rock_a_pinch_is_stiff_in_every_direction_and_conservative(diameter):
+    """Springs and rolling without slip have an energy: K_g is symmetric, and positive."""
+    settled = HAND.settle(Cylinder(diameter), ROCK, HOLDS["pinch"][1])
+    stiffness = CompliantHand(settled).stiffness()
+    # what is left is of the preload's forces turning with the rock: not of springs
+    np.testing.assert_allclose(stiffness, stiffness.T, atol=5e-3 * np.abs(stiffness).max())
+    assert np.linalg.eigvalsh(stiffness + stiffness.T).min() > 0.0
+
+
+@pytest.mark.parametrize("name", ["pinch", "oblique", "plane"])
+def test_at_rest_the_palm_does_not_stiffen_the_hand(name):
+    """It begins to carry there, which a complex step must not take for carrying."""
+    hold, grasp = HOLDS[name]
+    bare = Grasp(outer_rotation=grasp.outer_rotation, palm=False)
+    without = CompliantHand(HAND.settle(hold, ROCK, bare))
+    np.testing.assert_allclose(compliant(name).stiffness(), without.stiffness(), atol=1e-6)
+
+
+def test_the_palm_neither_pushes_nor_pulls():
+    hand = compliant("pinch")
+    assert hand.settled.palm.engaged
+    away, against = (
+        hand.loads(np.array([[side * 1e-4, 0.0, -side * 1e-4, 0.0, 0.0, 0.0]])).palm[0]
+        for side in (1.0, -1.0)
+    )
+    np.testing.assert_array_equal(away, 0.0)
+    assert (against > 0.0).all()
+
+
+@pytest.mark.parametrize("preload", [[1.0] * 3, [-1.0] * 4, [701.0] * 4, [math.nan] * 4])
+def test_an_impossible_preload_is_refused(preload):
+    with pytest.raises(InvalidInputError, match="tendon_preload"):
+        compliant("pinch", preload)
+
+
+def test_an_impossible_preload_is_told_as_a_plain_list():
+    with pytest.raises(InvalidInputError) as caught:
+        compliant("pinch", np.full(4, 900.0))
+    assert str(caught.value) == (
+        "tendon_preload: four tensions from 0 to 700 N are needed, got [900.0, 900.0, 900.0, 900.0]"
+    )
+
+
+def test_a_hand_on_its_nails_cannot_float():
+    hold = Edge(fillet_radius=0.002, angle=1.5707963)
+    settled = HAND.settle(hold, ROCK, Grasp(fingernail=True))
+    with pytest.raises(UnsupportedError, match="nails"):
+        CompliantHand(settled)
+
+
+# Linearised sets --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["pinch", "oblique", "sphere", "plane"])
+def test_the_linearised_set_touches_the_exact_one_where_it_is_linearised(name):
+    hand = compliant(name)
+    wrist = FloatingWrist(hand)
+    at = np.array([5e-5, 2e-5, -8e-5, 1e-3, -1e-3, 5e-4])
+    back, into = hand.palm_loads(at[None])[0] > 0.0
+    space = wrist.linearised(at, PALM_MODES[bool(back), bool(into)])
+    loads = hand.loads(at[None])
+    np.testing.assert_allclose(space.wrench(at), hand.wrenches(loads)[0], atol=1e-8)
+    verdict = wrist.judge(at[None])
+    assert space.utilisations(at).max() == pytest.approx(verdict.utilisation[0], abs=1e-9)
+    assert space.rows[int(space.utilisations(at).argmax())] == wrist.limits[verdict.limiting[0]]
+    # away from there the loads are off to second order only
+    way = np.random.default_rng(2).normal(size=6) * [*[1e-4] * 3, *[1e-3] * 3]
+    off = [
+        abs(space.utilisations(at + t * way).max() - wrist.judge((at + t * way)[None]).utilisation)[
+            0
+        ]
+        for t in (0.04, 0.02)
+    ]
+    assert off[1] <= 0.35 * off[0] + 1e-9
+
+
+def test_rows_have_the_fixed_wrists_names():
+    hand = compliant("pinch")
+    fixed = wrench_space(hand.settled)
+    floating = FloatingWrist(hand).linearised()
+    count = len(floating.s)
+    assert floating.rows[:count] == fixed.rows[: len(fixed.s)]
+    np.testing.assert_allclose(floating.s, fixed.s)
+
+
+def test_a_range_keeps_the_wrist_near():
+    wrist = FloatingWrist(compliant("no lateral"))
+    within = np.array([1e-4, 2e-4, 1e-4, 1e-3, 1e-3, 1e-3])
+    at = np.array([1e-5, 0.0, -2e-5, 0.0, 1e-4, 0.0])
+    space = wrist.linearised(at, within=within)
+    new = [row.label for row in space.rows if row.limit == "wrist_range"]
+    assert len(new) == 12
+    inside = at + 0.99 * within * [1, -1, 1, -1, 1, -1]
+    outside = at + 2.1e-4 * np.eye(6)[1]
+    rows = slice(len(space.h) - 12, None)
+    assert (space.H[rows] @ inside <= space.h[rows]).all()
+    assert not (space.H[rows] @ outside <= space.h[rows]).all()
+
+
+def test_the_sieve_lets_pass_all_that_holds():
+    wrist = FloatingWrist(compliant("no lateral"))
+    twists = np.random.default_rng(4).normal(size=(4000, 6)) * [*[2e-4] * 3, *[3e-3] * 3]
+    holds = np.flatnonzero(wrist.judge(twists).holds)
+    passed = wrist.sieve(twists)
+    assert 0 < len(holds) <= len(passed) < len(twists)
+    assert set(holds) <= set(passed)

@@ -1,0 +1,94 @@
+"""What the tiles of a hand carry: every force of every finger, and their sum."""
+
+import numpy as np
+from hypothesis import given, settings, strategies as st
+
+from hand_models import FINGERS
+from hand_models.fixed_wrist import wrench_space
+from tests.suite.helpers.hands import HAND, pinch, settled_at
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def test_seated_on_300_mm_at_37_n_the_fingers_carry_figure_12():
+    settled = pinch()
+    loads = settled.tile_loads(np.full(4, 37.0))
+    for i in range(4):
+        tiles = np.flatnonzero(settled.finger_of == i)[-3:]
+        np.testing.assert_allclose(loads[tiles, 0], [4.85, 6.95, 8.05], atol=1e-6)
+        assert (np.abs(loads[tiles, 1] - [8.45, 1.0, 1.85]) <= [0.2535, 0.2, 0.2]).all()
+        np.testing.assert_array_equal(loads[tiles, 2], 0.0)
+
+
+def equation_6(settled, i, tension):
+    """Shear and normal of finger i's three tiles by the full square system, forces in H.
+
+    Joint rows, where contacts hold the joint: the torque about its axis of the rock's forces, of
+    tendon and spring. Tile rows: the rock's force along a phalanx is its shear, nothing beside its
+    tile; where nothing touches, both forces are 0.
+    """
+    model, finger = HAND.finger, settled.fingers[i]
+    tiles = np.flatnonzero(settled.finger_of == i)[-3:]
+    frame = HAND.frames(settled.grasp.outer_rotation)[i]
+    up = np.array([0.0, 0.0, 1.0])
+    axis = np.cross(frame.along, up)
+    joints = [frame.joint + c.joint[0] * frame.along + c.joint[1] * up for c in finger.contacts]
+    rows, values = [], []
+    closing = settled.closing_tension
+    for j, (tile, contact) in enumerate(zip(tiles, finger.contacts, strict=True)):
+        if contact.stop is None:
+            row = np.zeros(6)
+            for k in range(j, 3):
+                arm = settled.positions[tiles[k]] - joints[j]
+                row[2 * k : 2 * k + 2] = [axis @ np.cross(arm, unit) for unit in (frame.along, up)]
+            angle = contact.angle - (finger.contacts[j - 1].angle if j else 0.0)
+            rows.append(row)
+            values.append(model.joint_stiffness[j] * angle - tension * model.pulley_radii[j])
+        if contact.kind == "none":
+            rows += [np.eye(6)[2 * j], np.eye(6)[2 * j + 1]]
+            values += [0.0, 0.0]
+            continue
+        distal = -settled.axes[tile, 0]
+        row = np.zeros(6)
+        row[2 * j : 2 * j + 2] = [distal @ frame.along, distal @ up]
+        shear = model.engagement[j] * closing + model.shear_gain * (tension - closing)
+        rows.append(row)
+        values.append(0.0 if contact.kind == "frame" else shear)
+    A, b = np.array(rows), np.array(values)
+    on_tiles = np.linalg.solve(A, b).reshape(3, 2)
+    on_rock = -(on_tiles[:, :1] * frame.along + on_tiles[:, 1:] * up)
+    return np.einsum("tkx,tx->tk", settled.axes[tiles, :2], on_rock)
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds, st.floats(0.0, 700.0))
+def test_loads_are_those_of_the_full_system_of_equation_6(seed, tension):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    loads = settled.tile_loads(np.full(4, tension))
+    for i in range(4):
+        tiles = np.flatnonzero(settled.finger_of == i)[-3:]
+        expected = equation_6(settled, i, tension)
+        scale = 1.0 + np.abs(expected).max()
+        np.testing.assert_allclose(loads[tiles, :2] / scale, expected / scale, atol=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds)
+def test_the_hands_wrench_is_the_sum_of_its_tiles_and_palms_forces(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    rng = np.random.default_rng(seed)
+    space = wrench_space(settled)
+    y = rng.uniform(0.0, 100.0, len(space.columns))
+    value = dict(zip(space.columns, y, strict=True))
+    lateral = np.array([value.get(f"{finger}/lateral", 0.0) for finger in FINGERS])
+    loads = settled.tile_loads(y[:4], lateral)
+    forces = np.einsum("tk,tkx->tx", loads, settled.axes)
+    palm = np.array([-value.get("palm_shear", 0.0), 0.0, value.get("palm_pressing", 0.0)])
+    forces = np.vstack([forces, palm])
+    places = np.vstack([settled.positions, settled.palm.centre])
+    expected = np.concatenate([forces.sum(axis=0), np.cross(places, forces).sum(axis=0)])
+    np.testing.assert_allclose(space.wrench(y), expected, rtol=1e-9, atol=1e-9)

@@ -1,0 +1,258 @@
+"""The fixed wrist: the parallelepiped of Eq. 16, and what each row says."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, SpinyHand
+from hand_models.fixed_wrist import wrench_space
+from hand_models.parameters import ParameterTable, Quantity, hand_table
+from hand_models.tile import inner_half_planes
+from tests.suite.helpers.hands import (
+    HAND,
+    PINCH,
+    ROCK,
+    changed_hand,
+    pinch,
+    settled_at,
+    without_hand_load,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def tile_load(settled, t, tension):
+    return settled.loads[t, :, 0] + settled.loads[t, :, 1] * tension
+
+
+def own_tiles(settled, i):
+    return np.flatnonzero((settled.finger_of == i) & settled.touching)
+
+
+def without_structure(space):
+    """The same set with a structure and a grip that nothing overloads."""
+    strong = ("finger_shear", "fingertip_force", "hand_load")
+    names = [row.limit for row in space.rows[: len(space.s)]]
+    return replace(space, s=np.where(np.isin(names, strong), 1e9, space.s))
+
+
+def interval(settled, i, surface):
+    """Least and largest tension of a finger, from its tiles' own limits one by one."""
+    least, most = 0.0, HAND.maximum_tension
+    pieces = inner_half_planes(surface)
+    for t in own_tiles(settled, i):
+        (t0, t1), (n0, n1) = settled.loads[t]
+        least = max(least, -t0 / t1)
+        for p in pieces:
+            constant = p.capacity - p.a_shear * t0 - p.a_normal * n0
+            slope = p.a_shear * t1 + p.a_normal * n1
+            if slope > 0.0:
+                most = min(most, constant / slope)
+            elif slope < 0.0:
+                least = max(least, constant / slope)
+    return least, most
+
+
+@pytest.mark.parametrize("diameter", [0.3, 0.7])
+@pytest.mark.parametrize("rotation", [0.0, 0.5, math.pi])
+def test_without_palm_and_lateral_the_set_is_the_parallelepiped_of_equation_16(diameter, rotation):
+    """2^n corners o + Σ f_i v_i, each tension at its least or its largest."""
+    grasp = Grasp(outer_rotation=rotation, palm=False, lateral=False)
+    settled = HAND.settle(Cylinder(diameter), ROCK, grasp)
+    space = without_hand_load(wrench_space(settled))
+    assert space.columns == tuple(f"{finger}/tension" for finger in FINGERS)
+    ends = [interval(settled, i, ROCK) for i in range(4)]
+    corners = np.array([space.wrench(f) for f in itertools.product(*ends)])
+    vertices = space.vertices()
+    assert len(vertices) == 2**4
+    gaps = np.linalg.norm(vertices[:, None] - corners, axis=2)
+    np.testing.assert_allclose(gaps.min(axis=1), 0.0, atol=1e-7)
+    np.testing.assert_allclose(gaps.min(axis=0), 0.0, atol=1e-7)
+
+
+def test_the_origin_is_c_sys_and_a_generator_is_c_act_of_equation_14():
+    settled = pinch(lateral=False)
+    space = wrench_space(settled)
+    units = np.concatenate(
+        [settled.axes, np.cross(settled.positions[:, None], settled.axes)], axis=2
+    )[:, :2]
+    c_sys = (settled.loads[:, :, :1] * units).sum(axis=(0, 1))
+    np.testing.assert_allclose(space.origin, c_sys, atol=1e-12)
+    for i in range(4):
+        mine = settled.finger_of == i
+        c_act = (settled.loads[mine][:, :, 1:] * units[mine]).sum(axis=(0, 1))
+        np.testing.assert_allclose(space.generators[:, i], c_act, atol=1e-12)
+
+
+@settings(max_examples=80, deadline=None)
+@given(seeds)
+def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    space = wrench_space(settled)
+    labels = [row.label for row in space.rows]
+    assert len(set(labels)) == len(labels) == len(space.A)
+    assert len(set(space.columns)) == len(space.columns)
+    kinds = [row.kind for row in space.rows]
+    assert kinds == ["limit"] * len(space.s) + ["hard"] * len(space.h)
+    assert (space.s > 0.0).all()
+    touching = {
+        (tile.finger, tile.phalanx)
+        for tile, touches in zip(settled.tiles, settled.touching, strict=True)
+        if touches
+    }
+    named = {(r.finger, r.phalanx) for r in space.rows if r.limit in ("shear", "pull_off")}
+    assert named == touching
+
+
+@settings(max_examples=80, deadline=None)
+@given(seeds)
+def test_rows_say_what_tile_by_tile_reckoning_says(seed):
+    """Utilisation from each tile's own load, and hard rows from its shear and the stops."""
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    rng = np.random.default_rng(seed)
+    space = wrench_space(settled)
+    y = rng.uniform(-20.0, 120.0, len(space.columns))
+    value = dict(zip(space.columns, y, strict=True))
+    lateral = np.array([value.get(f"{finger}/lateral", 0.0) for finger in FINGERS])
+    loads = {
+        (tile.finger, tile.phalanx): load
+        for tile, load in zip(settled.tiles, settled.tile_loads(y[:4], lateral), strict=True)
+    }
+    used = space.utilisations(y)
+    worst: dict = {}
+    for row, u in zip(space.rows, used, strict=False):
+        worst[row.finger, row.phalanx, row.limit] = max(
+            u, worst.get((row.finger, row.phalanx, row.limit), -math.inf)
+        )
+    for (finger, phalanx, limit), u in worst.items():
+        if limit in ("finger_shear", "fingertip_force", "hand_load"):
+            continue  # in test_structure.py
+        if limit == "tendon_tension":
+            expected = value[f"{finger}/tension"] / 700.0
+        elif limit == "motor_torque":
+            expected = value[f"{finger}/tension"] * 0.0067 / (236.0 * 0.7) / 0.0286
+        elif limit == "motor_current":
+            torque = value[f"{finger}/tension"] * 0.0067 / (236.0 * 0.7)
+            expected = (torque / 0.0234 + 0.0263) / 1.24
+        elif limit == "palm_shear":
+            expected = value["palm_shear"] / settled.palm.shear_limit
+        elif limit == "palm_pressing":
+            expected = value["palm_pressing"] / settled.palm.pressing_limit
+        else:
+            shear, normal, side = loads[finger, phalanx]
+            expected = max(
+                (p.a_shear * shear + p.a_normal * normal + p.a_lateral * abs(side)) / p.capacity
+                for p in inner_half_planes(settled.surface)
+                if p.limit == limit
+            )
+        assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    kept = dict(
+        zip(
+            (row.label for row in space.rows[len(used) :]),
+            space.h - space.H @ y >= -1e-9,
+            strict=True,
+        )
+    )
+    for finger in FINGERS:
+        assert kept[f"{finger}/slack_tendon"] == (value[f"{finger}/tension"] >= -1e-9)
+    for tile in settled.tiles:
+        shear, normal, _ = loads[tile.finger, tile.phalanx]
+        name = f"{tile.finger}/{tile.phalanx}"
+        if tile.contact in ("face", "edge"):
+            assert kept[f"{name}/dragged_backwards"] == (shear >= -1e-9)
+        if tile.contact == "frame":
+            assert kept[f"{name}/frame_pulled"] == (normal >= -1e-9)
+    for i, joint, torque in settled.stops:
+        label = f"{FINGERS[i]}/{('proximal', 'middle', 'distal')[joint]}/joint_stop"
+        holding = float(torque @ [1.0, y[i]])
+        if abs(holding) > 1e-7:
+            assert kept[label] == (holding > 0.0)
+
+
+def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_shear():
+    settled = pinch()
+    space = wrench_space(settled)
+    i = FINGERS.index("inner_left")
+    column = space.columns.index("inner_left/lateral")
+    np.testing.assert_allclose(settled.lateral_shares[own_tiles(settled, i)], 1.0 / 3.0, atol=1e-15)
+    # at 37 N: share/3 of Y beside (T, N) on each tile, on the tightest of its half-planes
+    reach = min(
+        3.0 * (p.capacity - p.a_shear * T - p.a_normal * N) / p.a_lateral
+        for p in inner_half_planes(ROCK)
+        for T, N in (tile_load(settled, t, 37.0) for t in own_tiles(settled, i))
+    )
+    y = np.zeros(len(space.columns))
+    y[:4] = 37.0
+    for sign in (1.0, -1.0):
+        y[column] = sign * reach
+        assert space.utilisations(y).max() == pytest.approx(1.0)
+
+
+def test_lateral_switched_off_leaves_no_lateral_column():
+    assert not any("lateral" in name for name in wrench_space(pinch(lateral=False)).columns)
+    assert sum("lateral" in name for name in wrench_space(pinch()).columns) == 4
+
+
+@pytest.mark.parametrize(("cap", "effective"), [(100.0, 100.0), (5000.0, 700.0), (None, 700.0)])
+def test_a_callers_cap_on_tension_counts_below_the_hands_own_maximum(cap, effective):
+    settled = HAND.settle(Plane(), ROCK.from_values({"shear_limit": 1e4}), Grasp(palm=False))
+    space = without_structure(wrench_space(settled, cap))
+    names = [row.limit for row in space.rows[: len(space.s)]]
+    caps = space.s[[name == "tendon_tension" for name in names]]
+    np.testing.assert_array_equal(caps, effective)
+    along = space.support([-1.0, 0, 0, 0, 0, 0])
+    shear = -space.wrench([effective] * 4 + [0.0] * (len(space.columns) - 4))[0]
+    assert along == pytest.approx(shear)
+
+
+def test_the_palm_shears_along_minus_x_and_presses_along_z_at_its_centre():
+    settled = pinch()
+    space = wrench_space(settled)
+    shear, pressing = space.generators[:, -2], space.generators[:, -1]
+    x, y, z = settled.palm.centre
+    np.testing.assert_allclose(shear, [-1, 0, 0, *np.cross([x, y, z], [-1, 0, 0])])
+    np.testing.assert_allclose(pressing, [0, 0, 1, *np.cross([x, y, z], [0, 0, 1])])
+    assert space.columns[-2:] == ("palm_shear", "palm_pressing")
+    assert not any("palm" in name for name in wrench_space(pinch(palm=False)).columns)
+
+
+def test_closing_beyond_what_tiles_hold_leaves_no_wrench():
+    settled = pinch(0.3, ROCK.from_values({"shear_limit": 1.0}))
+    with pytest.raises(EmptySetError, match="contradict"):
+        wrench_space(settled).vertices()
+
+
+def test_tendons_with_friction_are_not_slackened_below_closing():
+    """There the far tiles would stick, and their loads not follow the tension."""
+    hand = changed_hand("tendon", "friction", 0.2)
+    settled = hand.settle(Cylinder(0.3), ROCK, PINCH)
+    space = wrench_space(settled)
+    hard = space.rows[len(space.s) :]
+    sticks = [i for i, row in enumerate(hard) if row.limit == "tendon_sticks"]
+    assert [hard[i].finger for i in sticks] == list(FINGERS)
+    for finger, i in enumerate(sticks):
+        np.testing.assert_array_equal(space.H[i], -np.eye(len(space.columns))[finger])
+        assert space.h[i] == -37.0
+    assert not any(row.limit == "tendon_sticks" for row in wrench_space(pinch()).rows)
+
+
+def test_friction_at_the_palms_own_pulleys_lets_stiff_tiles_carry_more():
+    stiffness = [1e4, 1e4, 1e4, 1e4, 4e3, 1e4, 1e4, 1e4]
+    uneven = ParameterTable(
+        {"palm": {"contact_stiffness": Quantity(stiffness, "N/m", "assumed", "of a test")}}
+    )
+    own = ParameterTable({"palm": {"own_pulley_friction": Quantity(0.34, "1", "assumed", "")}})
+    table = hand_table().replaced(uneven)
+    limits = [
+        SpinyHand(one).settle(Cylinder(2.0), ROCK, PINCH).palm.shear_limit
+        for one in (table, table.replaced(own))
+    ]
+    assert limits[1] > 1.02 * limits[0]

@@ -1,0 +1,166 @@
+"""Whatever a hand is asked to hold: finite numbers, or an error of its own, and no warnings."""
+
+import itertools
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.spatial.transform import Rotation
+
+from hand_models import (
+    Cylinder,
+    Edge,
+    EmptySetError,
+    Grasp,
+    InvalidInputError,
+    Plane,
+    Pose,
+    Sphere,
+    Surface,
+    tension_limits,
+)
+from hand_models.fixed_wrist import wrench_space
+from tests.suite.helpers.hands import HAND
+
+ROCK = Surface.named("rock")
+SIZES = [1e-3, 1e-2, 1.0, 30.0, 1e3]
+
+
+def stress(hold, surface, grasp, pose):
+    """Everything that can be asked of a hand; how it ended, once every number is looked at."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            settled = HAND.settle(hold, surface, grasp, pose)
+        except InvalidInputError as error:
+            if error.field != "hold":
+                raise
+            return "refused"
+        numbers = [settled.positions, settled.axes, settled.loads, settled.palm.centre]
+        numbers += [torque for _, _, torque in settled.stops]
+        assert all(np.isfinite(each).all() for each in numbers)
+        lengths = np.linalg.norm(settled.axes, axis=2)
+        np.testing.assert_allclose(lengths, 1.0, atol=1e-9)
+        # loads grow with tension by a lever of pulleys and phalanges, never without bound
+        assert np.abs(settled.loads[..., 1]).max() < 100.0
+        assert not np.isnan(settled.palm.gaps).any()
+        assert all(limit.tension >= 0.0 for limit in tension_limits(settled))
+        space = wrench_space(settled)
+        for each in (space.origin, space.generators, space.A, space.b):
+            assert np.isfinite(each).all()
+        try:
+            vertices, faces = space.vertices(), space.half_spaces()
+        except EmptySetError:
+            return "empty"
+        assert len(vertices) >= 1
+        assert np.isfinite(vertices).all()
+        off = vertices @ faces.equation_normals.T - faces.equation_offsets
+        size = 1.0 + np.abs(vertices).max()
+        assert np.abs(off).max(initial=0.0) < 1e-5 * size
+        if len(vertices) < 3000:
+            slack = faces.offsets - vertices @ faces.normals.T
+            assert slack.min(initial=0.0) > -1e-5 * size
+        return "held"
+
+
+def test_holds_from_a_millimetre_to_a_kilometre_can_be_taken():
+    ends = set()
+    for size, rotation in itertools.product(SIZES, (0.0, 0.4, 2.8, math.pi)):
+        for hold in (Cylinder(size), Sphere(size), Edge(size, 1.2)):
+            ends.add(stress(hold, ROCK, Grasp(rotation), None))
+    assert "held" in ends
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-3, math.pi - 1e-3, math.pi - 1e-9])
+@pytest.mark.parametrize("radius", [1e-4, 0.1])
+def test_knife_edges_and_edges_that_are_nearly_flat(angle, radius):
+    for rotation, tilt in ((0.0, 0.1), (1.0, 0.0), (math.pi, 0.1)):
+        pose = Pose(
+            np.array([0.03, 0.0, 0.004]), Rotation.from_rotvec([0.0, tilt, 0.2]).as_matrix()
+        )
+        stress(Edge(radius, angle), ROCK, Grasp(rotation), None)
+        stress(Edge(radius, angle), ROCK, Grasp(rotation), pose)
+
+
+def test_an_edge_that_is_nearly_flat_holds_like_a_plane():
+    """Its crest lies between the finger tiles, all of which lie on its faces."""
+    pose = Pose(np.array([0.045, 0.0, 0.0041]), np.eye(3))
+    edge = HAND.settle(Edge(0.01, math.pi - 1e-6), ROCK, Grasp(palm=False), pose)
+    plane = HAND.settle(Plane(), ROCK, Grasp(palm=False), pose)
+    np.testing.assert_allclose(edge.positions, plane.positions, atol=1e-6)
+    np.testing.assert_allclose(edge.loads, plane.loads, atol=1e-3)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5, 1.2, math.pi / 2, math.pi])
+@pytest.mark.parametrize("hold", [Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)])
+def test_holds_tilted_as_far_as_they_go(hold, tilt):
+    for axis in np.vstack([np.eye(3), [[0.6, 0.8, 0.0]]]):
+        turned = Rotation.from_rotvec(tilt * axis).as_matrix()
+        for place in ([0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [0.1, 0.1, 0.1]):
+            stress(hold, ROCK, Grasp(1.0), Pose(np.array(place), turned))
+
+
+@pytest.mark.parametrize("distance", [0.05, 1.0, 1e4])
+def test_a_hand_far_from_its_hold_carries_nothing(distance):
+    pose = Pose(np.array([0.0, 0.0, distance]), np.eye(3))
+    for hold in (Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)):
+        settled = HAND.settle(hold, ROCK, Grasp(), pose)
+        assert settled.palm.engaged == ()
+        if distance >= 1.0:
+            assert not settled.touching.any()
+            space = wrench_space(settled)
+            np.testing.assert_array_equal(space.vertices(), np.zeros((1, 6)))
+
+
+@pytest.mark.parametrize("hold", [Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)])
+@pytest.mark.parametrize("behind", [0.0051, 0.3, 1e4])
+def test_a_hold_behind_the_palm_is_refused(hold, behind):
+    with pytest.raises(InvalidInputError, match="inside the palm") as caught:
+        HAND.settle(hold, ROCK, Grasp(), Pose(np.array([0.0135, 0.014, -behind]), np.eye(3)))
+    assert caught.value.field == "hold"
+
+
+def test_a_joint_in_the_middle_of_a_ball_is_no_division_by_zero():
+    pose = Pose(HAND.inner_joint - [0.0, 0.0, 5e-4], np.eye(3))
+    assert stress(Sphere(1e-3), ROCK, Grasp(), pose) in ("held", "empty")
+
+
+@pytest.mark.parametrize("strength", [1e-3, 1.0, 1e5])
+@pytest.mark.parametrize("closing", [1e-3, 37.0, 700.0])
+def test_strengths_and_closing_tensions_of_any_size(strength, closing):
+    for half_planes, lateral in ((1, True), (3, False)):
+        surface = Surface.from_values({"shear_limit": strength, "half_planes": half_planes})
+        for rotation in (0.0, math.pi):
+            ended = stress(Cylinder(0.3), surface, Grasp(rotation, closing, True, lateral), None)
+            assert ended == "empty" or strength > 0.01 * closing
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_anything_anywhere_ends_in_numbers_or_is_refused(seed):
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-3.0, 3.0)
+    hold = (Plane(), Cylinder(size), Sphere(size), Edge(size, rng.uniform(0.01, 3.13)))[
+        rng.integers(4)
+    ]
+    surface = Surface.from_values(
+        {"shear_limit": 10.0 ** rng.uniform(-2.0, 4.0), "half_planes": int(rng.integers(1, 3))}
+    )
+    grasp = Grasp(
+        float(rng.choice([0.0, math.pi, rng.uniform(0.0, math.pi)])),
+        float(10.0 ** rng.uniform(-1.0, 2.8)),
+        bool(rng.integers(2)),
+        bool(rng.integers(2)),
+    )
+    turned = Rotation.from_rotvec(rng.uniform(0.0, math.pi) * rng.normal(size=3)).as_matrix()
+    place = rng.choice([0.0, 1e-3, 0.05, 1.0, 1e4]) * rng.normal(size=3)
+    pose = Pose(place, turned) if rng.random() < 0.7 else None
+    assert stress(hold, surface, grasp, pose) in ("held", "empty", "refused")
+
+
+def test_closing_beyond_the_tendons_maximum_is_refused():
+    with pytest.raises(InvalidInputError, match="at most the tendon's 700 N") as caught:
+        HAND.settle(Cylinder(0.3), ROCK, Grasp(closing_tension=701.0))
+    assert caught.value.field == "grasp.closing_tension"

@@ -1,0 +1,75 @@
+"""Where hands go on rock that is known by its outline or its triangles only."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings, strategies as st
+
+from hand_models import Cylinder, Grasp, Sphere
+from hand_models.rock import Mesh, Profile
+from tests.suite.helpers.hands import HAND
+from tests.suite.helpers.rocks import cylinder_mesh, distance, random_mesh, random_profile
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.parametrize("diameter", [0.15, 0.2, 0.3, 0.7, 1.5])
+@pytest.mark.parametrize("rotation", [0.0, math.pi])
+def test_a_meshed_cylinder_seats_as_the_cylinder(diameter, rotation):
+    want = HAND.seat(Cylinder(diameter), Grasp(rotation))
+    got = HAND.seat(Mesh(*cylinder_mesh(diameter, 512)), Grasp(rotation))
+    assert got.rule == want.rule
+    np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
+
+
+def test_a_meshed_ball_seats_as_the_ball():
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
+    want = HAND.seat(Sphere(0.4), Grasp())
+    got = HAND.seat(Mesh(ball.vertices + [0.0, 0.0, 0.2], ball.faces), Grasp())  # noqa: RUF005
+    assert got.rule == want.rule == "palm_on_rock"
+    np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
+    rng = np.random.default_rng(seed)
+    hold = random_mesh(rng) if rng.random() < 0.5 else random_profile(rng)
+    grasp = Grasp(float(rng.choice([0.0, 1.0, math.pi])))
+    seating = HAND.seat(hold, grasp)
+    x, y = np.meshgrid(np.linspace(-0.055, 0.055, 23), np.linspace(-0.026, 0.026, 5))
+    palm = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    gaps = distance(hold, seating.pose.inverse().apply(palm))
+    # rock between the lines on which it is looked for may stand into the palm a little
+    assert gaps.min() > -2e-3
+    if seating.rule in ("palm_on_rock", "palm_on_rock_centred"):
+        assert gaps.min() < 3e-3
+    if seating.rule in ("pinch", "palm_on_rock"):
+        joint = seating.pose.inverse().apply(HAND.inner_joint)
+        section = hold.section(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+        model = HAND.finger
+        face = model.tile_range[0], model.joint_spacing, model.tile_height
+        rest = section.rest((0.0, 0.0), *face, model.joint_lower[0], model.joint_upper[0])
+        assert rest.distance == pytest.approx(HAND.seated_contact, abs=2e-4)
+
+
+def test_a_raised_ridge_under_the_palm_lifts_it():
+    """A ridge 8 mm high, 20 mm behind the crest that the fingers take."""
+    x = np.linspace(-0.2, 0.2, 2001)
+    log = 0.15 - np.sqrt(np.maximum(0.15**2 - x**2, 0.0))
+    ridge = 0.012 * np.exp(-(((x + 0.02) / 0.008) ** 2))
+    plain, raised = (Profile(np.column_stack([x, z])) for z in (log, log - ridge))
+    low, high = (HAND.seat(hold, Grasp(1.0)).pose.position[2] for hold in (plain, raised))
+    assert low == pytest.approx(0.0, abs=1e-5)
+    assert high == pytest.approx(0.012 - 0.02**2 / 0.3, abs=1.5e-3)
+
+
+def test_without_rock_under_the_palm_the_hold_keeps_its_place():
+    beside = Profile([[0.3, 0.0], [0.5, 0.0]])
+    seating = HAND.seat(beside, Grasp())
+    assert seating.rule == "palm_on_rock_centred"
+    np.testing.assert_array_equal(seating.pose.position, 0.0)

@@ -1,0 +1,413 @@
+"""Hands settled together, against fingers closed one by one; and what is kept of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
+from hand_models.base import Recent
+from hand_models.finger import settle_finger
+from hand_models.finger.contact_states import close
+from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
+from hand_models.rock import Mesh, Profile
+from hand_models.tile import Surface
+from planner.prepare.settled_stance import settle_stance
+from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand
+from tests.suite.helpers.rocks import (
+    random_axes,
+    random_ellipsoid,
+    random_hold,
+    random_mesh,
+    random_profile,
+)
+from tests.suite.helpers.stances import on_wall
+
+seeds = st.integers(0, 2**32 - 1)
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def random_placement(rng: np.random.Generator, *, rough: float = 0.15) -> Placement:
+    """A hand on any kind of hold, seated or tilted, gripping or clinging; sometimes in it."""
+    kinds = (random_hold, random_ellipsoid, random_profile, random_mesh)
+    chances = np.array([0.65, 0.35, 0.0, 0.0]) * (1.0 - rough) + [
+        0.0,
+        0.0,
+        0.8 * rough,
+        0.2 * rough,
+    ]
+    hold = kinds[rng.choice(4, p=chances)](rng)
+    surface = Surface.from_values(
+        {"shear_limit": rng.uniform(15.0, 100.0), "pull_off_angle": rng.uniform(0.3, 1.5)}
+    )
+    grasp = Grasp(
+        outer_rotation=float(rng.choice([0.0, math.pi, 0.5 * math.pi, rng.uniform(0.0, math.pi)])),
+        closing_tension=None if rng.random() < 0.5 else float(rng.uniform(15.0, 60.0)),
+        palm=bool(rng.random() < 0.8),
+        fingernail=bool(rng.random() < 0.07),
+    )
+    pose = None
+    if rng.random() < 0.6:
+        tilt = float(rng.choice([0.0, 0.05, 0.3]))
+        axes = random_axes(rng, tilt) if tilt else np.eye(3)
+        pose = Pose(rng.uniform([-0.04, -0.03, -0.002], [0.07, 0.03, 0.012]), axes)
+    return Placement(hold, surface, grasp, pose)
+
+
+def same(one: SettledHand, other: SettledHand) -> None:
+    assert one.tiles == other.tiles
+    assert one.palm.engaged == other.palm.engaged
+    assert one.seating.rule == other.seating.rule
+    for a, b in (
+        (one.positions, other.positions),
+        (one.axes, other.axes),
+        (one.loads, other.loads),
+        (one.palm.gaps, other.palm.gaps),
+        (one.palm.centre, other.palm.centre),
+        (one.nail_angles, other.nail_angles),
+        (one.seating.pose.position, other.seating.pose.position),
+        (one.palm.shear_limit, other.palm.shear_limit),
+    ):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-10)
+
+
+def forget() -> None:
+    HAND.settled.clear()
+    HAND.settled_scans.clear()
+
+
+# Each hand, from its finger planes ----------------------------------------------------------------
+
+
+def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAND) -> None:
+    """Against the hand put together from sections and fingers closed one by one."""
+    hold, surface, grasp, pose = placement
+    assert settled.seating.rule == ("given" if pose is not None else HAND.seat(hold, grasp).rule)
+    there = settled.seating.pose
+    if pose is not None:
+        np.testing.assert_array_equal(there.position, pose.position)
+    inverse = there.inverse()
+    into = inverse.rotation[:, 2]
+    closing = hand.closing_tension if grasp.closing_tension is None else grasp.closing_tension
+    row = 0
+    for name, frame, finger in zip(
+        FINGERS, hand.frames(grasp.outer_rotation), settled.fingers, strict=True
+    ):
+        outer = name.startswith("outer")
+        if outer:
+            place = frame.joint + (hand.base_tile_reach - hand.outer_reach) * frame.along
+            place[2] = hand.base_tile_surface
+            gap = hold.entry(inverse.apply(place), into)
+            on = abs(gap) <= hand.spine_travel and not grasp.fingernail
+            assert settled.tiles[row] == (name, "base", "face" if on else "none")
+            np.testing.assert_allclose(
+                settled.positions[row], place + (gap if on else 0.0) * UP, atol=1e-11
+            )
+            gain = hand.finger.shear_gain
+            drag = ((hand.finger.base_engagement - gain) * closing, gain) if on else (0.0, 0.0)
+            np.testing.assert_allclose(settled.loads[row], [drag, (0.0, 0.0)], atol=1e-12)
+            row += 1
+        section = hand.section(name, hold, grasp, there)
+        if grasp.fingernail:
+            angles, shears, normals = np.zeros(3), np.zeros((3, 2)), np.zeros((3, 2))
+        else:
+            closed = close(hand.finger, section, surface, closing, outer)
+            assert closed is not None
+            angles = [contact.angle for contact in closed.finger.contacts]
+            shears, normals = closed.shears, closed.normals
+            assert [(c.kind, c.stop) for c in closed.finger.contacts] == [
+                (c.kind, c.stop) for c in finger.contacts
+            ]
+            alongs = [contact.along for contact in closed.finger.contacts]
+            np.testing.assert_allclose([c.along for c in finger.contacts], alongs, atol=1e-10)
+        np.testing.assert_allclose([c.angle for c in finger.contacts], angles, atol=1e-10)
+        joint = frame.joint
+        for i, contact in enumerate(finger.contacts):
+            u = math.cos(contact.angle) * frame.along + math.sin(contact.angle) * UP
+            n = math.cos(contact.angle) * UP - math.sin(contact.angle) * frame.along
+            place = joint + contact.along * u + hand.finger.tile_height * n
+            np.testing.assert_allclose(settled.positions[row], place, atol=1e-12)
+            np.testing.assert_allclose(settled.axes[row], [-u, n, frame.across], atol=1e-12)
+            size = 1.0 + np.abs(normals).max()
+            np.testing.assert_allclose(settled.loads[row, 0], shears[i], atol=1e-9)
+            np.testing.assert_allclose(settled.loads[row, 1], normals[i], atol=1e-8 * size)
+            assert settled.tiles[row].contact == contact.kind
+            joint = joint + hand.finger.joint_spacing * u
+            row += 1
+        row += grasp.fingernail
+    assert row == len(settled.tiles)
+    gaps = [hold.entry(inverse.apply(tile), into) for tile in hand.palm_tiles]
+    np.testing.assert_allclose(settled.palm.gaps, gaps, atol=1e-11)
+    engaged = [i for i, gap in enumerate(gaps) if gap <= hand.spine_travel and grasp.palm]
+    assert settled.palm.engaged == tuple(engaged)
+    if engaged:
+        places = hand.palm_tiles[engaged] + np.array(gaps)[engaged, None] * UP
+        np.testing.assert_allclose(settled.palm.centre, places.mean(axis=0), atol=1e-11)
+
+
+@settings(max_examples=35, deadline=None)
+@given(seeds)
+def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
+    rng = np.random.default_rng(seed)
+    placements = [random_placement(rng) for _ in range(rng.integers(1, 5))]
+    for placement, settled in zip(placements, HAND.settle_each(placements), strict=True):
+        if isinstance(settled, SettledHand):
+            check_hand(placement, settled)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seeds)
+def test_tendons_that_rub_load_outer_fingers_less(seed):
+    rng = np.random.default_rng(seed)
+    hand = changed_hand("tendon", "friction", 0.1)
+    placements = [random_placement(rng, rough=0.0) for _ in range(3)]
+    for placement, settled in zip(placements, hand.settle_each(placements), strict=True):
+        if isinstance(settled, SettledHand):
+            check_hand(placement, settled, hand)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seeds)
+def test_neither_company_nor_order_changes_a_hand(seed):
+    rng = np.random.default_rng(seed)
+    placements = [random_placement(rng, rough=0.1) for _ in range(4)]
+    together = HAND.settle_each(placements)
+    order = rng.permutation(4)
+    forget()
+    others = HAND.settle_each([placements[i] for i in order])
+    for i, other in zip(order, others, strict=True):
+        forget()
+        (alone,) = HAND.settle_each([placements[i]])
+        for found in (together[i], other):
+            if isinstance(alone, InvalidInputError):
+                assert (type(found), str(found)) == (type(alone), str(alone))
+            else:
+                assert isinstance(found, SettledHand)
+                same(found, alone)
+
+
+def test_a_hand_that_cannot_be_where_it_is_has_its_error_in_place():
+    deep = Pose(np.array([0.0, 0.0, -0.02]), np.eye(3))
+    good = Placement(Cylinder(0.3), ROCK, PINCH, None)
+    outcomes = HAND.settle_each(
+        [
+            good,
+            Placement(Plane(), ROCK, Grasp(), deep),
+            Placement(Cylinder(0.3), ROCK, Grasp(closing_tension=900.0), deep),
+            good,
+        ]
+    )
+    first, palm, tension, last = outcomes
+    assert first is last
+    assert isinstance(first, SettledHand)
+    assert (palm.field, tension.field) == ("hold", "grasp.closing_tension")
+    assert "20.0 mm inside the palm" in str(palm)
+    assert "must be at most the tendon's 700 N, got 900" in str(tension)
+    with pytest.raises(InvalidInputError, match=r"^hold: the hold stands 20\.0 mm inside the palm"):
+        HAND.settle(Plane(), ROCK, Grasp(), deep)
+
+
+def test_the_first_hand_of_a_stance_that_is_impossible_is_named():
+    stance = on_wall()
+    hands = list(stance.hands)
+    for i, depth in ((1, 0.03), (3, 0.04)):
+        into = Pose(np.array([0.0, 0.0, -depth]), np.eye(3))
+        hands[i] = dataclasses.replace(hands[i], hold_in_hand=into)
+    with pytest.raises(InvalidInputError, match=r"^stance\.hands\[1\]\.hold: .* 29\.4 mm inside"):
+        settle_stance(dataclasses.replace(stance, hands=tuple(hands)))
+
+
+def test_a_stance_settles_as_its_hands_do():
+    stance = on_wall()
+    hand = stance.hands[2]
+    for settled in settle_stance(stance):
+        same(settled, HAND.settle(hand.hold, hand.surface, hand.grasp))
+
+
+# What is kept -------------------------------------------------------------------------------------
+
+LEVEL = Pose(np.array([0.0, 0.0, 0.003]), np.eye(3))
+BASIC = Placement(Cylinder(0.3), ROCK, Grasp(0.5), LEVEL)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        BASIC._replace(hold=Cylinder(0.31)),
+        BASIC._replace(hold=Sphere(0.3)),
+        BASIC._replace(hold=Edge(0.15, 2.0)),
+        BASIC._replace(hold=Ellipsoid((0.15, 0.3, 0.15))),
+        BASIC._replace(surface=Surface.named("sandpaper-36")),
+        BASIC._replace(surface=dataclasses.replace(ROCK, half_planes=2)),
+        BASIC._replace(grasp=Grasp(0.6)),
+        BASIC._replace(grasp=Grasp(0.5, closing_tension=30.0)),
+        BASIC._replace(grasp=Grasp(0.5, palm=False)),
+        BASIC._replace(grasp=Grasp(0.5, lateral=False)),
+        BASIC._replace(grasp=Grasp(0.5, fingernail=True)),
+        BASIC._replace(hold_in_hand=Pose(np.array([0.0, 1e-9, 0.003]), np.eye(3))),
+        BASIC._replace(hold_in_hand=Pose(LEVEL.position, np.diag([-1.0, -1.0, 1.0]))),
+        BASIC._replace(hold_in_hand=None),
+    ],
+)
+def test_a_hand_is_kept_for_the_same_hold_place_grasp_and_surface_only(other):
+    HAND.settled.clear()
+    (first,) = HAND.settle_each([BASIC])
+    copies = BASIC._replace(
+        hold=Cylinder(0.3),
+        grasp=Grasp(0.5),
+        surface=dataclasses.replace(ROCK),
+        hold_in_hand=Pose(LEVEL.position.copy(), np.eye(3)),
+    )
+    (again,) = HAND.settle_each([copies])
+    assert again is first
+    (different,) = HAND.settle_each([other])
+    assert different is not first
+    assert (different.hold, different.surface, different.grasp) == other[:3]
+    assert HAND.settled.info() == (1, 2, 2)
+
+
+def test_each_hand_keeps_its_own():
+    own = changed_hand("finger", "tile_height", 0.006)
+    (first,), (other,) = HAND.settle_each([BASIC]), own.settle_each([BASIC])
+    assert first.hand is HAND
+    assert other.hand is own
+    assert np.abs(first.positions - other.positions).max() > 1e-5
+
+
+@pytest.mark.parametrize("kind", ["mesh", "profile"])
+def test_scanned_rock_is_known_by_the_object(kind):
+    rng = np.random.default_rng(5)
+    rock = random_mesh(rng) if kind == "mesh" else random_profile(rng)
+    alike = (
+        Mesh(rock.triangles.vertices, rock.triangles.faces)
+        if isinstance(rock, Mesh)
+        else Profile(rock.outlines[0])
+    )
+    one, again, other = (HAND.settle(each, ROCK, PINCH) for each in (rock, rock, alike))
+    assert one is again
+    assert other is not one
+
+
+def test_what_is_kept_cannot_be_changed():
+    place = Pose(np.array([0.0, 0.0, 0.003]), np.eye(3))
+    settled = HAND.settle(Edge(0.1, 1.5), ROCK, Grasp(), place)
+    arrays = (
+        *(getattr(settled, name) for name in ("positions", "axes", "loads", "finger_of")),
+        *(settled.palm.gaps, settled.palm.centre, settled.nail_angles, settled.nail_normals),
+        *(settled.seating.pose.position, settled.seating.pose.rotation),
+        *settled.postures,
+        *(torque for _, _, torque in settled.stops),
+    )
+    for array in arrays:
+        with pytest.raises(ValueError, match="read-only"):
+            array.flat[0] = 1.0
+    # nor through what the caller gave
+    place.position[2] = 0.5
+    assert settled.seating.pose.position[2] == 0.003
+
+
+def test_only_so_many_hands_are_kept_the_last_ones():
+    hand = SpinyHand()
+    placements = [Placement(Plane(), ROCK, Grasp(0.01 * i), None) for i in range(300)]
+    first = hand.settle_each(placements)
+    assert hand.settled.info() == (0, 300, hand.settled.most)
+    again = hand.settle_each(placements)
+    kept = [one is other for one, other in zip(first, again, strict=True)]
+    assert kept == [False] * (300 - hand.settled.most) + [True] * hand.settled.most
+
+
+def test_fewer_hands_on_scans_are_kept_than_on_holds_given_by_numbers():
+    hand = SpinyHand()
+    holds = [Profile([[-0.3, 0.0], [0.01 * i, 0.0], [0.3, 0.01]]) for i in range(20)]
+    placements = [Placement(hold, ROCK, Grasp(), None) for hold in holds]
+    placements.insert(7, Placement(Plane(), ROCK, Grasp(), None))
+    settled = hand.settle_each(placements)
+    assert [each.hold for each in settled] == [each.hold for each in placements]
+    assert hand.settled.info() == (0, 1, 1)
+    assert hand.settled_scans.info() == (0, 20, 16)
+    assert hand.settle_each(placements[7:8]) == settled[7:8]
+    assert hand.settle_each(placements[-1:]) == settled[-1:]
+    assert hand.settle(holds[0], ROCK) is not settled[0]
+
+
+def test_threads_share_what_is_kept():
+    hand = SpinyHand()
+    rng = np.random.default_rng(11)
+    placements = [random_placement(rng, rough=0.0) for _ in range(12)]
+    orders = [rng.integers(0, len(placements), 6) for _ in range(60)]
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda o: hand.settle_each([placements[i] for i in o]), orders))
+    alone = SpinyHand().settle_each(placements)
+    for order, outcomes in zip(orders, found, strict=True):
+        for i, outcome in zip(order, outcomes, strict=True):
+            if isinstance(alone[i], SettledHand):
+                same(outcome, alone[i])
+            else:
+                assert str(outcome) == str(alone[i])
+    hits, misses, kept = hand.settled.info()
+    assert hits + misses == 60 * 6
+    assert kept == sum(isinstance(each, SettledHand) for each in alone)
+
+
+def test_a_hand_travels_between_processes_without_what_it_keeps():
+    # the one that this process has now: others may have come between
+    hand = spiny_hand()
+    assert pickle.loads(pickle.dumps(hand)) is hand
+    recent = Recent(3)
+    recent.keep([("a", 1)])
+    copy = pickle.loads(pickle.dumps(recent))
+    assert (copy.most, copy.info()) == (3, (0, 0, 0))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(1, 5), st.lists(st.tuples(st.booleans(), st.integers(0, 7)), max_size=40))
+def test_recent_answers_are_those_asked_for_last(most, steps):
+    recent, model, order = Recent(most), {}, []
+    for asking, question in steps:
+        known = question in model
+        if asking:
+            assert recent.find([question]) == [model.get(question)]
+        elif not known:
+            recent.keep([(question, str(question))])
+            model[question] = str(question)
+        if asking == known:
+            order = [other for other in order if other != question] + [question]
+        for gone in order[:-most]:
+            del model[gone]
+        order = order[-most:]
+    assert recent.info().kept == len(model)
+
+
+# The bottom-up state of a finger ------------------------------------------------------------------
+
+
+@settings(max_examples=150, deadline=None)
+@given(seeds)
+def test_a_finger_is_laid_as_on_its_section(seed):
+    """On planes of any tilt through smooth holds."""
+    rng = np.random.default_rng(seed)
+    placement = random_placement(rng, rough=0.0)
+    placement = placement._replace(grasp=dataclasses.replace(placement.grasp, fingernail=False))
+    (settled,) = HAND.settle_each([placement])
+    if isinstance(settled, InvalidInputError):
+        return
+    for name, finger in zip(FINGERS, settled.fingers, strict=True):
+        if len(finger.free) < 3:
+            continue
+        section = HAND.section(name, placement.hold, placement.grasp, settled.seating.pose)
+        first = settle_finger(HAND.finger, section, (0.0, 0.0))
+        angles = [contact.angle for contact in first.contacts]
+        if not np.allclose([contact.angle for contact in finger.contacts], angles, atol=1e-6):
+            continue  # it has given way
+        np.testing.assert_allclose(
+            [(c.angle, c.along, *c.joint) for c in finger.contacts],
+            [(c.angle, c.along, *c.joint) for c in first.contacts],
+            atol=1e-10,
+        )

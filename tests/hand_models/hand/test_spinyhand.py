@@ -1,0 +1,227 @@
+"""The whole hand: where its tiles are and how it is seated."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from hand_models import (
+    FINGERS,
+    CruxError,
+    Cylinder,
+    Edge,
+    Grasp,
+    InvalidInputError,
+    Plane,
+    Pose,
+    Sphere,
+)
+from hand_models.finger import PHALANGES
+from hand_models.sections import LEVEL
+from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, settled_at
+from tests.suite.helpers.rocks import in_hand
+
+MESH_ORIGIN = np.array([-19.85, 0.0, 43.4])
+"""Of H in the frame of the published CAD mesh, axes parallel [mm]."""
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def test_the_hand_has_22_tiles_8_of_them_in_the_palm():
+    settled = pinch()
+    assert len(settled.tiles) + len(settled.palm.gaps) == 22
+    assert len(settled.palm.gaps) == 8
+    expected = [
+        (finger, phalanx)
+        for finger in FINGERS
+        for phalanx in (("base", *PHALANGES) if finger.startswith("outer") else PHALANGES)
+    ]
+    assert [(tile.finger, tile.phalanx) for tile in settled.tiles] == expected
+
+
+def test_palm_tiles_and_joints_are_where_the_cad_mesh_has_them():
+    columns, rows = [-60.6, -33.1, -6.2, 20.9], [14.1, -14.1]
+    mesh = np.array([(x, y, 43.4) for x in columns for y in rows]) - MESH_ORIGIN
+    np.testing.assert_allclose(1e3 * HAND.palm_tiles, mesh, atol=0.011)
+    joints = {f: 1e3 * frame.joint for f, frame in zip(FINGERS, HAND.frames(0.0), strict=True)}
+    np.testing.assert_allclose(joints["inner_left"] + MESH_ORIGIN, [46.3, 16.5, 42.8], atol=0.01)
+    np.testing.assert_allclose(joints["inner_right"] + MESH_ORIGIN, [46.3, -16.5, 42.8], atol=0.01)
+    # outer fingers: 34.6 mm from an axis at (12.9, ±50.5), turned outward
+    turned = HAND.frames(math.radians(11.3))[FINGERS.index("outer_left")]
+    reach = 34.6 * np.array([math.cos(math.radians(11.3)), math.sin(math.radians(11.3))])
+    np.testing.assert_allclose(
+        (1e3 * turned.joint + MESH_ORIGIN)[:2], np.array([12.9, 50.5]) + reach, atol=0.01
+    )
+
+
+def test_base_tiles_turn_with_their_fingers_as_in_the_cad_mesh():
+    settled = HAND.settle(Plane(), ROCK, Grasp(outer_rotation=math.radians(11.3)))
+    base = settled.positions[[tile.phalanx == "base" for tile in settled.tiles]]
+    mesh = 1e3 * base[:, :2] + MESH_ORIGIN[:2]
+    np.testing.assert_allclose(mesh, [[24.3, 52.4], [24.3, -52.4]], atol=0.6)
+
+
+def test_at_rest_all_fingers_are_alike_and_turned_by_pi_the_outer_ones_oppose():
+    for frame in HAND.frames(0.0):
+        np.testing.assert_allclose(frame.along, [1, 0, 0], atol=1e-15)
+    for name, frame in zip(FINGERS, HAND.frames(math.pi), strict=True):
+        sign = -1 if name.startswith("outer") else 1
+        np.testing.assert_allclose(frame.along, [sign, 0, 0], atol=1e-15)
+        np.testing.assert_allclose(np.cross([0, 0, 1], frame.along), frame.across, atol=1e-15)
+    # outward: half way, each points to its own side
+    left, *_, right = HAND.frames(math.pi / 2)
+    np.testing.assert_allclose([left.along[1], right.along[1]], [1, -1])
+
+
+def test_opposed_bases_are_68_mm_apart():
+    outer, inner, *_ = HAND.frames(math.pi)
+    assert inner.joint[0] - outer.joint[0] == pytest.approx(0.068, abs=1e-4)
+
+
+@pytest.mark.parametrize(("diameter", "stand_off"), [(0.3, 2.3), (0.7, 3.3)])
+def test_in_a_pinch_the_crest_is_midway_and_the_palm_stands_off(diameter, stand_off):
+    settled = pinch(diameter)
+    x, y, z = 1e3 * settled.seating.pose.position
+    assert settled.seating.rule == "pinch"
+    np.testing.assert_allclose(settled.seating.pose.rotation, np.eye(3))
+    assert (x, y) == (pytest.approx(0.5 * (66.15 + 32.75 - 34.6)), 0.0)
+    assert z == pytest.approx(stand_off, abs=0.06)
+    for finger in settled.fingers:
+        assert finger.contacts[0].along == pytest.approx(0.0247, abs=1e-9)
+
+
+def test_in_other_grasps_the_palm_rests_on_the_rock_and_the_crest_is_where_inner_fingers_close():
+    settled = HAND.settle(Cylinder(0.3), ROCK)
+    x, y, z = 1e3 * settled.seating.pose.position
+    assert settled.seating.rule == "palm_on_rock"
+    # Pythagoras: joint to centre along x, (154.7² + 24.7² − 150.6²)^½ mm = 43.15 mm
+    assert x == pytest.approx(66.15 - 43.15, abs=0.01)
+    assert (y, z) == (0.0, 0.0)
+    for name, finger in zip(FINGERS, settled.fingers, strict=True):
+        if name.startswith("inner"):
+            assert finger.contacts[0].along == pytest.approx(0.0247, abs=1e-9)
+
+
+def test_on_a_plane_every_contact_is_at_its_tiles_centre():
+    for grasp in (Grasp(), PINCH):
+        settled = HAND.settle(Plane(), ROCK, grasp)
+        assert settled.seating.rule == "flat"
+        for finger in settled.fingers:
+            assert [c.along for c in finger.contacts] == [HAND.finger.tile_centre] * 3
+            np.testing.assert_allclose(finger.joint_angles, 0.0, atol=1e-12)
+        assert settled.palm.engaged == tuple(range(8))
+
+
+@pytest.mark.parametrize("hold", [Cylinder(0.005), Sphere(0.01), Edge(0.001, 0.5)])
+def test_where_no_seat_can_be_had_the_crest_is_under_the_palm(hold):
+    for grasp in (Grasp(), PINCH):
+        seating = HAND.seat(hold, grasp)
+        assert seating.rule == "palm_on_rock_centred"
+        np.testing.assert_array_equal(seating.pose.position, 0.0)
+
+
+def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
+    palm = pinch().palm
+    beside = np.array([-40.75, -13.25, 13.65, 40.75]) - 0.5 * (66.15 + 32.75 - 34.6)
+    gaps = 2.3 + 150.0 - np.sqrt(150.0**2 - beside**2)
+    np.testing.assert_allclose(1e3 * palm.gaps, np.repeat(gaps, 2), atol=0.1)
+    assert palm.engaged == (4, 5, 6, 7)
+    np.testing.assert_allclose(palm.centre[:2], [(0.01365 + 0.04075) / 2, 0.0], atol=1e-12)
+    assert palm.centre[2] == pytest.approx(palm.gaps[4:].mean())
+    assert palm.pressing_limit == 4 * 250.0
+    assert palm.shear_limit == pytest.approx(4 * 63.0)  # alike tiles share alike
+
+
+def test_a_grasp_without_palm_has_none():
+    palm = pinch(palm=False).palm
+    assert palm.engaged == ()
+    assert (palm.shear_limit, palm.pressing_limit) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 0.7, 1.9, math.pi])
+@pytest.mark.parametrize("hold", [Cylinder(0.3), Sphere(0.5), Edge(0.1, 1.5), Plane()])
+def test_left_and_right_mirror_each_other(hold, rotation):
+    settled = HAND.settle(hold, ROCK, Grasp(outer_rotation=rotation))
+    for left, right in ((0, 3), (1, 2)):
+        a, b = (settled.finger_of == i for i in (left, right))
+        np.testing.assert_allclose(settled.positions[a], settled.positions[b] * MIRROR, atol=1e-9)
+        np.testing.assert_allclose(settled.loads[a], settled.loads[b], atol=1e-7)
+        mirrored = settled.axes[b] * MIRROR * [[1], [1], [-1]]  # lateral: z × along turns round
+        np.testing.assert_allclose(settled.axes[a], mirrored, atol=1e-9)
+    np.testing.assert_allclose(settled.palm.gaps[::2], settled.palm.gaps[1::2])
+
+
+@pytest.mark.parametrize("hold", [Cylinder(0.3), Cylinder(8.0), Sphere(0.6)])
+def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
+    pose = HAND.seat(hold, PINCH).pose
+    turns = np.linspace(0.0, math.pi, 315)
+    hands = [HAND.settle(hold, ROCK, Grasp(outer_rotation=float(t)), pose) for t in turns]
+    for one, other in itertools.pairwise(hands):
+        if one.tiles == other.tiles:
+            # at most the 0.2 m arm times 0.01 rad, and the same again for closing
+            assert np.abs(one.positions - other.positions).max() < 0.004
+        else:
+            changed = [a.finger for a, b in zip(one.tiles, other.tiles, strict=True) if a != b]
+            assert all(finger.startswith("outer") for finger in changed)
+    assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 20
+
+
+@settings(max_examples=100, deadline=None)
+@given(seeds)
+def test_tiles_said_to_touch_are_on_the_rock(seed):
+    settled = settled_at(seed)
+    if settled is None:
+        return
+    on = settled.touching
+    clearance = in_hand(settled.hold, settled.seating.pose, settled.positions)
+    faces = np.array([tile.contact == "face" for tile in settled.tiles])
+    # a face that lies flat may be level to a tenth of a millimetre
+    assert (clearance[faces] > -1e-9).all()
+    assert (clearance[faces] < LEVEL).all()
+    # at an edge, spines reach across the gap
+    assert (clearance[on] > -1e-9).all()
+    assert (clearance[on] < HAND.spine_travel + 1e-9).all()
+    for tile, place in zip(settled.tiles, settled.positions, strict=True):
+        if tile.phalanx == "base" and tile.contact != "none":
+            assert abs(place[2]) <= 0.005 + 1e-12
+    z = np.column_stack([HAND.palm_tiles[:, :2], settled.palm.gaps])[list(settled.palm.engaged)]
+    np.testing.assert_allclose(in_hand(settled.hold, settled.seating.pose, z), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("depth", "possible"), [(0.0049, True), (0.0051, False)])
+def test_rock_stands_no_deeper_in_the_palm_than_spines_retract(depth, possible):
+    log = Cylinder(0.3)  # its crest under a column of palm tiles, clear of the fingers
+    pose = Pose(np.array([HAND.palm_tiles[4, 0], 0.0, -depth]), np.eye(3))
+    if possible:
+        assert HAND.settle(log, ROCK, None, pose).palm.gaps.min() == pytest.approx(-depth)
+    else:
+        with pytest.raises(CruxError, match=r"5\.1 mm inside the palm"):
+            HAND.settle(log, ROCK, None, pose)
+
+
+def test_a_hand_whose_fingers_stand_in_the_rock_is_refused():
+    with pytest.raises(CruxError, match=r"4\.\d mm inside outer_left") as caught:
+        HAND.settle(Plane(), ROCK, None, Pose(np.array([0.0, 0.0, -0.0049]), np.eye(3)))
+    assert caught.value.field == "hold"
+
+
+@pytest.mark.parametrize(
+    ("values", "field"),
+    [
+        ({"outer_rotation": -0.1}, "outer_rotation"),
+        ({"outer_rotation": 3.2}, "outer_rotation"),
+        ({"outer_rotation": math.nan}, "outer_rotation"),
+        ({"closing_tension": 0.0}, "closing_tension"),
+        ({"closing_tension": -1.0}, "closing_tension"),
+        ({"closing_tension": math.inf}, "closing_tension"),
+        ({"closing_tension": math.nan}, "closing_tension"),
+    ],
+)
+def test_impossible_grasps_are_refused_by_field(values, field):
+    with pytest.raises(InvalidInputError) as caught:
+        Grasp(**values)
+    assert caught.value.field == field

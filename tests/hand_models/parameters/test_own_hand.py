@@ -1,0 +1,549 @@
+"""A hand of the caller's own: files with some of its numbers, in every command and over zenoh."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import zenoh
+
+from hand_models import Cylinder, InvalidInputError, Mesh, SpinyHand, spiny_hand
+from hand_models.hand import FINGERS
+from hand_models.parameters import ParameterTable, Quantity, hand_table, load_own_hand, own_hand
+from planner.robots import robosimian
+from service.answering import dispatch, read_hand, with_hand
+from service.answering.own_hand import over_default
+from service.answering.questions import question
+from service.commands.cli import run
+from service.replies import PlanReply
+from service.requests import PlanRequest
+from service.serving import CruxClient, PlanService, open_session, zenoh_config
+from service.wire import ServiceError, decode_request
+from tests.service.commands.test_cli import process
+from tests.service.serving.test_service import Served, client_config, free_endpoint
+from tests.suite.helpers.asked import HEAVY, full_request, put, wall_request
+from tests.suite.helpers.hands import PINCH, ROCK
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.rocks import cylinder_mesh
+
+X, Z = np.eye(3)[[0, 2]]
+BUNDLED = [(section, name) for section, name, _ in hand_table()]
+IDS = [f"{section}.{name}" for section, name in BUNDLED]
+
+
+def line(section: str, name: str, value: Any, unit: str | None = None) -> str:
+    """A file with one entry."""
+    unit = hand_table().quantity(section, name).unit if unit is None else unit
+    return f'[{section}]\n{name} = {{ value = {value}, unit = "{unit}", source = "assumed" }}\n'
+
+
+def own(section: str, name: str, value: Any) -> ParameterTable:
+    return ParameterTable.read(line(section, name, value), "own.toml")
+
+
+def request_for(*parts: ParameterTable, mass: float | None = 50.0) -> PlanRequest:
+    request = decode_request(msgspec.json.encode(wall_request(mass)), PlanRequest)
+    for part in parts:
+        request = with_hand(request, part)
+    return request
+
+
+def untimed(reply: PlanReply) -> dict:
+    """A reply without what it took."""
+    return {k: v for k, v in msgspec.to_builtins(reply).items() if k not in ("time", "solver")}
+
+
+THICK = own("finger", "pulley_radii", [0.011, 0.00616, 0.00538])
+"""Joint pulleys of twice the radius."""
+WEAK = own("tendon", "maximum_tension", 60.0)
+
+
+@pytest.fixture
+def file(tmp_path: Path):
+    """Writes a hand's file, and returns its path."""
+
+    def write(text: str | bytes, name: str = "own.toml") -> str:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return str(path)
+
+    return write
+
+
+# Numbers ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("section", "name"), BUNDLED, ids=IDS)
+def test_every_entry_may_be_one_per_cent_off(section: str, name: str, file) -> None:
+    value = hand_table().quantity(section, name).value
+    off = [1.01 * v for v in value] if isinstance(value, list) else 1.01 * value
+    table = own_hand(read_hand(Path(file(line(section, name, off)))))
+    changed = table.difference(hand_table()).sections
+    if np.any(value):
+        assert {(s, n): q.value for s, ns in changed.items() for n, q in ns.items()} == {
+            (section, name): off
+        }
+    else:
+        assert changed == {}
+
+
+@pytest.mark.parametrize(("section", "name"), BUNDLED, ids=IDS)
+def test_what_is_no_coordinate_may_not_be_negative(section: str, name: str) -> None:
+    value = np.asarray(hand_table().quantity(section, name).value)
+    negative = (-1.01 * np.abs(value) - 1e-3).tolist()
+    if value.min() < 0.0 or (section, name) == ("fingers", "base_tile_surface"):
+        SpinyHand(own_hand(own(section, name, (value - 1e-4).tolist())))
+    else:
+        with pytest.raises(InvalidInputError, match="must be from 0 to") as caught:
+            own_hand(own(section, name, negative))
+        assert caught.value.field == f"{section}.{name}"
+
+
+def test_twice_the_pulleys_change_the_normals_by_the_balance_of_the_joints() -> None:
+    """Eq. 4: the tendon's added moment f r about each joint is what the added normals take."""
+    tension = 100.0
+    bundled, thick = spiny_hand(), spiny_hand(own_hand(THICK))
+    radii = np.array(hand_table().vector("finger", "pulley_radii"))
+    height = hand_table().scalar("finger", "tile_height")
+    before, after = (hand.settle(Cylinder(0.3), ROCK, PINCH) for hand in (bundled, thick))
+    loads = [settled.tile_loads(np.full(4, tension)) for settled in (before, after)]
+    for i in range(len(FINGERS)):
+        contacts = after.fingers[i].contacts
+        assert contacts == before.fingers[i].contacts
+        assert all(contact.kind == "face" for contact in contacts)
+        moments = np.zeros((3, 3))
+        for k in range(3):
+            x, z = contacts[k].joint
+            for j in range(k, 3):
+                u, w = contacts[j].point(height)
+                angle = contacts[j].angle
+                # of the rock's reaction −N n, n = (−sin, cos), about joint k, from x toward z
+                moments[k, j] = (u - x) * math.cos(angle) + (w - z) * math.sin(angle)
+        tiles = [n for n, t in enumerate(after.tiles) if t.finger == FINGERS[i] != t.phalanx]
+        tiles = [n for n in tiles if after.tiles[n].phalanx in ("proximal", "middle", "distal")]
+        added = loads[1][tiles] - loads[0][tiles]
+        np.testing.assert_allclose(added[:, 0], 0.0, atol=1e-9)  # shear follows the tendon alone
+        np.testing.assert_allclose(added[:, 1], np.linalg.solve(moments, tension * radii))
+
+
+def test_four_heavier_hands_weigh_on_the_body() -> None:
+    heavy = robosimian(own_hand(own("hand", "mass", 5.6)))
+    assert heavy.mass == pytest.approx(robosimian().mass + 4 * 3.0)
+    wrench = question(request_for(own("hand", "mass", 5.6), mass=None)).needed_wrench()
+    np.testing.assert_allclose(
+        np.linalg.norm(wrench[:3]), 9.81 * (robosimian().mass + 12.0), rtol=1e-12
+    )
+
+
+def test_a_hand_is_built_once_for_each_content() -> None:
+    a, b = (own_hand(own("tile", "spine_travel", 0.004)) for _ in range(2))
+    assert a is not b
+    assert a == b != hand_table()
+    assert hash(a) == hash(b)
+    assert spiny_hand(a) is spiny_hand(b) is robosimian(a).hand is not spiny_hand()
+
+
+def test_a_tile_smooths_rock_to_its_own_length() -> None:
+    roof = [[-0.3, 0.3], [0.0, 0.0], [0.3, 0.3]]
+    asked = put(
+        wall_request(), ("stance", "hands", 0, "hold"), {"shape": "profile", "points": roof}
+    )
+    request = decode_request(msgspec.json.encode(asked), PlanRequest)
+    fillets = {}
+    for length in (0.024, 0.012):
+        small = with_hand(request, own("finger", "tile_length", length))
+        section = question(small).stance.hands[0].hold.section(np.zeros(3), X, Z)
+        # how deep the roof's sides, raw, lie under the fillet
+        fillets[length] = -min(section.clearance((x, x)) for x in np.linspace(0.0, 0.05, 201))
+    # a corner is rounded as wide as the tile is long; by 1.8 mm with one of 24 mm
+    assert fillets[0.024] == pytest.approx(1.8e-3, abs=1e-4)
+    assert fillets[0.012] == pytest.approx(0.5 * fillets[0.024], rel=0.02)
+
+
+def test_a_large_hand_meets_scanned_rock_as_far_as_it_reaches() -> None:
+    longer = {"joint_spacing": 0.12, "tile_centre": 0.06}
+    entries = {name: Quantity(value, "m", "assumed") for name, value in longer.items()}
+    table = own_hand(ParameterTable({"finger": entries}))
+    hand = spiny_hand(table)
+    want = hand.settle(Cylinder(1.5), ROCK, PINCH)
+    got = hand.settle(Mesh(*cylinder_mesh(1.5, 1024), table), ROCK, PINCH, want.seating.pose)
+    assert np.abs(want.positions[:, 1]).max() < 0.06
+    assert np.abs(want.positions[:, 0]).max() > 0.3
+    np.testing.assert_allclose(got.positions, want.positions, atol=3e-4)
+
+
+# Files --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stance", ["slab", "ledge"])
+def test_a_file_with_the_bundled_numbers_gives_the_same_plan(
+    stance: str, file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = ""
+    for section, entries in hand_table().sections.items():
+        text += f"[{section}]\n" + "".join(
+            line(section, n, q.value).partition("\n")[2] for n, q in entries.items()
+        )
+    replies = []
+    for more in ([], ["--hand", file(text)]):
+        assert run(["plan", stance, "--json", *more]) == 0
+        replies.append(msgspec.json.decode(capfd.readouterr().out))
+    for reply in replies:
+        del reply["time"]
+    assert replies[0] == replies[1]
+
+
+BAD = {
+    "an unknown section": (
+        '[fingr]\nlength = { value = 1, unit = "m", source = "assumed" }',
+        "fingr: unknown section; known are finger, fingers, hand,",
+    ),
+    "an unknown entry": (
+        '[finger]\npulley_radius = { value = 1, unit = "m", source = "assumed" }',
+        "finger.pulley_radius: unknown entry; known are pulley_radii,",
+    ),
+    "millimetres": (
+        line("finger", "joint_spacing", 43.1, "mm"),
+        "finger.joint_spacing: must be in 'm', got 43.1 in 'mm'",
+    ),
+    "millimetres that say metres": (
+        line("finger", "joint_spacing", 43.1),
+        "finger.joint_spacing: must be from 0 to 1 m, got 43.1",
+    ),
+    "degrees": (
+        line("finger", "joint_upper", [100, 100, 100], "deg"),
+        "finger.joint_upper: must be in 'rad', got [100.0, 100.0, 100.0] in 'deg'",
+    ),
+    "a number for a list": (
+        line("finger", "pulley_radii", 0.005),
+        "finger.pulley_radii: a list of 3 numbers is needed, got 0.005",
+    ),
+    "a list for a number": (
+        line("finger", "joint_spacing", [0.04, 0.04, 0.04]),
+        "finger.joint_spacing: one number is needed, got a list of 3",
+    ),
+    "a short list": (
+        line("palm", "tile_x", [0.01, 0.02]),
+        "palm.tile_x: a list of 4 numbers is needed, got [0.01, 0.02]",
+    ),
+    "a negative length": (
+        line("finger", "tile_height", -0.004),
+        "finger.tile_height: must be from 0 to 1 m, got -0.004",
+    ),
+    "joints in one place": (
+        line("finger", "joint_spacing", 0.0),
+        "finger.joint_spacing: must be above 0, got 0",
+    ),
+    "no pulley": (
+        line("finger", "pulley_radii", [0.005, 0.0, 0.003]),
+        "finger.pulley_radii: must be above 0 m, got [0.005, 0.0, 0.003]",
+    ),
+    "a tile beyond its phalanx": (
+        line("finger", "joint_spacing", 0.03),
+        "finger.tile_centre: a tile must lie on its phalanx, from 0 to 0.03 m, got 0.0085 to",
+    ),
+    "a joint that cannot turn": (
+        line("finger", "joint_lower", [1.8, -0.3, -0.3]),
+        "finger.joint_upper: must be above finger.joint_lower, both within half a turn, got 1.75",
+    ),
+    "friction of one": (
+        line("tendon", "friction", 1.0),
+        "tendon.friction: must be in [0, 1), got 1",
+    ),
+    "friction of the palm": (
+        line("palm", "pulley_friction", 2.0),
+        "palm.pulley_friction: must be in [0, 2), got 2",
+    ),
+    "own friction of the palm": (
+        line("palm", "own_pulley_friction", 2.5),
+        "palm.own_pulley_friction: must be in [0, 2), got 2.5",
+    ),
+    "a palm without contact": (
+        line("palm", "contact_stiffness", [0.0] * 8),
+        "palm.contact_stiffness: stiffnesses above 0 N/m are needed",
+    ),
+    "a palm that may not press": (
+        line("palm", "pressing_limit", 0.0),
+        "palm.pressing_limit: must be above 0, got 0",
+    ),
+    "closing beyond the tendon": (
+        line("tendon", "closing_tension", 800.0),
+        "tendon.closing_tension: must be at most the tendon's 700 N, got 800",
+    ),
+    "a gear that gains": (
+        line("motor", "efficiency", 1.2),
+        "motor.efficiency: must be in (0, 1], got 1.2",
+    ),
+    "not a number": (
+        line("finger", "pulley_radii", "[0.005, nan, 0.003]"),
+        "finger.pulley_radii.value[1]: must be finite, got nan",
+    ),
+    "no unit": (
+        '[hand]\nmass = { value = 1.0, source = "assumed" }',
+        "hand.mass: object missing required field unit; an entry is { value, unit, source, note",
+    ),
+    "a source that is none": (
+        '[hand]\nmass = { value = 1.0, unit = "kg", source = "guess" }',
+        "hand.mass.source: must be one of paper, measured, calibrated, assumed, got 'guess'",
+    ),
+    "text for a number": (
+        '[hand]\nmass = { value = "a", unit = "kg", source = "assumed" }',
+        "hand.mass.value: must be a number or a list of numbers, got 'a'",
+    ),
+    "a bare number": ("[hand]\nmass = 2.0\n", "hand.mass: expected object, got float"),
+    "no section": ("mass = 2.0\n", "mass: a section of entries is needed"),
+    "no TOML": ("[hand\n", "Expected"),
+    "no text": (b"\xff\xfe", "must be TOML in UTF-8"),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_a_bad_file_is_refused_in_one_line(
+    what: str, file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text, complaint = BAD[what]
+    path = file(text)
+    assert run(["plan", "wall-300", "--hand", path]) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith(f"crux: {path}: {complaint}")
+    assert err.count("\n") == 1
+    assert len(err) < len(path) + 600
+
+
+@pytest.mark.parametrize("name", ["nowhere.toml", ""])
+def test_a_file_that_is_none_is_refused(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    with pytest.raises(InvalidInputError):
+        load_own_hand(path)
+    assert run(["study", "fig06", "-o", str(tmp_path / "out"), "--hand", str(path)]) == 2
+    assert capfd.readouterr().err.startswith(f"crux: {path}: ")
+    assert not (tmp_path / "out").exists()
+
+
+# Commands -----------------------------------------------------------------------------------------
+
+
+def told(capfd: pytest.CaptureFixture[str]) -> dict:
+    out, err = capfd.readouterr()
+    assert err == ""
+    return json.loads(out)
+
+
+def test_a_plan_is_for_the_hand_of_the_file(file, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["plan", "wall-300", "--json"]) == 0
+    assert told(capfd)["limiting"]["limit"] != "tendon_tension"
+    path = file(line("tendon", "maximum_tension", 60.0))
+    assert run(["plan", "wall-300", "--json", "--hand", path]) == 3
+    reply = told(capfd)
+    assert reply["limiting"]["limit"] == "tendon_tension"
+    tensions = [f["tendon_tension"] for hand in reply["hands"] for f in hand["fingers"]]
+    assert max(tensions) / 60.0 == pytest.approx(reply["utilisation"], rel=1e-6)
+
+
+def test_the_file_has_the_last_word_over_the_stance(
+    file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = put(wall_request(None), ("stance", "hand"), msgspec.to_builtins(THICK.sections))
+    request["stance"]["hand"]["hand"] = {"mass": {"value": 9.0, "unit": "kg", "source": "assumed"}}
+    stance = file(json.dumps(request), "stance.json")
+    assert run(["plan", stance, "--json", "--hand", file(line("hand", "mass", 4.6))]) in (0, 3)
+    weight = 9.81 * (robosimian().mass + 4 * 2.0)
+    got = told(capfd)
+    np.testing.assert_allclose(np.linalg.norm(got["body_wrench"][:3]), weight, rtol=1e-9)
+    both = own_hand(THICK.replaced(own("hand", "mass", 4.6)))
+    want = dispatch.plan(with_hand(request_for(mass=None), both))
+    assert got["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
+
+
+def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixture[str]) -> None:
+    path = file(line("hand", "mass", 3.0))
+    assert run(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
+    assert f"one FILE at most, got {path}, {path}" in capfd.readouterr().err
+    assert run(["plan", "wall-300", "--hand", "front_left"]) == 2
+    assert "a FILE with numbers of a hand is wanted" in capfd.readouterr().err
+
+
+def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixture[str]) -> None:
+    path = file(line("tendon", "maximum_tension", 60.0))
+    limits = {}
+    for more in ([], ["--hand", path]):
+        assert run(["wrench-space", "wall-300", "--json", "--hand", "front_left", *more]) == 0
+        rows = told(capfd)["rows"]
+        limits[len(more)] = {row["capacity"] for row in rows if row["limit"] == "tendon_tension"}
+    assert limits == {0: {700.0}, 2: {60.0}}
+    for given in (["--hand", path], ["--hand", "front_left", "--hand", "rear_left"]):
+        assert run(["wrench-space", "wall-300", *given]) == 2
+        assert "one LIMB and at most one FILE that ends in .toml" in capfd.readouterr().err
+
+
+def test_a_route_is_climbed_with_the_hand(
+    file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = file(line("structure", "held_mass", 20.0))
+    tables = {}
+    for workers in ("1", "2"):
+        flags = ["--json", "--hand", path, "--workers", workers]
+        assert run(["route", "six-moves", "-o", str(tmp_path / workers), *flags]) == 3
+        assert told(capfd)["feasible"] is False
+        tables[workers] = (tmp_path / workers / "stages.csv").read_text()
+    assert tables["1"] == tables["2"]
+    assert "hand_load" in tables["1"]
+
+
+def test_the_demo_asks_for_the_hand(
+    file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = file(line("tendon", "maximum_tension", 60.0))
+    assert run(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
+    assert told(capfd)["limiting"]["limit"] == "tendon_tension"
+    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_study_is_of_the_hand_and_says_so(
+    file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = file(line("palm", "spring_stiffness", 400.0))
+    assert run(["study", "fig06", "-o", str(tmp_path), "--json", "--hand", path]) == 0
+    reply = told(capfd)
+    assert reply["hand"]["palm"]["spring_stiffness"]["value"] == 400.0
+    k1, k2, mu, kp = 2200.0, 1400.0, 0.34, 400.0
+    by_hand = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
+    (pair,) = [c for c in reply["data"]["configurations"] if c["springs"] == [1, 2]]
+    assert pair["load_with_friction"] == pytest.approx(by_hand)
+
+
+@pytest.mark.parametrize("friction", [0.0, 1.9])
+def test_the_studies_of_the_palm_bear_any_possible_palm(
+    friction: float, file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = file(line("palm", "pulley_friction", friction))
+    for name in ("fig06", "fig07"):
+        assert run(["study", name, "-o", str(tmp_path), "--json", "--hand", path]) == 0
+        assert told(capfd)["data"]["friction"] == friction
+
+
+def test_the_help_of_study_lists_the_studies(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["study", "--help"]) == 0
+    text = " ".join(capfd.readouterr().out.split())
+    assert "NAME is one of fig06, fig07, fig10" in text
+
+
+# Zenoh --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def alone() -> Iterator[zenoh.Session]:
+    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
+        yield opened
+
+
+def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Session) -> None:
+    asked = [request_for(), request_for(THICK), request_for(WEAK), request_for(THICK, WEAK)]
+    want = [untimed(dispatch.plan(request)) for request in asked]
+    assert len({reply["utilisation"] for reply in want}) >= 2
+    order = [i for _ in range(5) for i in (0, 1, 2, 3, 1, 0)]
+    with PlanService(alone), ThreadPoolExecutor(4) as pool:
+        client = CruxClient(alone, timeout=PATIENCE)
+        got = list(pool.map(lambda i: untimed(client.plan(asked[i])), order))
+        bad = put(
+            msgspec.to_builtins(asked[1]),
+            ("stance", "hand", "finger", "joint_spacing"),
+            {"value": -0.04, "unit": "m", "source": "assumed"},
+        )
+        with pytest.raises(ServiceError, match="must be from 0 to 1 m") as caught:
+            client.plan(msgspec.convert(bad, PlanRequest))
+        assert (caught.value.kind, caught.value.field) == (
+            "invalid",
+            "stance.hand.finger.joint_spacing",
+        )
+        assert untimed(client.plan(asked[0])) == want[0]
+    assert got == [want[i] for i in order]
+
+
+def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(file) -> None:
+    plain = request_for(mass=HEAVY)
+    heavy = own("hand", "mass", 12.6)
+    served = Served(free_endpoint(), "--hand", file(line("structure", "held_mass", 20.0)))
+    default = own("structure", "held_mass", 20.0)
+    try:
+        with zenoh.open(client_config(served.endpoint)) as session:
+            client = CruxClient(session, timeout=PATIENCE)
+            for request in (plain, with_hand(plain, THICK), with_hand(plain, heavy)):
+                want = dispatch.plan(over_default(request, default))
+                assert untimed(client.plan(request)) == untimed(want)
+            back = own("structure", "held_mass", 50.0)
+            assert untimed(client.plan(with_hand(plain, back))) == untimed(dispatch.plan(plain))
+        stance = file(json.dumps(wall_request(HEAVY)), "stance.json")
+        flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
+        flags += ["--timeout", str(PATIENCE)]
+        hand = file(line("structure", "held_mass", 45.0), "mine.toml")
+        asked = process("query", stance, *flags, "--json", "--hand", hand)
+        want = dispatch.plan(with_hand(plain, own("structure", "held_mass", 45.0)))
+        assert json.loads(asked.stdout)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
+    finally:
+        served.stop(signal.SIGTERM)
+
+
+SPOILT = [
+    ({"finger": 1}, "stance.hand.finger", "a section of entries is needed"),
+    ({"colour": {}}, "stance.hand.colour", "unknown section; known are"),
+    ({"finger": {"colour": 1}}, "stance.hand.finger.colour", "expected object, got int"),
+    ({"x" * 65: {}}, "stance.hand", "64"),
+    ({"finger": {"tile_height": {"value": 1e-3}}}, "stance.hand.finger.tile_height", "unit"),
+    (
+        {"finger": {"pulley_radii": {"value": [0.01] * 10**5, "unit": "m", "source": "paper"}}},
+        "stance.hand.finger.pulley_radii",
+        "a list of 3 numbers is needed, got a list of 100000",
+    ),
+    (
+        {"hand": {"mass": {"value": 1.0, "unit": "kg" * 10**5, "source": "paper"}}},
+        "stance.hand.hand.mass",
+        "must be in 'kg'",
+    ),
+    (
+        {"hand": {"mass": {"value": 1.0, "unit": "kg", "source": "x" * 10**5}}},
+        "stance.hand.hand.mass.source",
+        "must be one of paper, measured, calibrated, assumed",
+    ),
+    (
+        {"hand": {"mass": {"value": 10**400, "unit": "kg", "source": "paper"}}},
+        None,
+        "",
+    ),
+]
+
+
+@pytest.mark.parametrize(("hand", "field", "words"), SPOILT)
+def test_a_spoilt_hand_costs_its_sender_one_short_error(
+    hand: dict, field: str | None, words: str
+) -> None:
+    request = json.dumps(put(full_request(), ("stance", "hand"), hand)).encode()
+    answer = dispatch.handle("crux/robosimian/plan", request)
+    assert not answer.good
+    assert len(answer.payload) < 1000
+    error = json.loads(answer.payload)["error"]
+    assert error["kind"] in ("invalid", "malformed")
+    assert words in error["message"]
+    if field is not None:
+        assert error["field"] == field
+
+
+@pytest.mark.parametrize("depth", [100, 900, 100_000])
+def test_a_deep_hand_is_no_trouble(depth: int) -> None:
+    text = json.dumps(put(wall_request(), ("stance", "hand"), {"finger": {"tile_height": 0.5}}))
+    answer = dispatch.handle(
+        "crux/robosimian/plan", text.replace("0.5", "[" * depth + "]" * depth, 1).encode()
+    )
+    assert not answer.good
+    assert json.loads(answer.payload)["error"]["kind"] in ("invalid", "malformed")

@@ -1,0 +1,85 @@
+"""The picture of a hand on its hold, for every hold and any place of its fingers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure, SubFigure
+
+from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
+from hand_models.compliance import CompliantHand, FloatingWrist
+from hand_models.fixed_wrist import wrench_space
+from hand_models.rock import Mesh, Profile
+from planner.pictures import hand_plots
+from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.rocks import cylinder_mesh
+
+HOLDS = {
+    "plane": (Plane(), 0.0),
+    "cylinder": (Cylinder(0.3), math.pi),
+    "sphere": (Sphere(0.22), 1.0),
+    "ellipsoid": (Ellipsoid((0.2, 0.15, 0.1)), 2.5),
+    "edge": (Edge(0.05, 1.5), 0.4),
+    "profile": (Profile([[-0.2, 0.1], [0.0, 0.0], [0.2, 0.1]]), math.pi),
+    "mesh": (Mesh(*cylinder_mesh(0.2, 64)), 1.0),
+    "too small to hold": (Sphere(0.02), 0.0),
+}
+
+
+@pytest.mark.parametrize(("hold", "rotation"), HOLDS.values(), ids=HOLDS.keys())
+def test_every_hold_has_a_picture(hold, rotation, tmp_path):
+    settled = HAND.settle(hold, ROCK, Grasp(rotation, lateral=False))
+    path = tmp_path / "hand.png"
+    hand_plots.plot_wrench_space(settled, wrench_space(settled), path, "a hand")
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_contacts_and_forces_are_drawn_where_they_are():
+    settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
+    axes = Figure().subplots(2, 2).ravel()
+    hand_plots._draw_fingers(list(axes), settled, np.full(4, settled.closing_tension))
+    drawn = axes[0]  # inner_left
+    finger = settled.fingers[1]
+    dots = [line for line in drawn.lines if line.get_color() == "black"]
+    np.testing.assert_allclose(
+        np.array([dot.get_xydata()[0] for dot in dots]), 1e3 * finger.points, atol=1e-9
+    )
+    loads = settled.tile_loads(np.full(4, settled.closing_tension))
+    largest = np.hypot(*loads[:, :2].T).max()
+    rows = np.flatnonzero(settled.finger_of == 1)
+    arrows = [note for note in drawn.texts if getattr(note, "arrow_patch", None) is not None]
+    tips = [np.array(note.xy) - np.array(note.xyann) for note in arrows[: len(rows)]]
+    for tip, row in zip(tips, rows, strict=True):
+        force = loads[row, 0] * settled.axes[row, 0] + loads[row, 1] * settled.axes[row, 1]
+        np.testing.assert_allclose(tip, hand_plots.ARROW * force[[0, 2]] / largest, atol=1e-9)
+
+
+def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypatch, tmp_path):
+    settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
+    wrist = FloatingWrist(CompliantHand(settled, [40.0, 50.0, 60.0, 45.0]))
+    at_rest = wrist.hand.loads(np.zeros((1, 6)))
+    drawn = settled.tile_loads(wrist.hand.preload)
+    np.testing.assert_allclose(drawn[:, 0], at_rest.shears[0], atol=1e-9)
+    np.testing.assert_allclose(drawn[:, 1], at_rest.normals[0], atol=1e-9)
+    titles = []
+    monkeypatch.setattr(SubFigure, "suptitle", lambda _, text: titles.append(text))
+    hand_plots.plot_wrench_space(
+        settled, wrist.linearised(), tmp_path / "hand.png", "a hand", wrist.hand.preload
+    )
+    assert "preload of 40, 50, 60, 45 N, wrist floating" in titles[0]
+    assert "linearised at rest" in titles[1]
+
+
+@pytest.mark.parametrize(
+    ("along", "words"),
+    [
+        ([1.0, 0.0, 0.0], "along x of H"),
+        ([-1.0, 1e-9, 0.0], "along −x of H"),
+        ([0.0, -1.0, 0.0], "along −y of H"),
+        ([0.5, math.sqrt(0.75), 0.0], "60° from x toward y of H"),
+    ],
+)
+def test_planes_are_named_by_their_direction(along, words):
+    assert hand_plots._direction(np.array(along)) == words

@@ -1,0 +1,549 @@
+"""The picture of a plan: what is drawn is what was planned, for every kind of stance."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from itertools import combinations, pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d import proj3d
+from mpl_toolkits.mplot3d.art3d import Line3D
+
+from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
+from hand_models.base import Pose
+from hand_models.rock import Mesh, Profile
+from hand_models.rock.profile import STRIPS
+from planner.explanation import constraint_words
+from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
+from planner.pictures.plan_scene import scene_of, sights
+from planner.pictures.plan_views import COLOURS, LIMB
+from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
+from planner.pictures.route_plots import draw_route
+from planner.question import HandOnHold, Limits, Load, Question, Stance
+from planner.robots import RobotFile, robot_of
+from planner.route import RouteStage
+from planner.solving import solve
+from service.answering import questions
+from service.commands.cli import run
+from service.commands.stances import read_request
+from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
+from tests.suite.helpers.rocks import cylinder_mesh
+from tests.suite.helpers.stances import attainable_wrench, on_wall, wall
+
+found = solve.plan
+
+OFF = 0.45
+"""How far the body stands off the wall so that RoboSimian's limbs are bent [m]."""
+
+
+@cache
+def answered(name):
+    """A question by name, and its plan."""
+    solved = replace(on_wall(off=OFF), joints="solve")
+    heavy = Load(mass=400.0, com=(0.1, 0.2, -0.1))
+    two = replace(on_wall(off=OFF, limbs=("front_left", "rear_right")), joints="solve")
+    bare = on_wall(off=OFF, limbs=("front_left", "front_right"), palm=False, lateral=False)
+    bare = replace(bare, joints="solve")
+    own = standing("left", "right")
+    floating = on_wall(off=OFF)
+    floating = replace(
+        floating, hands=(replace(floating.hands[0], wrist="floating"), *floating.hands[1:])
+    )
+    questions = {
+        "solved": lambda: Question(solved),
+        "overloaded": lambda: Question(solved, load=heavy, limits=Limits(joint_torque=100.0)),
+        "plain": lambda: Question(on_wall(off=OFF, overhang=-0.3)),
+        "ceiling": lambda: Question(on_wall(overhang=math.pi / 2, off=OFF)),
+        "floating": lambda: Question(floating),
+        "two hands": lambda: Question(two),
+        "infeasible": lambda: Question(bare, body_wrench=np.array([0.0, 100, 800, 300, 0, 0])),
+        "flat wall": lambda: Question(on_wall(Plane(), off=OFF, outer_rotation=0.0)),
+        "nails": lambda: requested("ledge"),
+        "one limb": lambda: Question(standing("leg")),
+        "two limbs": lambda: Question(
+            own, body_wrench=attainable_wrench(own, np.random.default_rng(0))
+        ),
+    }
+    question = questions[name]()
+    return question, solve.plan(question)
+
+
+def requested(name):
+    """The question of a bundled example."""
+    return questions.question(read_request(name))
+
+
+def standing(*limbs):
+    """A robot of one's own at given angles, its hands on balls where they are then."""
+    toml, urdf = arm(7, limbs)
+    if limbs == ("leg",):
+        toml, urdf = limbs_toml("leg", {"leg": "foot"}), TWO_LINK
+    robot = robot_of(RobotFile("own", toml, urdf))
+    joints = {
+        limb: np.linspace(0.2, 0.6, len(robot.model.joint_names[limb])) for limb in robot.limbs
+    }
+    body = Pose(np.array([1.0, 2.0, 3.0]), wall())
+    poses = robot.model.hand_poses(joints)
+    hands = tuple(
+        HandOnHold(limb, body @ poses[limb], Sphere(0.3), ROCK, grasp=Grasp()) for limb in limbs
+    )
+    return Stance(hands, body, robot=robot, joints=joints)
+
+
+@cache
+def drawn(name):
+    """The picture of a question by name."""
+    question, plan = answered(name)
+    return draw_plan(plan, question)
+
+
+def panels(figure):
+    """The view in W, the one facing the rock and that from the side."""
+    return figure.axes[:3]
+
+
+def arrows(axes):
+    """Begin and tip of every arrow, shape (n, 2, 2), and their colours."""
+    notes = [note for note in axes.texts if note.arrow_patch is not None]
+    ends = np.array([(note.xyann, note.xy) for note in notes])
+    return ends, [note.arrow_patch.get_edgecolor() for note in notes]
+
+
+def limb_lines(axes):
+    return [line for line in axes.lines if line.get_color() == LIMB and line.get_linewidth() == 4.0]
+
+
+def words(axes):
+    return [note.get_text() for note in axes.texts]
+
+
+KINDS = ("overloaded", "plain", "ceiling", "floating", "infeasible", "one limb", "two limbs")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_stance_has_a_picture_with_units_on_its_axes(name, tmp_path):
+    question, plan = answered(name)
+    figure = drawn(name)
+    figure.savefig(tmp_path / "plan.png", dpi=30)
+    space, facing, side = panels(figure)
+    labels = [space.get_xlabel(), space.get_ylabel(), space.get_zlabel()]
+    assert labels == ["x of W [m]", "y of W [m]", "z of W [m]"]
+    for axes in (facing, side):
+        assert axes.get_xlabel().endswith(", from B [m]")
+        assert axes.get_ylabel().endswith(", from B [m]")
+        assert axes.get_aspect() == 1.0
+    for axes in (space, facing, side):
+        count = 0 if plan.joints is None else len(question.stance.robot.limbs)
+        assert len(limb_lines(axes)) == count
+        assert len(arrows(axes)[0]) == 1 + len(plan.hands or ())
+    used = "" if plan.utilisation is None else f": utilisation {plan.utilisation:.2f}"
+    assert figure.get_suptitle() == f"{plan.status}{used}"
+
+
+@pytest.mark.parametrize(("ending", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_picture_is_written_in_the_form_of_its_name(ending, begin, tmp_path):
+    question, plan = answered("two hands")
+    plot_plan(plan, question, tmp_path / f"plan.{ending}")
+    assert (tmp_path / f"plan.{ending}").read_bytes().startswith(begin)
+
+
+def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd):
+    solved = []
+    monkeypatch.setattr(solve, "plan", lambda question: solved.append(question) or found(question))
+    picture = tmp_path / "plan.png"
+    assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
+    assert picture.exists()
+    # once as asked, once without palms
+    palms = [[hand.grasp.palm for hand in question.stance.hands] for question in solved]
+    assert palms == [[True] * 4, [False] * 4]
+    assert json.loads(capfd.readouterr().out)["status"] == "optimal"
+
+
+def test_the_kinds_are_what_they_are_called():
+    found = {name: answered(name)[1].status for name in KINDS}
+    assert found["overloaded"] == "overloaded"
+    assert found["infeasible"] == "infeasible"
+    assert found["plain"] == "optimal"
+
+
+@pytest.mark.parametrize("name", ["solved", "plain", "overloaded", "two limbs"])
+def test_the_arrows_of_every_view_balance(name):
+    for axes in panels(drawn(name)):
+        ends, _ = arrows(axes)
+        steps = ends[:, 1] - ends[:, 0]
+        longest = np.linalg.norm(steps, axis=1).max()
+        np.testing.assert_allclose(steps.sum(axis=0), 0.0, atol=1e-5 * longest)
+
+
+@pytest.mark.parametrize("name", ["overloaded", "ceiling", "two limbs"])
+def test_no_arrow_leaves_the_picture(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    space, *sides = panels(figure)
+    for axes in sides:
+        ends, _ = arrows(axes)
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        assert ((ends >= [left, low]) & (ends <= [right, high])).all()
+    ends, _ = arrows(space)
+    pixels = space.transData.transform(ends.reshape(-1, 2))
+    room = sides[0].get_window_extent().x0
+    assert ((pixels >= 0.0) & (pixels <= [room, figure.bbox.height])).all()
+
+
+@pytest.mark.parametrize("name", ["overloaded", "ceiling", "two hands", "two limbs"])
+def test_notes_do_not_lie_on_each_other(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    for axes in panels(figure):
+        boxes = [note.get_window_extent() for note in axes.texts if note.get_text()]
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+
+
+@pytest.mark.parametrize("name", ["solved", "ceiling", "two limbs"])
+def test_notes_stay_in_the_frame_and_off_the_tips_of_arrows(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    for axes in panels(figure)[1:]:
+        tips = axes.transData.transform(arrows(axes)[0][:, 1])
+        frame = axes.get_window_extent()
+        for note in axes.texts:
+            if note.get_text():
+                box = note.get_window_extent()
+                assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+                assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+                assert not any(box.contains(*tip) for tip in tips)
+
+
+@pytest.mark.parametrize("off", [0.3, OFF, 0.6])
+def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
+    question = Question(on_wall(overhang=math.pi / 2, off=off))
+    plan = replace(answered("ceiling")[1], hands=None, joints=None, certificate=None)
+    axes = draw_plan(plan, question).axes[0]
+    load = scene_of(plan, question).load
+
+    def seen(places):
+        return np.column_stack(proj3d.proj_transform(*np.transpose(places), axes.get_proj())[:2])
+
+    spots = seen([question.stance.body.position, load.place])
+    for hand in scene_of(plan, question).hands:
+        drawn_hand = seen(np.vstack([hand.palm, *hand.fingers]))
+        within = (drawn_hand.min(axis=0) < spots) & (spots < drawn_hand.max(axis=0))
+        assert not within.all(axis=1).any()
+
+
+@pytest.mark.parametrize("name", ["plain", "nails"])
+def test_titles_of_columns_do_not_run_together(name):
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    titles = figure.axes[3].get_xticklabels()
+    assert ("nail" in [title.get_text() for title in titles]) == (name == "nails")
+    if titles[0].get_rotation() == 0.0:
+        boxes = [title.get_window_extent() for title in titles]
+        assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+    else:
+        # parallel lines of words, whose ends are farther apart than they are high
+        ends = [title.get_transform().transform(title.get_position())[0] for title in titles]
+        height = titles[0].get_fontsize() * figure.dpi / 72.0
+        away = np.diff(ends) * math.sin(math.radians(titles[0].get_rotation()))
+        assert (away > height).all()
+
+
+def test_where_nothing_balances_the_picture_says_what_is_missing_and_what_leaves_no_balance():
+    _, plan = answered("flat wall")
+    assert plan.status == "infeasible"
+    proof = plan.certificate
+    panel = drawn("flat wall").axes[3]
+    cells = panel.tables[0].get_celld()
+    parts = {"needed": plan.body_wrench, "nearest": proof.nearest, "missing": proof.shortfall}
+    for j, (name, wrench) in enumerate(parts.items(), start=1):
+        assert cells[0, j].get_text().get_text() == name
+        told = [float(cells[i + 1, j].get_text().get_text()) for i in range(6)]
+        np.testing.assert_allclose(told, wrench, atol=0.051)
+    text = words(panel)[-1]
+    assert proof.irreducible
+    first = proof.irreducible[0]
+    assert f"{first.limb.replace('_', ' ')}:\n    {constraint_words(first)}" in text
+    for name in proof.irreducible:
+        assert f"{name.limb.replace('_', ' ')}:" in text
+
+
+def test_where_loads_of_any_sign_give_nothing_the_picture_says_so():
+    _, plan = answered("infeasible")
+    assert plan.certificate.irreducible == ()
+    panel = drawn("infeasible").axes[3]
+    assert "no loads at all, of any sign" in words(panel)[-1]
+    bare = draw_plan(replace(plan, certificate=None), answered("infeasible")[0])
+    assert words(bare.axes[3]) == ["no plan, no loads"]
+
+
+@pytest.mark.parametrize(
+    ("used", "crux"), [((0.4, 0.9, 0.3), 1), ((0.4, 1.6), 1), ((5.0, 0.3), 0), ((0.5, None), 1)]
+)
+def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, crux):
+    question, plan = answered("plain")
+    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(len(used))]
+    plans = [replace(plan, utilisation=u, load_factor=None) for u in used]
+    route = SimpleNamespace(name="up", limits=Limits())
+    result = SimpleNamespace(plans=plans, stages=stages, route=route, crux=crux)
+    figure = draw_route(result)
+    FigureCanvasAgg(figure).draw()
+    upper = figure.axes[0]
+    note = next(text for text in upper.texts if text.get_text() == "crux")
+    box = Text.get_window_extent(note)
+    frame, legend = upper.get_window_extent(), upper.get_legend().get_window_extent()
+    assert frame.y0 < box.y0 < box.y1 < frame.y1
+    assert not box.overlaps(legend)
+    assert legend.y0 >= frame.y1
+
+
+@pytest.mark.parametrize("name", ["solved", "overloaded"])
+def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
+    question, plan = answered(name)
+    _, facing, side = panels(drawn(name))
+    # on a vertical wall the views are along −z and along y of B
+    body = question.stance.body.inverse()
+    poses = [body @ hand.pose for hand in question.stance.hands]
+    forces = np.array(
+        [-pose.rotation @ hand.wrench[:3] for pose, hand in zip(poses, plan.hands, strict=True)]
+    )
+    scale = 0.5 / max(*np.linalg.norm(forces, axis=1), np.linalg.norm(plan.body_wrench[:3]))
+    for axes, (right, up) in ((facing, (-1, 0)), (side, (-2, 0))):
+        ends, colours = arrows(axes)
+        for i, (pose, force, hand) in enumerate(zip(poses, forces, plan.hands, strict=True)):
+            want = [-pose.position[-right], pose.position[up]]
+            np.testing.assert_allclose(ends[i, 0], want, atol=1e-9)
+            step = scale * np.array([-force[-right], force[up]])
+            np.testing.assert_allclose(ends[i, 1] - ends[i, 0], step, atol=1e-9)
+            assert colours[i] == COLOURS(hand.utilisation)
+    over = to_rgba("#7b1fa2")
+    assert all((colour == over) == (name == "overloaded") for colour in arrows(facing)[1][:4])
+
+
+@pytest.mark.parametrize("name", ["solved", "two hands", "infeasible", "two limbs"])
+def test_limbs_are_drawn_where_the_model_has_them(name):
+    question, plan = answered(name)
+    stance = question.stance
+    space, facing, side = panels(drawn(name))
+    for i, limb in enumerate(stance.robot.limbs):
+        chain = stance.robot.model.link_chain(plan.joints, limb)
+        line = limb_lines(space)[i]
+        assert isinstance(line, Line3D)
+        places = np.array(line.get_data_3d()).T
+        np.testing.assert_allclose(places, stance.body.apply(chain), atol=1e-9)
+        flat = limb_lines(facing)[i].get_xydata(), limb_lines(side)[i].get_xydata()
+        if name != "two limbs":
+            np.testing.assert_allclose(flat[0], chain[:, [1, 0]] * [-1.0, 1.0], atol=1e-9)
+            np.testing.assert_allclose(flat[1], chain[:, [2, 0]] * [-1.0, 1.0], atol=1e-9)
+        away = np.linalg.norm(np.diff(chain, axis=0), axis=1)
+        across = np.linalg.norm(np.diff(flat[0], axis=0), axis=1)
+        assert (across <= away + 1e-9).all()
+    for hand in stance.hands:
+        i = stance.robot.limbs.index(hand.limb)
+        end = np.array(limb_lines(space)[i].get_data_3d())[:, -1]
+        np.testing.assert_allclose(end, hand.pose.position, atol=1e-5)
+
+
+def test_joints_have_the_colour_and_the_number_of_their_torque():
+    _, plan = answered("overloaded")
+    figure = drawn("overloaded")
+    used = {limb: np.abs(torque) / 100.0 for limb, torque in plan.joint_torque.items()}
+    facing, table = figure.axes[1], figure.axes[4]
+    dots = [line.get_color() for line in facing.lines if line.get_markeredgecolor() == "0.2"]
+    dots = [colour for colour in dots if colour != "0.2"]
+    want = [COLOURS(value) for limb in used for value in np.sort(used[limb])]
+    assert dots == want
+    assert words(table) == [f"{value:.2f}" for limb in used for value in used[limb]]
+    assert table.get_title(loc="right").startswith("utilisation of each joint")
+
+
+def test_the_table_has_the_utilisation_of_every_tile():
+    _, plan = answered("plain")
+    table = drawn("plain").axes[3]
+    want = []
+    for hand in plan.hands:
+        for i, finger in enumerate(hand.fingers):
+            want += [tile.utilisation for tile in finger.tiles if tile.contact != "none"]
+            if i == 0 and hand.palm.engaged:
+                want.append(hand.palm.utilisation)
+    assert words(table) == [f"{value:.2f}" for value in want]
+    assert len(table.get_yticklabels()) == 4 * len(plan.hands)
+
+
+def test_joints_without_a_plan_have_no_colour_and_no_table():
+    _, plan = answered("infeasible")
+    figure = drawn("infeasible")
+    assert len(figure.axes) == 4
+    assert plan.joints is not None
+    dots = [line for line in figure.axes[1].lines if line.get_color() == "white"]
+    assert len(dots) == 4
+
+
+def test_hands_and_limbs_are_named_and_hands_behind_each_other_share_a_note():
+    _, facing, _ = panels(drawn("two hands"))
+    assert {"front left", "rear right", "front right (free)"} <= set(words(facing))
+    _, facing, side = panels(drawn("solved"))
+    assert {"front left", "rear right", "front right", "rear left"} <= set(words(facing))
+    assert {"front right,\nfront left", "rear right,\nrear left"} <= set(words(side))
+    _, facing, _ = panels(drawn("floating"))
+    assert "front right (floats)" in words(facing)
+
+
+def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
+    for name, word in (("solved", "weight 1082 N"), ("plain", "weight 1082 N")):
+        question, plan = answered(name)
+        load = scene_of(plan, question).load
+        assert load.weight
+        np.testing.assert_allclose(load.moment, 0.0, atol=1e-6)
+        assert word in words(drawn(name).axes[1])
+    question, plan = answered("overloaded")
+    load = scene_of(plan, question).load
+    assert not load.weight
+    np.testing.assert_allclose(load.place, question.stance.body.apply((0.1, 0.2, -0.1)))
+    np.testing.assert_allclose(load.force, [0.0, 0.0, -400.0 * 9.81])
+    np.testing.assert_allclose(load.moment, 0.0, atol=1e-6)
+    # about B a force and a moment: at the centre of mass the moment is another
+    given = Question(question.stance, body_wrench=np.array([500.0, 0, 0, 0, 0, 30.0]))
+    load = scene_of(solve.plan(given), given).load
+    com = question.stance.robot.model.com(plan.joints)
+    about = -np.array([0.0, 0, 30.0]) + np.cross(com, [500.0, 0, 0])
+    np.testing.assert_allclose(load.moment, question.stance.body.rotation @ about, atol=1e-9)
+
+
+def test_many_hands_make_the_picture_taller():
+    question, plan = answered("plain")
+    limbs = [f"leg{i}" for i in range(16)]
+    wide = replace(plan, hands=tuple(replace(plan.hands[0], limb=limb) for limb in limbs))
+    assert drawn("plain").get_size_inches()[1] == plan_plots.SIZE[1]
+    height = draw_plan(wide, question).get_size_inches()[1]
+    assert height * (plan_plots.TOP - plan_plots.BOTTOM) / 64 > 0.1
+
+
+# Where it is seen from --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("overhang", [-0.8, 0.0, 0.8])
+def test_walls_are_seen_horizontally_toward_the_rock(overhang):
+    seen = sights(on_wall(overhang=overhang))
+    np.testing.assert_allclose(seen.ahead, [1.0, 0.0, 0.0], atol=1e-12)
+    assert seen.toward
+    assert not seen.steep
+
+
+def test_ceilings_and_floors_are_seen_from_below_and_above():
+    for overhang, height, title in ((math.pi / 2, 1.0, "below"), (-math.pi / 2, -1.0, "above")):
+        stance = on_wall(overhang=overhang)
+        seen = sights(stance)
+        np.testing.assert_allclose(seen.into, [0.0, 0.0, height], atol=1e-12)
+        assert seen.steep
+        assert not seen.toward
+        # what is ahead is x of B, and the front hands are farther along it
+        np.testing.assert_allclose(seen.ahead, stance.body.rotation[:, 0], atol=1e-12)
+        plan = replace(answered("ceiling")[1], hands=None, joints=None)
+        facing = draw_plan(plan, Question(stance)).axes[1]
+        assert facing.get_title() == f"seen from {title}"
+        spots = {note.get_text(): note.xy for note in facing.texts}
+        for name, place in (("front left", (-0.4, 0.5)), ("rear right", (0.4, -0.5))):
+            np.testing.assert_allclose(spots[name], place, atol=1e-9)
+
+
+def test_between_two_walls_ahead_is_where_the_belly_looks():
+    stance = on_wall()
+    turn = np.column_stack([[0.0, 0, 1], [-1.0, 0, 0], [0.0, -1, 0]])
+    hands = tuple(
+        replace(hand, pose=Pose(hand.pose.position, turn if i % 2 else turn * [1.0, -1.0, -1.0]))
+        for i, hand in enumerate(stance.hands)
+    )
+    seen = sights(replace(stance, hands=hands))
+    np.testing.assert_allclose(seen.ahead, -stance.body.rotation[:, 2], atol=1e-12)
+    assert not seen.toward
+    assert not seen.steep
+
+
+# Rock -------------------------------------------------------------------------------------------
+
+OUTLINES = dict(zip(STRIPS, (0.0, 0.002, 0.001, 0.003), strict=True))
+HOLDS = {
+    "plane": Plane(),
+    "log": Cylinder(0.3),
+    "large log": Cylinder(40.0),
+    "ball": Sphere(0.22),
+    "boulder": Ellipsoid((0.3, 0.2, 0.12)),
+    "edge": Edge(0.05, 1.5),
+    "rounded edge": Edge(3.0, 2.0),
+    "profile": Profile([[-0.3, 0.1], [0.0, 0.0], [0.3, 0.1]]),
+    "strips": Profile(
+        {name: [[-0.3, 0.02 + d], [0.0, d], [0.3, 0.02 + d]] for name, d in OUTLINES.items()}
+    ),
+    "mesh": Mesh(*cylinder_mesh(0.2, 64)),
+}
+
+
+@pytest.mark.parametrize("name", HOLDS)
+def test_rock_is_drawn_where_it_is(name):
+    settled = HAND.settle(HOLDS[name], ROCK, Grasp(math.pi if name == "log" else 0.5))
+    patch = rock_patch(settled)
+    assert 0 < len(patch) < 2 * MOST
+    assert np.abs(patch).max() <= AROUND + 1e-9
+    # in the hold's frame, every triangle has rock on one side, and begins there
+    corners = settled.seating.pose.inverse().apply(patch.reshape(-1, 3)).reshape(-1, 3, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1) / 2.0
+    large = np.flatnonzero(areas > 1e-6)
+    for i in large[:: max(1, len(large) // 60)]:
+        n, centre = normals[i] / (2.0 * areas[i]), corners[i].mean(axis=0)
+        begins = [settled.hold.entry(centre - 0.02 * s * n, s * n) - 0.02 for s in (1.0, -1.0)]
+        assert min(map(abs, begins)) < 2e-3
+    # nothing of the rock under the hand is missing
+    flat = np.diff(patch, axis=1) * [1.0, 1.0, 0.0]
+    seen = np.linalg.norm(np.cross(flat[:, 0], flat[:, 1]), axis=1).sum() / 2.0
+    assert seen > 0.02
+
+
+def test_a_fine_mesh_is_drawn_coarsely():
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.15)
+    assert len(ball.faces) > MOST
+    hold = Mesh(ball.vertices + np.array([0.0, 0.0, 0.15]), ball.faces)
+    settled = HAND.settle(hold, ROCK, Grasp())
+    patch = rock_patch(settled)
+    assert 100 < len(patch) < 2 * MOST
+    centre = settled.seating.pose.apply((0.0, 0.0, 0.15))
+    away = np.linalg.norm(patch.reshape(-1, 3) - centre, axis=1)
+    # corners of a grid about points of the ball, and chords between them
+    assert away.max() <= 0.15 + COARSE * math.sqrt(0.75)
+    assert away.min() >= 0.15 - 2.0 * COARSE
+
+
+def test_a_flat_wall_is_drawn_to_the_edge_of_the_box():
+    patch = rock_patch(HAND.settle(Plane(), ROCK, Grasp()))
+    area = np.linalg.norm(np.cross(patch[:, 1] - patch[:, 0], patch[:, 2] - patch[:, 0]), axis=1)
+    assert area.sum() / 2.0 == pytest.approx((2.0 * AROUND) ** 2, rel=1e-9)
+
+
+def test_rock_that_is_far_away_is_not_drawn():
+    away = Pose(np.array([0.0, 0.0, 0.6]), np.eye(3))
+    settled = HAND.settle(Sphere(0.2), ROCK, Grasp(), away)
+    assert rock_patch(settled).shape == (0, 3, 3)
+
+
+# One hand ---------------------------------------------------------------------------------------
+
+
+def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
+    settled = HAND.settle(Plane(), ROCK, Grasp())
+    panels = list(Figure().subplots(2, 2).ravel())
+    hand_plots._draw_fingers(panels, settled, np.full(4, settled.closing_tension))
+    named = {line.get_color(): line.get_label() for line in panels[0].get_legend().get_lines()}
+    bars = {line.get_color() for line in panels[0].lines if line.get_linewidth() in (3, 4)}
+    assert named[hand_plots.PALM] == "palm"
+    assert bars <= set(named)

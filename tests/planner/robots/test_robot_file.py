@@ -1,0 +1,307 @@
+"""A robot's own file and URDF: what they make, and the one line that says what is wrong."""
+
+import dataclasses
+import pickle
+import re
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.parameters import hand_table, own_hand
+from planner.robots import RobotFile, load_robot, robosimian, robot_of
+from tests.suite.helpers.robots import TWO_LINK, arm, joint, limbs_toml, link, urdf
+
+TOML = limbs_toml("walker", {"leg": "foot"})
+
+OWN_MASS = own_hand(
+    type(hand_table()).of(
+        {"hand": {"mass": {"value": 3.0, "unit": "kg", "source": "assumed"}}},
+    )
+)
+"""A hand of 3 kg, as in the figures worked by hand."""
+
+
+def written(folder, toml=TOML, text=TWO_LINK):
+    path = folder / "walker.toml"
+    path.write_text(toml)
+    (folder / "walker.urdf").write_text(text)
+    return path
+
+
+def refusal(toml=TOML, text=TWO_LINK):
+    with pytest.raises(InvalidInputError) as caught:
+        robot_of(RobotFile("walker", toml, text, "walker.toml"))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("walker.toml: ")
+    return message.removeprefix("walker.toml: ")
+
+
+def test_a_file_makes_a_robot(tmp_path):
+    robot = load_robot(written(tmp_path), OWN_MASS)
+    assert (robot.name, robot.limbs) == ("walker", ("leg",))
+    assert robot.mass == pytest.approx(10.0 + 2.0 + 1.0 + 0.5 + 3.0)
+    # its centre of mass at zero angles, worked by hand
+    x = (2.0 * 0.8 + 1.0 * 1.3 + 3.0 * 1.6) / 16.5
+    np.testing.assert_allclose(robot.com, [x, 0.0, (10.0 * 0.1 + 0.5 * 0.4) / 16.5], atol=1e-12)
+    np.testing.assert_array_equal(robot.torque_limits["leg"], [80.0, 80.0])
+    assert robot.reach == pytest.approx(1.0)
+    # the foot 0.9 m before the hip: stretched to 90 %
+    assert robot.stretch("leg", Pose(np.array([1.5, 0.0, 0.0]), np.eye(3))) == pytest.approx(0.9)
+
+
+def test_files_of_the_same_content_make_one_robot(tmp_path):
+    (tmp_path / "other").mkdir()
+    one, two = RobotFile.load(written(tmp_path)), RobotFile.load(written(tmp_path / "other"))
+    assert one == two
+    assert hash(one) == hash(two)
+    assert pickle.loads(pickle.dumps(one)) == one
+    assert robot_of(one) is robot_of(two)
+    assert robot_of(dataclasses.replace(one, urdf=TWO_LINK + "\n")) is not robot_of(one)
+
+
+def test_the_bundled_robot_is_a_file_like_any_other():
+    with resources.as_file(resources.files("planner.parameters")) as folder:
+        robot = load_robot(folder / "robosimian.toml")
+    assert robot is robosimian()
+    assert all(np.all(limits == 200.0) for limits in robot.torque_limits.values())
+
+
+def test_a_limb_says_what_differs_from_every_limb():
+    toml, text = arm(3, ("left", "right"))
+    own = """
+torque_limit = { value = [30.0, 20.0, 10.0], unit = "N·m", source = "measured" }
+orientation = { value = [0.0, 1.0, 0.0, 0.0], unit = "1", source = "measured" }
+hand_com = { value = [0.0, 0.0, -0.04], unit = "m", source = "measured" }
+"""
+    robot = robot_of(RobotFile("arms", toml + own, text))  # the last section is that of the right
+    np.testing.assert_array_equal(robot.torque_limits["left"], [80.0] * 3)
+    np.testing.assert_array_equal(robot.torque_limits["right"], [30.0, 20.0, 10.0])
+    np.testing.assert_allclose(robot.hand_in_link["right"].rotation, np.diag([-1.0, 1.0, -1.0]))
+    # the right hand's centre of mass is turned up, by its orientation, from where the left's is
+    plain = robot_of(RobotFile("arms", toml + own.replace("-0.04", "0.0"), text))
+    lift = robot.hand.mass * 0.04 / robot.mass
+    np.testing.assert_allclose(robot.com - plain.com, [0.0, 0.0, lift], atol=1e-12)
+
+
+def test_the_centre_of_mass_may_be_given():
+    com = '[robot]\ncom = { value = [0.1, 0.2, 0.3], unit = "m", source = "measured" }\n'
+    robot = robot_of(RobotFile("walker", TOML + com, TWO_LINK))
+    np.testing.assert_array_equal(robot.com, [0.1, 0.2, 0.3])
+
+
+def test_a_joint_that_no_limb_has_stays_at_zero():
+    """The slide of the head may go from 0.1 to 0.2 m; it is where the file draws it."""
+    robot = robot_of(RobotFile("walker", TOML, TWO_LINK))
+    assert robot.model.joint_names == {"leg": ("hip", "knee")}
+    heavy = TWO_LINK.replace('<mass value="0.5"/>', '<mass value="1.5"/>')
+    other = robot_of(RobotFile("walker", TOML, heavy))
+    moved = other.mass * other.com - robot.mass * robot.com
+    np.testing.assert_allclose(moved, [0.0, 0.0, 0.4], atol=1e-12)
+
+
+def entry(name, value, unit):
+    return f'{name} = {{ value = {value}, unit = "{unit}", source = "assumed" }}\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "walker"', "", "name: must be text, got nothing"),
+        ('name = "walker"', 'name = "w/*"', "name: a name must begin with a letter .* got 'w/\\*'"),
+        ('body = "trunk"', "body = 3", "body: must be text, got 3"),
+        ('body = "trunk"', 'body = "torso"', "body: unknown link 'torso'; known are trunk, thigh"),
+        (
+            'body = "trunk"',
+            'body = "trunk"\ncolour = "red"',
+            "colour: unknown; known are name, urdf",
+        ),
+        ("[every_limb]", "[every_leg]", "every_leg: unknown; known are"),
+        ("[limbs.leg]", '[limbs."a leg"]', "limbs: a name must begin with a letter"),
+        ('[limbs.leg]\nlink = "foot"\n', "", r"limbs: from 1 to 16 limbs are needed, .* got 0"),
+        ('link = "foot"', "", "limbs.leg.link: must be text, got nothing"),
+        ('link = "foot"', 'link = "toe"', "limbs.leg.link: unknown link 'toe'; known are trunk"),
+        ('link = "foot"', 'link = "trunk"', "limbs.leg.link: no joint moves between 'trunk' and"),
+        (
+            'link = "foot"',
+            'link = "head"',
+            "limbs.leg.link: joint 'neck' .* is prismatic; a limb's",
+        ),
+        (
+            'link = "foot"',
+            'link = "foot"\nspeed = 3',
+            "limbs.leg.speed: unknown entry; known are link",
+        ),
+        (
+            "[0.1, 0.0, 0.0]",
+            "[100.0, 0.0, 0.0]",
+            r"limbs.leg.position: .* within ±10 m, got 100, 0",
+        ),
+        ("[0.1, 0.0, 0.0]", "[0.1, 0.0]", "limbs.leg.position: must be 3 numbers"),
+        ("[0.1, 0.0, 0.0]", "[0.1, nan, 0.0]", r"every_limb.position.value\[1\]: must be finite"),
+        ("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 1.0, 1.0]", "limbs.leg.orientation: a quaternion"),
+        ('unit = "m"', 'unit = "mm"', "every_limb.position.unit: must be in 'm', got 'mm'"),
+        ('unit = "N·m"', 'unit = "Nm"', "every_limb.torque_limit.unit: must be in 'N·m', got 'Nm'"),
+        ("80.0", "0.0", "limbs.leg.torque_limit: must be 0.001 to 1e.06 N·m, got 0"),
+        (
+            "80.0",
+            "[80.0, 80.0, 80.0]",
+            "limbs.leg.torque_limit: one number is needed, or 2, .* got 3",
+        ),
+        ("80.0", "[]", "limbs.leg.torque_limit: must be 0.001"),
+        ('source = "assumed"', 'source = "guessed"', "every_limb.position.source: must be one of"),
+        ("[every_limb]", "[every_limb", ".*at line"),
+    ],
+)
+def test_what_is_wrong_with_a_file(old, new, message):
+    assert old in TOML
+    assert re.match(message, refusal(TOML.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize("missing", ["position", "orientation", "torque_limit"])
+def test_what_no_limb_can_do_without(missing):
+    lines = [line for line in TOML.splitlines() if not line.startswith(missing)]
+    assert refusal("\n".join(lines)) == f"limbs.leg.{missing}: missing parameter"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("</robot>", "", "urdf: must be a URDF, which is XML"),
+        ("robot", "sdf", "urdf: must be a URDF, whose root is <robot>, got <sdf>"),
+        (
+            'parent link="trunk"',
+            'parent link="chest"',
+            "urdf: joint 'hip': its parent must be a link",
+        ),
+        (
+            'child link="shank"',
+            'child link="thigh"',
+            "urdf: link 'thigh' hangs on two joints, 'hip'",
+        ),
+        ('type="continuous"', 'type="ball"', "urdf: joint 'knee': type must be one of revolute"),
+        ('type="continuous"', 'type="floating"', "limbs.leg.link: joint 'knee' .* is floating"),
+        (
+            'type="continuous"',
+            'type="revolute"',
+            "urdf: joint 'knee' is revolute and has no <limit>",
+        ),
+        ('upper="2.5"', 'upper="-2.5"', "urdf: joint 'hip': lower must be less than upper"),
+        (
+            'upper="2.5"',
+            'upper="inf"',
+            "urdf: joint 'hip': upper of <limit> must be a number within",
+        ),
+        ('effort="0"', "", "urdf: joint 'hip': effort of <limit> is missing"),
+        ('xyz="0.6 0 0"', 'xyz="600 0 0"', "urdf: joint 'knee': xyz of <origin> must be 3 numbers"),
+        (
+            'xyz="0.6 0 0"',
+            'xyz="${l} 0 0"',
+            r"urdf: joint 'knee': xyz of <origin> .* got '\$\{l\} 0",
+        ),
+        ('xyz="0 1 0"', 'xyz="0 0 0"', "urdf: joint 'hip': its axis must not be zero"),
+        ('mass value="2.0"', 'mass value="-2.0"', "urdf: link 'thigh': mass must not be negative"),
+        (
+            'mass value="2.0"',
+            'mass value="nan"',
+            "urdf: link 'thigh': value of <mass> must be a num",
+        ),
+        (
+            'mass value="2.0"',
+            'mass value="1e9"',
+            "urdf: link 'thigh': value of <mass> must be a num",
+        ),
+        (
+            'ixx="0.0"',
+            'ixx="-1.0"',
+            "urdf: link 'trunk': its inertia must have no negative principal",
+        ),
+        ('link name="head"', 'link name="foot"', "urdf: link 'foot' appears twice"),
+        ('joint name="knee"', 'joint name="hip"', "urdf: joint 'hip' appears twice"),
+        ('link name="head"', "link", "urdf: a <link> has no name"),
+        ('<link name="foot"/>', '<link name="foot"/><link name="hat"/>', "urdf: one link must be"),
+    ],
+)
+def test_what_is_wrong_with_a_urdf(old, new, message):
+    assert old in TWO_LINK
+    changed = TWO_LINK.replace(old, new) if old == "robot" else TWO_LINK.replace(old, new, 1)
+    assert re.match(message, refusal(text=changed))
+
+
+def test_a_joint_that_follows_another_is_no_limbs():
+    text = TWO_LINK.replace('link="shank"/><origin', 'link="shank"/><mimic joint="hip"/><origin')
+    assert refusal(text=text).startswith(
+        "limbs.leg.link: joint 'knee' between 'trunk' and 'foot' f"
+    )
+
+
+def test_a_ring_of_links_is_no_robot():
+    text = urdf(
+        *(link(name, 1.0) for name in ("trunk", "a", "b")),
+        joint("one", "continuous", "a", "b"),
+        joint("two", "continuous", "b", "a"),
+    )
+    assert refusal(text=text) == "urdf: link 'b' hangs on itself; a robot must be a tree"
+
+
+def test_a_robot_without_mass_is_refused():
+    text = re.sub(r"<inertial>.*?</inertial>", "", TWO_LINK)
+    assert refusal(text=text) == "urdf: no link has a mass; at least one must"
+
+
+def test_limbs_that_share_a_joint_are_refused():
+    toml = limbs_toml("walker", {"leg": "foot", "other": "thigh"})
+    assert refusal(toml) == (
+        "limbs.other.link: limbs 'leg' and 'other' share joint 'hip'; every limb needs joints of "
+        "its own"
+    )
+
+
+def test_a_limb_beside_the_body_is_refused():
+    toml = TOML.replace('body = "trunk"', 'body = "head"')
+    assert refusal(toml).startswith("limbs.leg.link: link 'foot' does not hang on the body 'head'")
+
+
+def test_a_limb_that_only_turns_its_hand_in_its_place_is_refused():
+    toml, text = arm(1)
+    assert refusal(toml.replace("[0.1, 0.0, 0.0]", "[0.0, 0.0, 0.0]"), text) == (
+        "limbs.arm.position: the limb's joints only turn the hand in its place; it must be away "
+        "from them"
+    )
+
+
+def test_sixteen_limbs_are_a_robot_and_seventeen_are_not():
+    limbs = [f"leg{i}" for i in range(17)]
+    toml, text = arm(1, tuple(limbs[:16]))
+    assert len(robot_of(RobotFile("arms", toml, text)).limbs) == 16
+    assert re.match("limbs: from 1 to 16 limbs are needed.* got 17", refusal(*arm(1, tuple(limbs))))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda folder: (folder / "walker.toml").unlink(), "walker.toml: No such file"),
+        (
+            lambda folder: (folder / "walker.urdf").unlink(),
+            "walker.toml: urdf: .*walker.urdf: No such",
+        ),
+        (
+            lambda folder: (folder / "walker.urdf").write_bytes(b"\xff\xfe\x00"),
+            "walker.toml: urdf: must be a URDF in UTF-8",
+        ),
+        (
+            lambda folder: (folder / "walker.toml").write_bytes(b"\xff"),
+            "walker.toml: must be TOML in UTF-8",
+        ),
+        (lambda folder: (folder / "walker.toml").write_text("a = "), "walker.toml: Invalid value"),
+    ],
+)
+def test_files_that_cannot_be_read(tmp_path, spoil, message):
+    path = written(tmp_path)
+    spoil(tmp_path)
+    with pytest.raises(InvalidInputError, match=message) as caught:
+        load_robot(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

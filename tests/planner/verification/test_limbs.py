@@ -1,0 +1,165 @@
+"""The check of joints, caps and what is asked of a hand finds each number that is wrong."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from planner.prepare import Posture, posture, settle_hand
+from planner.question import ForceCap, Limits, Load, Question
+from planner.result import Plan
+from planner.solving import plan
+from planner.verification import limbs as verify_limbs, problems
+from tests.suite.helpers.jointed import random_jointed_question
+from tests.suite.helpers.stances import on_wall
+
+LIMB = "rear_left"
+INDEX = 2
+
+
+@cache
+def asked() -> Question:
+    """All of it at once: joints in motion, a cap, a component of a wrench, small changes."""
+    stance = on_wall()
+    angles = plan(Question(replace(stance, joints="solve"))).joints
+    hands = list(stance.hands)
+    hands[INDEX] = replace(hands[INDEX], wrench=(None, 5.0, None, None, None, None))
+    return Question(
+        replace(stance, hands=tuple(hands), joints=dict(angles)),
+        load=Load(acceleration=(0.2, 0.1, -0.3), angular_acceleration=(0.1, -0.2, 0.3)),
+        limits=Limits(
+            per_hand={LIMB: ForceCap(400.0), "front_left": ForceCap(((-300.0, 300.0),) * 3)},
+            tension_change=200.0,
+        ),
+        present={LIMB: np.full(4, 80.0)},
+    )
+
+
+@cache
+def honest() -> tuple[Plan, Posture]:
+    return plan(asked()), posture(asked())
+
+
+def complaints(
+    question: Question | None = None, where: Posture | None = None, **changes
+) -> list[str]:
+    question = asked() if question is None else question
+    answer, there = honest()
+    answer = replace(answer, **changes)
+    return problems(
+        question,
+        [settle_hand(hand, question.stance) for hand in question.stance.hands],
+        answer.hands,
+        answer.utilisation,
+        answer.body_wrench,
+        there if where is None else where,
+        answer.effort,
+    )
+
+
+def with_joints(**changes: Callable) -> Posture:
+    """The posture with parts of one limb's joints changed."""
+    where = honest()[1]
+    joints = where.joints[LIMB]
+    joints = joints._replace(**{name: f(getattr(joints, name)) for name, f in changes.items()})
+    return replace(where, joints={**where.joints, LIMB: joints})
+
+
+def with_angle(limb: str, by: float) -> Posture:
+    where = honest()[1]
+    return replace(where, angles={**where.angles, limb: where.angles[limb] + by * np.eye(7)[3]})
+
+
+def with_limits(**changes) -> Question:
+    return replace(asked(), limits=replace(asked().limits, **changes))
+
+
+def test_an_honest_plan_passes():
+    answer, _ = honest()
+    assert answer.status == "optimal"
+    assert complaints() == []
+
+
+@pytest.mark.parametrize("objective", ["max_margin", "min_effort"])
+def test_honest_plans_of_random_questions_pass(objective):
+    for seed in range(20, 26):
+        assert plan(random_jointed_question(seed, objective=objective)).verified
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        (lambda: with_joints(gravity=lambda g: g + 0.01 * np.eye(7)[2]), "joint limb3_joint3"),
+        (lambda: with_joints(jacobian=lambda j: -j), "joint limb3_joint1 bears"),
+        (lambda: with_joints(jacobian=lambda j: j + 1e-4), "bears"),
+        (lambda: with_angle(LIMB, 0.001), "not at the angles that were given"),
+        (lambda: with_angle(LIMB, 0.001), "bears"),
+        (lambda: with_angle(LIMB, 0.2), "its joints put the hand"),
+        (lambda: with_angle("front_right", 2 * np.pi), "beyond its limit"),
+        (lambda: replace(with_angle(LIMB, 0.001), solved=True), "its joints put the hand"),
+    ],
+    ids=["weight", "signs", "jacobian", "other", "torque", "far", "beyond", "found"],
+)
+def test_joints_that_are_tampered_with_are_found(where, words):
+    found = complaints(where=where())
+    assert any(words in each for each in found), found
+
+
+def test_joints_that_are_left_out_are_found():
+    answer, _ = honest()
+    settled = [settle_hand(hand, asked().stance) for hand in asked().stance.hands]
+    found = problems(asked(), settled, answer.hands, answer.utilisation, answer.body_wrench)
+    assert any("the joints are not what" in each for each in found)
+
+
+@pytest.mark.parametrize("component", range(6))
+def test_another_weight_is_found(component):
+    wrench = honest()[0].body_wrench + 1e-5 * np.eye(6)[component]
+    assert any("weight and acceleration" in each for each in complaints(body_wrench=wrench))
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        (lambda: with_limits(joint_torque=20.0), "utilisation is"),
+        (lambda: with_limits(joint_torque={LIMB: 20.0}), f"{LIMB}: utilisation is"),
+        (lambda: with_limits(per_hand={LIMB: ForceCap(50.0)}), f"{LIMB}: utilisation is"),
+        (
+            lambda: with_limits(per_hand={LIMB: ForceCap(((-9.0, 9.0),) * 3, "world")}),
+            f"{LIMB}: utilisation is",
+        ),
+        (
+            lambda: with_limits(per_hand={LIMB: ForceCap(((0.0, 9e9), (0.0, 9e9), (0.0, 9e9)))}),
+            "N along x of the hand, of none",
+        ),
+        (lambda: with_limits(tension_change=1.0), "changes by"),
+        (lambda: replace(asked(), present={LIMB: np.full(4, 500.0)}), "changes by"),
+        (lambda: replace(asked(), load=Load()), "weight and acceleration"),
+        (lambda: replace(asked(), load=Load(acceleration=(0.2, 0.1, -0.3))), "bears"),
+    ],
+    ids=["torque", "limb", "cap", "world", "none", "change", "present", "still", "no turning"],
+)
+def test_a_plan_for_another_question_is_found(question, words):
+    found = complaints(question())
+    assert any(words in each for each in found), found
+
+
+def test_another_wrench_that_was_asked_for_is_found():
+    hands = list(asked().stance.hands)
+    for given in ((None, 5.001, None, None, None, None), (None, 5.0, None, 0.1, None, None)):
+        hands[INDEX] = replace(hands[INDEX], wrench=given)
+        stance = replace(asked().stance, hands=tuple(hands))
+        assert any("component" in each for each in complaints(replace(asked(), stance=stance)))
+
+
+def test_rows_that_promise_less_force_than_there_is_are_found(monkeypatch):
+    monkeypatch.setattr(verify_limbs, "BALL", 0.5 * verify_limbs.BALL)
+    assert any("more than its rows say" in each for each in complaints())
+
+
+@pytest.mark.parametrize("wrong", [0.0, 0.99, 1.01, float("nan")])
+def test_a_wrong_effort_is_found(wrong):
+    effort = honest()[0].effort * wrong
+    assert any("effort is" in each for each in complaints(effort=effort))

@@ -1,0 +1,165 @@
+"""The prepared check of a stance's loads: agrees with the check of plans, and finds each fault."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from planner.question import Question
+from planner.result import Plan
+from planner.solving import plan
+from planner.streaming.stream_stance import StreamStance
+from planner.verification.limit_surface import LimitCurves
+from tests.hand_models.finger.test_fingernail import STRONG, hung, one_hand
+from tests.suite.helpers.barred import KINDS
+from tests.suite.helpers.hands import changed_hand
+from tests.suite.helpers.stances import ask, on_wall
+
+WALL = ask(on_wall())
+
+
+def streamable(question: Question) -> Question:
+    """The question without what streams refuse, under the wrench that its load needs."""
+    question = replace(
+        question,
+        objective="max_margin",
+        limits=replace(question.limits, tension_change=None),
+        present={},
+    )
+    return replace(question, body_wrench=StreamStance(question).first)
+
+
+@cache
+def stance() -> StreamStance:
+    return StreamStance(WALL)
+
+
+def fault(known: StreamStance, loads, wrench, **told) -> str | None:
+    """What is wrong with loads, and what the stance's sets say of them."""
+    read = known.read(loads)
+    used = max(read.utilisation, known.check.idle)
+    told = {"wrenches": read.wrenches, "utilisation": used} | told
+    return known.check.fault(loads, body_wrench=wrench, **told)
+
+
+def given_by(known: StreamStance, loads) -> np.ndarray:
+    """The body wrench that loads give."""
+    return known.check._body @ loads.ravel() + known.check._from_rest
+
+
+CASES = [
+    *(("plain", seed) for seed in (0, 1, 2, 8, 14)),
+    *(("jointed", seed) for seed in (0, 1, 3, 7)),
+    *(("request", seed) for seed in (6, 9, 25, 28, 55)),
+]
+
+
+@pytest.mark.parametrize(("kind", "seed"), CASES)
+def test_plans_that_are_verified_pass(kind, seed):
+    question = streamable(KINDS[kind](seed))
+    answer, known = plan(question), StreamStance(question)
+    loads = known.loads_of(answer)
+    assert not known.check.wrong
+    assert fault(known, loads, known.first) is None
+    read = known.read(loads)
+    assert max(read.utilisation, known.check.idle) == pytest.approx(answer.utilisation, rel=1e-9)
+    wrenches = np.array([hand.wrench for hand in answer.hands])
+    np.testing.assert_allclose(read.wrenches, wrenches, rtol=1e-9, atol=1e-7)
+
+
+@pytest.mark.parametrize("pull", [1000.0, 2200.0])
+def test_plans_that_hang_on_nails_pass(pull):
+    question = hung(one_hand(STRONG), pull)
+    answer, known = plan(question), StreamStance(question)
+    loads = known.loads_of(answer)
+    assert fault(known, loads, known.first) is None
+    # more along a nail than rock and finger bear, with the balance that this gives
+    loads[0, known.columns[0].index("inner_left/nail")] += 1e4
+    assert fault(known, loads, given_by(known, loads)) == "a load of the wrong sign"
+
+
+@cache
+def honest() -> tuple[np.ndarray, Plan]:
+    answer = plan(WALL)
+    return stance().loads_of(answer), answer
+
+
+@pytest.mark.parametrize("row", range(4))
+@pytest.mark.parametrize("column", range(10))
+def test_no_load_can_be_another(row, column):
+    loads = honest()[0].copy()
+    loads[row, column] += 0.05
+    assert fault(stance(), loads, stance().first) == "the balance"
+
+
+def test_numbers_that_are_told_are_those_of_the_loads():
+    loads, _ = honest()
+    read = stance().read(loads)
+    wrenches = read.wrenches.copy()
+    wrenches[1, 4] += 1e-3
+    wrong = fault(stance(), loads, stance().first, wrenches=wrenches)
+    assert wrong == "a hand's wrench"
+    wrong = fault(stance(), loads, stance().first, utilisation=read.utilisation - 1e-5)
+    assert wrong == "the utilisation"
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_found(number):
+    loads = honest()[0].copy()
+    loads[2, 3] = number
+    with np.errstate(invalid="ignore"):
+        assert fault(stance(), loads, stance().first) is not None
+
+
+SIGNED = {
+    "a tension": "inner_left/tension",
+    "the palm's shear": "palm_shear",
+    "the palm's pressing": "palm_pressing",
+}
+
+
+@pytest.mark.parametrize("name", SIGNED.values(), ids=SIGNED.keys())
+def test_no_load_has_the_wrong_sign(name):
+    loads = honest()[0].copy()
+    loads[1, stance().columns[1].index(name)] = -1.0
+    assert fault(stance(), loads, given_by(stance(), loads)) == "a load of the wrong sign"
+
+
+def test_a_tendon_with_friction_must_not_be_slackened():
+    hand = changed_hand("tendon", "friction", 0.1)
+    robot = replace(WALL.stance.robot, hand=hand)
+    known = StreamStance(replace(WALL, stance=replace(WALL.stance, robot=robot)))
+    loads = known.solve(known.first).loads
+    closing = known._known.prepared.settled[0].closing_tension
+    for slack, expected in ((0.0, None), (0.01, "a load of the wrong sign")):
+        loads[0, 0] = closing - slack
+        assert fault(known, loads, given_by(known, loads)) == expected
+
+
+def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes():
+    known = StreamStance(WALL)
+    loads, _ = honest()
+    weak = replace(known._known.prepared.settled[0].surface, shear_limit=20.0, pull_off_limit=2.0)
+    count = len(known.check._curves._numbers.gain)
+    known.check._curves = LimitCurves([weak], np.zeros(count, dtype=int))
+    assert fault(known, loads, known.first) == "a tile's limit curve"
+
+
+def test_a_hand_holds_no_more_than_its_rows_say():
+    known = StreamStance(WALL)
+    loads, _ = honest()
+    known.check._matrix[:, known.check._held] *= 0.9
+    assert fault(known, loads, known.first) == "what a hand holds"
+
+
+def test_a_wrench_that_is_given_is_kept():
+    given = tuple(
+        replace(hand, wrench=(None, None, 25.0, None, None, None) if i == 0 else None)
+        for i, hand in enumerate(WALL.stance.hands)
+    )
+    known = StreamStance(replace(WALL, stance=replace(WALL.stance, hands=given)))
+    solved = known.solve(known.first)
+    assert known.read(solved.loads).wrenches[0, 2] == pytest.approx(25.0, abs=1e-6)
+    assert fault(known, solved.loads, known.first) is None
+    assert fault(known, honest()[0], known.first) == "a wrench that is given"

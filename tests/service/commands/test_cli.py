@@ -1,0 +1,462 @@
+"""The ``crux`` command: what it prints where, and its exit status."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import trimesh
+from rich.console import Console
+
+from service.answering import dispatch
+from service.commands import cli as command
+from service.commands.cli import run
+from service.commands.stances import bundled
+from service.commands.tables import print_plan
+from service.requests import PlanRequest
+from service.wire import decode_request
+from tests.service.serving.test_service import Served, free_endpoint
+from tests.suite.helpers.asked import HEAVY, LIGHT, flat_request, jointed_request, put, wall_request
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.rocks import cylinder_mesh
+
+DONE, FAILED, BAD_INPUT, OVERLOADED = 0, 1, 2, 3
+
+
+@pytest.fixture
+def stance(tmp_path: Path):
+    """Writes a request to a file, and returns its path."""
+
+    def write(request: object, name: str = "stance.json") -> str:
+        path = tmp_path / name
+        path.write_text(request if isinstance(request, str) else json.dumps(request))
+        return str(path)
+
+    return write
+
+
+def result(capfd: pytest.CaptureFixture[str]) -> dict:
+    """The one line of JSON on standard output, with nothing on standard error."""
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.endswith("\n")
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+def complaint(capfd: pytest.CaptureFixture[str]) -> str:
+    """The one line on standard error, with nothing on standard output."""
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith("crux: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-m", "service.commands.cli", *arguments],
+        input=given,
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
+        timeout=PATIENCE,
+        check=False,
+    )
+
+
+# plan ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("request_", "status", "code"),
+    [
+        (wall_request(), "optimal", DONE),
+        (wall_request(HEAVY), "overloaded", OVERLOADED),
+        (
+            put(flat_request(), ("stance", "hands", 0, "grasp", "palm"), False),
+            "infeasible",
+            OVERLOADED,
+        ),
+    ],
+)
+def test_the_exit_status_of_a_plan(
+    request_: dict, status: str, code: int, stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["plan", stance(request_), "--json"]) == code
+    assert result(capfd)["status"] == status
+    assert run(["plan", stance(request_)]) == code
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.startswith(status.upper())
+    assert max(len(line) for line in out.splitlines()) <= 80
+
+
+def test_a_failed_plan_is_a_failure(
+    stance, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*asked: object) -> dispatch.Planned:
+        answer = good(*asked)
+        answer.reply.status = "failed"
+        return answer
+
+    good = dispatch.planned
+    monkeypatch.setattr(dispatch, "planned", fail)
+    assert run(["plan", stance(wall_request()), "--json"]) == FAILED
+    assert result(capfd)["status"] == "failed"
+
+
+def test_a_plan_says_how_much_hangs_on_the_palms(stance, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance(wall_request())
+    run(["plan", path, "--json"])
+    reply = result(capfd)
+    assert 0.0 < reply["load_factor_without_palm"] < reply["load_factor"]
+    assert reply["prices"]
+    run(["plan", path])
+    out = capfd.readouterr().out
+    assert f"load factor {reply['load_factor']:.3f}" in out
+    assert f"load factor without the palms: {reply['load_factor_without_palm']:.3f}" in out
+    assert reply["reason"] in out.replace("\n", " ")
+    for hand in reply["hands"]:
+        assert hand["limb"] in out
+
+
+def test_what_is_asked_for_is_added_to_what_the_file_wants(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run(["plan", stance(wall_request() | {"want": ["model", "prices"]}), "--json"])
+    reply = result(capfd)
+    assert reply["hands"][0]["wrench_space"]["rows"]
+    assert reply["load_factor"] is not None
+
+
+def test_a_stance_from_standard_input(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = io.BytesIO(json.dumps(wall_request()).encode())
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=given))
+    assert run(["plan", "-", "--json"]) == DONE
+    assert result(capfd)["id"] == "wall"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["wall-300", "wall-300-joints", "wall-700", "overhang", "slab", "boulders", "ledge"],
+)
+def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert name in bundled()
+    assert run(["plan", name, "--json"]) in (DONE, OVERLOADED)
+    assert result(capfd)["verified"] is True
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("{", "crux: not json: Input data was truncated\n"),
+        ("{}", "crux: v: missing\n"),
+        (json.dumps(wall_request() | {"colour": 1}), "crux: colour: unknown field; known are "),
+        (json.dumps(wall_request() | {"confidence": 0.9}), "crux: confidence: not supported in"),
+        (json.dumps(wall_request() | {"deadline": 0}), "crux: deadline: "),
+        (
+            json.dumps(put(wall_request(), ("stance", "hands", 3, "limb"), "nose")),
+            "crux: stance.hands[3].limb: unknown limb 'nose'; known are front_right",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(
+    text: str, line: str, stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for flags in ([], ["--json"]):
+        assert run(["plan", stance(text), *flags]) == BAD_INPUT
+        assert complaint(capfd).startswith(line)
+
+
+def test_a_stance_that_is_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["plan", "no/such.json"]) == BAD_INPUT
+    line = complaint(capfd)
+    assert line.startswith("crux: STANCE: no such file, and no bundled stance 'no/such.json'")
+    assert "wall-300" in line
+
+
+def test_a_person_reads_torques_effort_and_whose_joint_it_is(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance(jointed_request() | {"limits": {"joint_torque": 10.0}, "present": {}})
+    assert run(["plan", path, "--json"]) == DONE
+    reply = result(capfd)
+    assert run(["plan", path]) == DONE
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert f"effort {reply['effort']:.3g}" in out
+    table = out.partition("joint torques [N·m]")[2]
+    for limb, torques in reply["joint_torque"].items():
+        used = max(torques, key=abs)
+        (row,) = [row for row in table.splitlines() if row.split()[:1] == [limb] and "*" in row]
+        assert f"{used:.1f}*" in row
+        assert row.split()[-2:] == ["10", f"{abs(used) / 10.0:.2f}"]
+    assert reply["effort_prices"]
+    prices, _, effort_prices = table.partition("would take off the effort")
+    assert reply["effort_prices"][0]["limb"] in effort_prices
+    joints = [price["joint"] for price in reply["prices"][:8] if price["joint"]]
+    assert joints
+    assert all(joint in prices for joint in joints)
+
+
+def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFixture[str]) -> None:
+    request = wall_request(LIGHT) | {"want": []}
+    reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
+    reply.joint_torque = {"arm": [-1234.5, *range(1, 15), -7.0], "tail": [0.25]}
+    reply.joint_torque_limit = {"arm": [2469.0, *[300.0] * 15], "tail": [1.0]}
+    print_plan(reply, Console(width=80))
+    table = capsys.readouterr().out.partition("joint torques")[2].splitlines()
+    rows = [row.split() for row in table]
+    assert ["arm", "-1234*", "1.0", "2.0", "3.0", "4.0", "5.0", "6.0", "2469", "0.50"] in rows
+    assert ["from", "8", "7.0", "8.0", "9.0", "10.0", "11.0", "12.0", "13.0"] in rows
+    assert ["from", "15", "14.0", "-7.0"] in rows
+    assert ["tail", "0.2*", "1", "0.25"] in rows
+    assert max(len(row) for row in table) <= 80
+
+
+def test_hands_out_of_reach_are_bad_input_in_one_line(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = put(wall_request(), ("stance", "joints"), "solve")
+    for i in (0, 2):
+        request["stance"]["hands"][i]["pose"]["position"][2] *= 3.0
+    assert run(["plan", stance(request)]) == BAD_INPUT
+    line = complaint(capfd)
+    assert line.startswith("crux: stance.hands[0].pose: front_right is out of reach by ")
+    assert "; rear_left is out of reach by " in line
+
+
+# wrench-space -------------------------------------------------------------------------------------
+
+
+def test_a_wrench_space(stance, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance(flat_request())
+    assert run(["wrench-space", path, "--hand", "front_left", "--json"]) == DONE
+    reply = result(capfd)
+    assert run(["wrench-space", path, "--hand", "front_left"]) == DONE
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "seated by rule pinch" in out
+    assert f"{len(reply['vertices'])} vertices, {len(reply['half_spaces']['offsets'])} half-" in out
+    assert f"dimension {reply['dimension']}" in out
+    for limit in reply["tension_limits"]:
+        assert f"{limit['tension']:.1f}" in out
+
+
+def test_a_wrench_space_of_a_hand_that_is_not_there(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["wrench-space", stance(flat_request()), "--hand", "nose"]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: limb: no hand 'nose' in this stance; it has front_")
+
+
+def test_a_picture_of_a_wrench_space(stance, tmp_path: Path) -> None:
+    picture = tmp_path / "space.png"
+    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+    assert run([*arguments, "--plot", str(picture), "--json"]) == DONE
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_of_a_hand_that_can_carry_nothing(stance, tmp_path: Path) -> None:
+    request = flat_request()
+    # a tile of this surface is overloaded as soon as the finger closes
+    request["stance"]["hands"][0]["surface"] = {"shear_limit": 0.01}
+    picture = tmp_path / "space.png"
+    arguments = ["wrench-space", stance(request), "--hand", "front_left", "--plot", str(picture)]
+    assert run([*arguments, "--json"]) == OVERLOADED
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+# Holds in files -----------------------------------------------------------------------------------
+
+
+def scanned(file: str) -> dict:
+    request = wall_request()
+    for hand in request["stance"]["hands"]:
+        hand["hold"] = {"shape": "mesh", "file": file}
+    return request
+
+
+def test_a_scan_is_read_beside_the_stance_that_names_it(
+    stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    trimesh.Trimesh(*cylinder_mesh(0.3), process=False).export(tmp_path / "log.stl")
+    assert run(["plan", stance(wall_request()), "--json"]) == DONE
+    want = result(capfd)
+    assert run(["plan", stance(scanned("log.stl")), "--json"]) == DONE
+    assert result(capfd)["load_factor"] == pytest.approx(want["load_factor"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(None, "no such file"), (b"solid\nendsolid\n", "no triangles")]
+)
+def test_a_scan_that_cannot_be_read(
+    content: bytes | None, words: str, stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        (tmp_path / "rock.stl").write_bytes(content)
+    assert run(["plan", stance(scanned("rock.stl"))]) == BAD_INPUT
+    error = complaint(capfd)
+    assert error.startswith("crux: stance.hands[0].hold.file: ")
+    assert words in error
+    assert "rock.stl" in error
+
+
+def test_a_scan_is_in_a_file_or_in_the_message_not_in_both(
+    stance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = put(scanned("a.stl"), ("stance", "hands", 0, "hold", "vertices"), [])
+    assert run(["plan", stance(request)]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: stance.hands[0].hold.file: give a file, or ")
+
+
+@pytest.mark.parametrize("picture", ["space.xyz", "no/folder/space.png"])
+def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+    assert run([*arguments, "--plot", picture]) == BAD_INPUT
+    assert picture in complaint(capfd)
+
+
+# serve and query ----------------------------------------------------------------------------------
+
+
+def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
+    server = Served(free_endpoint())
+    flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
+    flags += ["--timeout", str(PATIENCE)]
+    try:
+        asked = process("query", stance(wall_request()), *flags, "--json")
+        assert (asked.returncode, asked.stderr) == (DONE, b"")
+        reply = json.loads(asked.stdout)
+        assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
+        assert reply["prices"]
+        heavy = json.dumps(wall_request(HEAVY)).encode()
+        asked = process("query", "-", *flags, given=heavy)
+        assert (asked.returncode, asked.stderr) == (OVERLOADED, b"")
+        assert asked.stdout.startswith(b"OVERLOADED")
+        twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
+        assert run(["query", stance(twice), *flags, "--json"]) == BAD_INPUT
+        assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
+        taken = process("serve", "-l", server.endpoint, "--no-multicast-scouting", "--json")
+        assert (taken.returncode, taken.stdout) == (FAILED, b"")
+        assert taken.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
+    finally:
+        server.process.terminate()
+        server.process.communicate()
+    asked = process("query", stance(wall_request()), *flags, "--json")
+    assert (asked.returncode, asked.stdout) == (FAILED, b"")
+    assert asked.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
+
+
+def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
+    arguments = ["query", stance(wall_request()), "--no-multicast-scouting", "-l", free_endpoint()]
+    asked = subprocess.run(
+        [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (asked.returncode, asked.stdout) == (FAILED, b"")
+    assert b"DEBUG" in asked.stderr
+    assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
+
+
+@pytest.mark.parametrize(
+    ("flags", "line"),
+    [
+        (["--cfg", "colour:1"], "crux: --cfg: colour: "),
+        (["-c", "/nowhere.json5"], "crux: --config: "),
+        (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
+        (["--timeout", "0"], "crux: Invalid value for '--timeout'"),
+    ],
+)
+def test_bad_flags(flags: list[str], line: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["query", stance(wall_request()), *flags]) == BAD_INPUT
+    assert complaint(capfd).startswith(line)
+
+
+# The rest -----------------------------------------------------------------------------------------
+
+
+def test_demo(tmp_path: Path) -> None:
+    picture = tmp_path / "demo.png"
+    shown = process("demo", "-o", str(picture), "--json")
+    assert shown.stderr == b""
+    assert shown.returncode in (DONE, OVERLOADED)
+    assert json.loads(shown.stdout)["verified"] is True
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_schema(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["schema", "--json"]) == DONE
+    assert "PlanRequest" in result(capfd)["$defs"]
+    assert run(["schema"]) == DONE
+    assert "PlanRequest" in json.loads(capfd.readouterr().out)["$defs"]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["plan"], ["plan", "--fast"], ["wrench-space", "x"]]
+)
+def test_wrong_usage_is_one_line(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments) == BAD_INPUT
+    complaint(capfd)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told", "asked"),
+    [
+        (["fly"], "No such command 'fly'", "crux"),
+        (["plan"], "Missing argument 'STANCE'", "crux plan"),
+        (["body-space", "wall", "--axes", "fx,up"], "got fx,up", "crux body-space"),
+        (["body-space", "wall", "--pure", "--projection"], "not both", "crux body-space"),
+        (["body-space", "wall", "--projection", "--pure"], "not both", "crux body-space"),
+        (["wrench-space", "wall"], "Missing option '--hand'", "crux wrench-space"),
+        (["query", "wall", "--timeout", "soon"], "'soon' is not a valid float", "crux query"),
+    ],
+)
+def test_wrong_usage_leads_to_the_commands_own_help(
+    arguments: list[str], told: str, asked: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == BAD_INPUT
+    line = complaint(capfd)
+    assert told in line
+    assert line.endswith(f"; see {asked} --help\n")
+
+
+def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == DONE
+    out = capfd.readouterr().out
+    for name in command.crux.commands:
+        assert f"  {name} " in out
+
+
+def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
+    stance, tmp_path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "plan.png"
+    assert run(["plan", stance(wall_request()), "--plot", str(picture), "--json"]) == DONE
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    result(capfd)
+    assert run(["plan", stance(wall_request()), "--plot", str(tmp_path / "a.nothing")]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.startswith("crux: --plot: cannot write ")
+    assert len(error.splitlines()) == 1
+
+
+def test_help_names_every_bundled_stance(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == DONE
+    out = capfd.readouterr().out
+    assert all(name in out for name in bundled())

@@ -1,0 +1,86 @@
+"""What the README shows is what happens."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from service.commands.cli import run
+from service.commands.stances import bundled
+from tests.suite.helpers.checkout import ROOT
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_example_stance_is_answered(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    (text,) = blocks("json")
+    file = tmp_path / "stance.json"
+    file.write_text(text, encoding="utf-8")
+    assert run(["plan", str(file), "--json"]) == 0
+    reply = json.loads(capfd.readouterr().out)
+    assert reply["verified"] is True
+    assert reply["status"] == "optimal"
+
+
+def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.CaptureFixture[str]):
+    exec(compile(blocks("python")[0], "README.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("optimal 0.75")
+    assert " N of " in lines[1]
+    assert len(json.loads(lines[2])) == 4
+
+
+def test_the_examples_of_a_stance_that_stays_go_on_from_the_first(
+    capsys: pytest.CaptureFixture[str],
+):
+    scope: dict[str, object] = {}
+    for word in ("up_the_wall", "KnownStance", "WrenchStream"):
+        (example,) = (
+            block for block in blocks("python") if f"import {word}" in block or f"{word} =" in block
+        )
+        exec(compile(example, "README.md", "exec"), scope)
+    known, stream, *_ = capsys.readouterr().out.splitlines()[3:]
+    assert 0.5 < float(known) < 1.0
+    status, source, used, gap = stream.split()
+    assert (status, source) == ("optimal", "interpolated")
+    assert 0.0 <= float(gap) < 0.01 < float(used) < 1.0
+
+
+def test_the_example_of_a_floating_hand_prints_stiffness_pose_and_limit(
+    capsys: pytest.CaptureFixture[str],
+):
+    (example,) = (block for block in blocks("python") if "CompliantHand" in block)
+    exec(compile(example, "README.md", "exec"), {})
+    reach, label = capsys.readouterr().out.splitlines()[-1].split()
+    assert float(reach) > 50.0
+    assert label.split("/")[1] in ("proximal", "distal")
+
+
+def test_the_example_of_an_own_hand_changes_the_plan(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    (text,) = blocks("toml")
+    file = tmp_path / "mine.toml"
+    file.write_text(text, encoding="utf-8")
+    assert run(["plan", "wall-300", "--hand", str(file), "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["load_factor"] == pytest.approx(1.27, abs=0.005)
+
+
+def test_every_command_line_uses_a_bundled_name_that_exists():
+    lines = [line for block in blocks("") for line in block.splitlines()]
+    named = {m[1] for line in lines if (m := re.match(r"crux (?:plan|query) (\S+)", line))}
+    assert named
+    assert named <= set(bundled())
+
+
+def test_the_two_commands_are_each_on_one_line():
+    lines = [block.strip() for block in blocks("") if block.startswith("python3 -m venv")]
+    assert [line.split()[-1] for line in lines] == ["demo", "pytest"]
+    assert all("\n" not in line for line in lines)

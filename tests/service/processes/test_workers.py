@@ -1,0 +1,162 @@
+"""Processes that are kept open: they die under their work, and nothing else is lost."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections import Counter
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from service.processes import workers as workers_module
+from service.processes.workers import NO_START, THREADS, Lost, Workers
+from tests.suite.helpers import workshop
+from tests.suite.helpers.patience import PATIENCE
+
+
+def logged(log: Path) -> Counter[int]:
+    return Counter(int(line.split()[0]) for line in log.read_text().splitlines())
+
+
+def done(workers: Workers, items: list) -> dict:
+    found = dict(workers.each(items))
+    assert sorted(found) == list(range(len(items)))
+    return found
+
+
+def kill(workers: Workers, pid: int) -> None:
+    """Kill a process from outside, and see that it is dead."""
+    (process,) = (worker.process for worker in workers._all if worker.process.pid == pid)
+    os.kill(pid, 9)
+    process.join(PATIENCE)
+    assert process.exitcode == -9
+
+
+@pytest.fixture(scope="module")
+def nappers() -> Iterator[Workers]:
+    with Workers(workshop.naps, 2) as workers:
+        yield workers
+
+
+def test_what_kills_its_process_is_tried_twice_and_costs_nothing_else(tmp_path):
+    log = tmp_path / "log"
+    with Workers(partial(workshop.squares, str(log)), 2) as workers:
+        for _ in range(2):
+            # nothing stays behind from one time to the next
+            found = done(workers, list(range(100, 150)))
+            assert [found[i] for i in range(50)] == [i * i for i in range(100, 150)]
+        assert done(workers, []) == {}
+        assert len({line.split()[1] for line in log.read_text().splitlines()}) <= 2
+        found = done(workers, list(range(20)))
+        again = done(workers, [2, 3])
+    lost = {i for i, result in found.items() if isinstance(result, Lost)}
+    assert lost == {13}
+    assert found[13].reason == "its process died, twice"
+    assert all(found[i] == i * i for i in found if i not in lost)
+    # what dies once by chance is done again
+    assert (logged(log)[13], logged(log)[7]) == (2, 2)
+    assert again == {0: 4, 1: 9}
+    alive = {process.pid for process in multiprocessing.active_children()}
+    assert not alive & {int(line.split()[1]) for line in log.read_text().splitlines()}
+
+
+def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
+    found, killed = {}, None
+    for i, result in nappers.each([0.02] * 30):
+        found[i] = result
+        if killed is None:
+            killed = result
+            kill(nappers, killed)
+    assert sorted(found) == list(range(30))
+    assert not any(isinstance(result, Lost) for result in found.values())
+    # one that has nothing to do is replaced, too
+    (first,) = done(nappers, [0.0]).values()
+    kill(nappers, first)
+    assert first not in done(nappers, [0.0] * 4).values()
+
+
+def test_all_processes_are_ready_once_they_are_waited_for():
+    with Workers(workshop.naps, 2) as workers:
+        workers.wait()
+        assert [worker.ready for worker in workers._all] == [True, True]
+        workers.wait()
+        assert len(set(done(workers, [0.2] * 4).values())) == 2
+    with Workers(workshop.nothing, 2) as workers:
+        workers.wait()
+        assert workers._all == []
+
+
+def test_who_stops_listening_leaves_no_work_behind(nappers):
+    for _ in nappers.each([0.0, *[2.0 * PATIENCE] * 5]):
+        busy = [worker.process for worker in nappers._all if worker.hand]
+        break
+    assert busy
+    assert {process.exitcode for process in busy} == {-9}
+    assert len(done(nappers, [0.0, 0.0])) == 2
+
+
+def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
+    with Workers(workshop.nothing, 2) as workers:
+        found = done(workers, list(range(20)))
+    assert {result.reason for result in found.values()} == {NO_START}
+
+
+def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
+    monkeypatch.setattr(workers_module, "PATIENCE", 1e5)
+    with Workers(workshop.sleepers, 2) as workers:
+        # well before any is ready
+        found = dict(workers.each(list(range(5)), lambda item: -item))
+        assert not any(worker.ready for worker in workers._all)
+        processes = [worker.process for worker in workers._all]
+    assert found == {i: -i for i in range(5)}
+    # what is not ready is not waited for
+    assert [process.exitcode for process in processes] == [-9, -9]
+    with Workers(workshop.nothing, 2) as workers:
+        found = {}
+        for i, result in workers.each([0.0] * 20, workshop.nap_here):
+            found[i] = result
+            for worker in workers._all:
+                worker.process.join(PATIENCE)
+        assert workers._stillborn == 2
+        assert workers._all == []
+    assert set(found.values()) == {os.getpid()}
+    assert sorted(found) == list(range(20))
+
+
+def test_this_process_and_others_share_the_work(nappers):
+    # one of them at least is ready
+    done(nappers, [0.0])
+    found = dict(nappers.each([0.02] * 60, workshop.nap_here))
+    assert sorted(found) == list(range(60))
+    assert os.getpid() in found.values()
+    assert len(set(found.values())) >= 2
+
+
+def test_an_item_that_kills_processes_spares_this_one(tmp_path):
+    here = os.getpid()
+    with Workers(partial(workshop.squares, str(tmp_path / "log")), 1) as workers:
+        assert done(workers, [2]) == {0: 4}
+        found = dict(workers.each([13, 2, 3], lambda number: (here, number)))
+    assert isinstance(found[0], Lost)
+    assert found[1] in (4, (here, 2))
+    assert found[2] in (9, (here, 3))
+
+
+def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
+    monkeypatch.setenv(THREADS[0], "7")
+    monkeypatch.delenv(THREADS[1], raising=False)
+    with Workers(workshop.threads, 1) as workers:
+        assert set(done(workers, list(THREADS)).values()) == {"1"}
+    assert os.environ[THREADS[0]] == "7"
+    assert THREADS[1] not in os.environ
+
+
+def test_neither_side_waits_for_the_other_to_take_what_is_large():
+    """More than a pipe takes: chunks go out while results come back."""
+    items = [bytes([i, 0]) * 400_000 for i in range(24)]
+    with Workers(workshop.reversers, 1) as workers:
+        found = done(workers, items)
+    assert [found[i] for i in range(24)] == [item[::-1] for item in items]

@@ -1,0 +1,599 @@
+"""The service on zenoh: real sessions over TCP loopback, real ``crux serve`` processes."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+import zenoh
+from zenoh.handlers import FifoChannel
+
+from hand_models.base import InvalidInputError
+from planner import solving
+from planner.prepare import settled_stance as settling
+from planner.robots import RobotFile
+from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest
+from service.answering import dispatch
+from service.answering.dispatch import Answer
+from service.replies import ErrorReply, PlanReply
+from service.serving import PlanService, listening, open_session, zenoh_config
+from service.wire import (
+    Format,
+    NoServiceError,
+    ServiceError,
+    ServiceTimeout,
+    decode_request,
+    service_key,
+)
+from tests.service.wire.test_messages import check_answer
+from tests.suite.helpers.asked import (
+    HEAVY,
+    JSON,
+    MSGPACK,
+    flat_request,
+    full_request,
+    jointed_request,
+    spoil,
+    wall_request,
+)
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
+
+PLAN = service_key("robosimian", "plan")
+WRENCH_SPACE = service_key("robosimian", "wrench_space")
+BODY_SPACE = service_key("robosimian", "body_space")
+STREAM = service_key("robosimian", "stream")
+SET_POINTS = service_key("robosimian", "set_points")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Served:
+    """A ``crux serve`` process."""
+
+    def __init__(self, endpoint: str, *more: str) -> None:
+        self.endpoint = endpoint
+        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "service.commands.cli", "serve", *flags],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+        line = self.process.stdout.readline()
+        assert line, self.process.stderr.read().decode()
+        self.ready = json.loads(line)
+
+    def stop(self, number: int) -> tuple[str, str]:
+        """Send a signal; what the process had to say until its end."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return out.decode(), err.decode()
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    server = Served(free_endpoint())
+    yield server
+    server.stop(signal.SIGTERM)
+    assert server.process.returncode == 0
+
+
+def client_config(endpoint: str) -> zenoh.Config:
+    return zenoh_config(mode="client", connect=[endpoint], multicast=False)
+
+
+@pytest.fixture
+def session(served: Served) -> Iterator[zenoh.Session]:
+    with zenoh.open(client_config(served.endpoint)) as opened:
+        yield opened
+
+
+def plan_request(request: dict | None = None) -> PlanRequest:
+    return decode_request(msgspec.json.encode(request or wall_request()), PlanRequest)
+
+
+def ask(
+    session: zenoh.Session, payload: bytes | None, encoding: str | None = None, key: str = PLAN
+) -> list[Answer]:
+    """Every reply to a raw query."""
+    answers = []
+    for reply in session.get(key, payload=payload, encoding=encoding, timeout=PATIENCE):
+        part = reply.ok or reply.err
+        answers.append(Answer(part.payload.to_bytes(), str(part.encoding), reply.ok is not None))
+        if reply.ok is not None:
+            assert str(reply.ok.key_expr) in KEYS
+    return answers
+
+
+# Queries ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("encoding", "replied"),
+    [
+        (None, JSON),
+        (JSON, JSON),
+        ("text/json", JSON),
+        (MSGPACK, MSGPACK),
+        ("application/msgpack;crux.PlanRequest@1", MSGPACK),
+    ],
+)
+def test_a_reply_comes_in_the_encoding_of_the_request(
+    session: zenoh.Session, encoding: str | None, replied: str
+) -> None:
+    form = Format.named(encoding or "")
+    (answer,) = ask(session, form.encode(plan_request()), encoding)
+    assert answer.good
+    assert answer.encoding == f"{replied};crux.PlanReply@1"
+    assert form.decode(answer.payload, PlanReply).status == "optimal"
+
+
+@pytest.mark.parametrize("form", Format)
+def test_an_error_comes_in_the_encoding_of_the_request(
+    session: zenoh.Session, form: Format
+) -> None:
+    (answer,) = ask(session, form.encode(plan_request())[:-1], form.value)
+    assert not answer.good
+    assert answer.encoding == f"{form.value};crux.ErrorReply@1"
+    assert form.decode(answer.payload, ErrorReply).error.kind == "malformed"
+
+
+def test_a_query_without_payload_is_an_error(session: zenoh.Session) -> None:
+    (answer,) = ask(session, None)
+    assert not answer.good
+
+
+def test_a_wildcard_finds_the_robots_that_plan(session: zenoh.Session) -> None:
+    (answer,) = ask(session, msgspec.json.encode(wall_request()), JSON, key="crux/*/plan")
+    assert answer.good
+
+
+def test_the_service_is_alive_while_it_serves(session: zenoh.Session) -> None:
+    told = session.liveliness().get("crux/**", timeout=PATIENCE)
+    alive = [str(reply.ok.key_expr) for reply in told]
+    assert alive == [service_key("robosimian", "alive")]
+
+
+def test_fuzz_over_the_network(session: zenoh.Session) -> None:
+    chance = random.Random(7)
+    for i in range(200):
+        asked = (full_request, flat_request, jointed_request, flat_request)[i % 4]
+        payload, encoding = spoil(asked(), chance)
+        (answer,) = ask(session, payload, encoding)
+        check_answer(answer, payload[:500])
+    (answer,) = ask(session, msgspec.json.encode(wall_request()), JSON)
+    assert answer.good
+
+
+# The client ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", Format)
+def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
+    config = client_config(served.endpoint)
+    with CruxClient(config, form=form, timeout=PATIENCE) as client:
+        reply = client.plan(plan_request())
+        assert (reply.id, reply.status) == ("wall", "optimal")
+        assert client.plan(plan_request(wall_request(HEAVY))).status == "overloaded"
+        stance = plan_request(flat_request()).stance
+        space = client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="front_left"))
+        assert space.limb == "front_left"
+        assert space.vertices
+        body = client.body_space(BodySpaceRequest(v=1, stance=stance, axes=["fx", "my"]))
+        assert body.section.axes == ["fx", "my"]
+        assert body.section.inner
+
+
+def test_the_client_raises_what_the_service_says(session: zenoh.Session) -> None:
+    client = CruxClient(session, timeout=PATIENCE)
+    request = msgspec.structs.replace(plan_request(), objective="max_reliability")
+    with pytest.raises(ServiceError, match="objective: max_reliability is not supported") as caught:
+        client.plan(request)
+    assert (caught.value.kind, caught.value.field) == ("unsupported", "objective")
+    stance = plan_request(flat_request()).stance
+    with pytest.raises(ServiceError, match="no hand 'nose'") as caught:
+        client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="nose"))
+    assert (caught.value.kind, caught.value.field) == ("invalid", "limb")
+    client.close()
+    assert not session.is_closed()
+
+
+def test_nobody_there() -> None:
+    with pytest.raises(NoServiceError, match="no zenoh session"):
+        CruxClient(client_config(free_endpoint()))
+    alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with (
+        CruxClient(alone, timeout=PATIENCE) as client,
+        pytest.raises(NoServiceError, match="nobody answers at"),
+    ):
+        client.plan(plan_request())
+
+
+def test_a_robot_that_nobody_plans_for(session: zenoh.Session) -> None:
+    with pytest.raises(NoServiceError, match="crux/loris/plan"):
+        CruxClient(session, "loris", timeout=PATIENCE).plan(plan_request())
+
+
+@pytest.fixture
+def alone() -> Iterator[zenoh.Session]:
+    """A session that is its own whole network."""
+    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
+        yield opened
+
+
+def test_a_service_that_does_not_answer_in_time(alone: zenoh.Session) -> None:
+    held: queue.SimpleQueue[zenoh.Query] = queue.SimpleQueue()
+    with alone.declare_queryable(PLAN, held.put):
+        with pytest.raises(ServiceTimeout, match=r"no answer at crux/robosimian/plan within 0.3 s"):
+            CruxClient(alone, timeout=0.3).plan(plan_request())
+        held.get().drop()
+
+
+def test_an_empty_answer_is_asked_for_once_more(alone: zenoh.Session) -> None:
+    asked = []
+    good = wire_reply()
+
+    def second_time(query: zenoh.Query) -> None:
+        with query:
+            asked.append(query)
+            if len(asked) == 2:
+                query.reply(PLAN, good, encoding=JSON)
+
+    with alone.declare_queryable(PLAN, second_time):
+        assert CruxClient(alone, timeout=PATIENCE).plan(plan_request()).status == "optimal"
+    asked.clear()
+    with (
+        alone.declare_queryable(PLAN, lambda query: (asked.append(1), query.drop())),
+        pytest.raises(NoServiceError),
+    ):
+        CruxClient(alone, timeout=PATIENCE).plan(plan_request())
+    assert len(asked) == 2
+
+
+def wire_reply() -> bytes:
+    return dispatch.handle(PLAN, msgspec.json.encode(wall_request())).payload
+
+
+@pytest.mark.parametrize("payload", [b"", b"\xff", b'{"v": 1}', b"[]"])
+def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
+    def nonsense(query: zenoh.Query) -> None:
+        with query:
+            query.reply(PLAN, payload, encoding=JSON)
+
+    with (
+        alone.declare_queryable(PLAN, nonsense),
+        pytest.raises(ServiceError, match="a reply that is no PlanReply"),
+    ):
+        CruxClient(alone, timeout=PATIENCE).plan(plan_request())
+
+
+# Faults and floods --------------------------------------------------------------------------------
+
+
+def test_a_fault_is_the_callers_error_and_the_service_goes_on(
+    alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    client = CruxClient(alone, timeout=PATIENCE)
+    with PlanService(alone):
+        with monkeypatch.context() as patch:
+            patch.setattr(solving, "plan", lambda _: 1 / 0)
+            with pytest.raises(ServiceError, match=r"the service failed \(ZeroDivisionError\)"):
+                client.plan(plan_request())
+        assert "Traceback" in caplog.text
+        assert client.plan(plan_request()).status == "optimal"
+    with pytest.raises(NoServiceError):
+        client.plan(plan_request())
+
+
+class Turn:
+    """A lock that knows whose it is."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.owner: int | None = None
+
+    def acquire(self, *, timeout: float = -1.0) -> bool:
+        taken = self._lock.acquire(timeout=timeout)
+        if taken:
+            self.owner = threading.get_ident()
+        return taken
+
+    def release(self) -> None:
+        self.owner = None
+        self._lock.release()
+
+
+def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    turn, all_sent = Turn(), threading.Event()
+
+    def exclusive(*_: object) -> None:
+        # while others wait
+        assert all_sent.wait(PATIENCE)
+        assert turn.owner == threading.get_ident()
+        raise InvalidInputError("done", field="stance")
+
+    monkeypatch.setattr(solving, "plan", exclusive)
+    monkeypatch.setattr(settling, "resting_hand", exclusive)
+    monkeypatch.setattr(dispatch, "explore", exclusive)
+    stance = wall_request()["stance"]
+    questions = {
+        PLAN: wall_request(),
+        WRENCH_SPACE: {"v": 1, "stance": stance, "limb": "front_left"},
+        BODY_SPACE: {"v": 1, "stance": stance, "axes": ["fx", "fz"]},
+    }
+    service = PlanService(alone)
+    monkeypatch.setattr(service, "_answering", turn)
+    with service:
+        # no more than fit into the channels while nothing is answered
+        channels = [
+            alone.get(key, payload=msgspec.json.encode(asked), encoding=JSON, timeout=PATIENCE)
+            for key, asked in 2 * list(questions.items())
+        ]
+        all_sent.set()
+        for channel in channels:
+            (reply,) = channel
+            error = Format.JSON.decode(reply.err.payload.to_bytes(), ErrorReply).error
+            assert (error.kind, error.message) == ("invalid", "done")
+
+
+def test_a_stop_does_not_wait_for_a_long_question(
+    alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def long_question(_: object) -> None:
+        begun.set()
+        go_on.wait(0.5 * PATIENCE)
+        ended.set()
+        raise InvalidInputError("too late")
+
+    monkeypatch.setattr(solving, "plan", long_question)
+    with PlanService(alone):
+        payload = msgspec.json.encode(wall_request())
+        channel = alone.get(PLAN, payload=payload, timeout=PATIENCE)
+        assert begun.wait(PATIENCE)
+    assert not ended.is_set()
+    go_on.set()
+    list(channel)
+
+
+FLOOD, FLOODS = 300, 4
+"""Questions that a flood has at once, and floods."""
+
+BEFORE = 100
+"""Others' questions that may be answered before one: far fewer than are waiting."""
+
+
+def test_a_flood_from_some_leaves_the_others_their_turn(served: Served) -> None:
+    payload = msgspec.json.encode(wall_request() | {"want": ["load_factor"]})
+    answered: list[int] = []
+    flooded, stop = threading.Event(), threading.Event()
+
+    def note(_: zenoh.Reply) -> None:
+        answered.append(1)
+        if len(answered) >= 4 * FLOODS:
+            flooded.set()
+
+    def flood() -> None:
+        with zenoh.open(client_config(served.endpoint)) as mine:
+            for _ in range(FLOOD):
+                if stop.is_set():
+                    return
+                mine.get(PLAN, note, payload=payload, timeout=PATIENCE)
+            stop.wait(PATIENCE)
+
+    floods = [threading.Thread(target=flood) for _ in range(FLOODS)]
+    with zenoh.open(client_config(served.endpoint)) as mine:
+        for thread in floods:
+            thread.start()
+        assert flooded.wait(PATIENCE)
+        before = []
+        for _ in range(3):
+            start = len(answered)
+            (answer,) = ask(mine, payload, JSON)
+            before.append(len(answered) - start)
+            assert answer.good
+        stop.set()
+        for thread in floods:
+            thread.join()
+    assert max(before) < BEFORE
+
+
+# Processes ----------------------------------------------------------------------------------------
+
+
+def test_a_server_says_what_it_serves(served: Served) -> None:
+    assert served.ready == {"v": 1, "keys": KEYS, "listen": [served.endpoint]}
+
+
+@pytest.mark.parametrize(
+    ("number", "busy"),
+    [
+        (signal.SIGTERM, True),
+        (signal.SIGINT, False),
+        pytest.param(signal.SIGTERM, False, marks=pytest.mark.slow),
+        pytest.param(signal.SIGINT, True, marks=pytest.mark.slow),
+    ],
+)
+def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
+    server = Served(free_endpoint())
+    payload = msgspec.json.encode(wall_request())
+    with zenoh.open(client_config(server.endpoint)) as mine:
+        channels = []
+        if busy:
+            ask(mine, payload, JSON)
+            channels = [mine.get(PLAN, payload=payload, timeout=PATIENCE) for _ in range(50)]
+        out, err = server.stop(number)
+        replies = [reply for channel in channels for reply in channel]
+    assert server.process.returncode == 0
+    # who has no answer is told that none comes, and does not wait until his time is over
+    assert all(reply.ok is not None for reply in replies)
+    assert out == ""
+    assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
+
+
+def test_a_second_server_of_one_robot_warns(served: Served) -> None:
+    def said() -> list[str]:
+        second = Served(free_endpoint(), "-e", served.endpoint)
+        return second.stop(signal.SIGTERM)[1].splitlines()
+
+    # the first's token may not have been heard of yet
+    for _ in range(10):
+        *warnings, serving = said()
+        if warnings:
+            break
+    assert warnings == [
+        "crux: another service already answers crux/robosimian/…: queries may reach either; "
+        "--no-multicast-scouting keeps services apart"
+    ]
+    assert serving.startswith("crux: serving ")
+
+
+def soon(said: Callable[[], bool], *, within: float = PATIENCE) -> bool:
+    """Whether something is ever said: tokens take a moment to be heard of."""
+    until = time.monotonic() + within
+    while time.monotonic() < until:
+        if said():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
+    endpoint = free_endpoint()
+    first = zenoh_config(listen=[endpoint], multicast=False)
+    second = zenoh_config(connect=[endpoint], settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(first) as there, open_session(second) as here:
+        service = PlanService(here)
+        assert not service.has_rival()
+        with PlanService(there):
+            assert soon(service.has_rival)
+            assert not PlanService(here, RobotFile("lemur", toml="", urdf="")).has_rival()
+        assert soon(lambda: not service.has_rival())
+
+
+def test_a_killed_server_is_noticed_and_its_successor_found() -> None:
+    endpoint = free_endpoint()
+    server = Served(endpoint)
+    config = zenoh_config(mode="client", connect=[endpoint], multicast=False)
+    with CruxClient(config, timeout=0.5 * PATIENCE) as client:
+        assert client.plan(plan_request()).status == "optimal"
+        answered, outcome = threading.Event(), []
+
+        def ask_until_it_fails() -> None:
+            try:
+                while True:
+                    client.plan(plan_request())
+                    answered.set()
+            except BaseException as error:
+                outcome.append(error)
+
+        asking = threading.Thread(target=ask_until_it_fails)
+        asking.start()
+        assert answered.wait(PATIENCE)
+        server.stop(signal.SIGKILL)
+        asking.join(PATIENCE)
+        # not that its time is over
+        assert isinstance(outcome[0], NoServiceError)
+        successor = Served(endpoint)
+
+        def found() -> bool:
+            with contextlib.suppress(NoServiceError):
+                return client.plan(plan_request()).status == "optimal"
+            return False
+
+        try:
+            assert soon(found)
+        finally:
+            successor.stop(signal.SIGTERM)
+    assert successor.process.returncode == 0
+
+
+# Configuration ------------------------------------------------------------------------------------
+
+
+def setting(config: zenoh.Config, key: str) -> object:
+    return json.loads(config.get_json(key))
+
+
+def test_flags_become_a_configuration(tmp_path: Path) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text('{mode: "client", connect: {endpoints: ["tcp/127.0.0.1:1"]}}')
+    config = zenoh_config(file=file)
+    assert setting(config, "mode") == "client"
+    assert setting(config, "connect/endpoints") == ["tcp/127.0.0.1:1"]
+    config = zenoh_config(
+        file=file,
+        mode="router",
+        listen=["tcp/127.0.0.1:2", "tcp/127.0.0.1:3"],
+        settings=["namespace:'arm'"],
+        multicast=False,
+    )
+    assert setting(config, "mode") == "router"
+    assert listening(config) == ["tcp/127.0.0.1:2", "tcp/127.0.0.1:3"]
+    assert setting(config, "scouting/multicast/enabled") is False
+    assert setting(config, "transport/shared_memory/enabled") is False
+    assert setting(config, "namespace") == "arm"
+
+
+def test_the_environment_names_a_configuration(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text('{mode: "client"}')
+    monkeypatch.setenv("ZENOH_CONFIG", str(file))
+    assert setting(zenoh_config(), "mode") == "client"
+
+
+@pytest.mark.parametrize(
+    ("flags", "field"),
+    [
+        ({"settings": ["scuting/multicast/enabled:false"]}, "--cfg"),
+        ({"settings": ["mode"]}, "--cfg"),
+        ({"mode": "boss"}, "--mode"),
+        ({"connect": ["127.0.0.1"]}, "--connect"),
+        ({"file": Path("/nowhere.json5")}, "--config"),
+    ],
+)
+def test_a_bad_flag_is_named(flags: dict, field: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        zenoh_config(**flags)
+    assert caught.value.field == field
+    assert ".rs:" not in caught.value.message
+
+
+def test_a_channel_that_is_full_makes_its_client_wait(alone: zenoh.Session) -> None:
+    """What the server builds on: zenoh loses no query of a full channel."""
+    queryable = alone.declare_queryable(PLAN, FifoChannel(1))
+    replies = []
+    sender = threading.Thread(
+        target=lambda: replies.extend(
+            alone.get(PLAN, payload=str(i), timeout=PATIENCE) for i in range(5)
+        )
+    )
+    sender.start()
+    for _ in range(5):
+        with queryable.handler.recv() as query:
+            query.reply(PLAN, query.payload.to_bytes())
+    sender.join()
+    assert [next(iter(r)).ok.payload.to_string() for r in replies] == list("01234")

@@ -1,0 +1,394 @@
+"""Streams from outside: over zenoh in real sessions, as messages, and on the command line."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
+import pytest
+import zenoh
+
+from planner.result import no_set_points
+from planner.streaming import WrenchStream
+from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
+from service.answering import Streams, dispatch, streams
+from service.answering.streams import KEPT
+from service.commands import stream as stream_command
+from service.commands.cli import run
+from service.replies import SetPointsReply, StreamReply
+from service.serving import PlanService, open_session, zenoh_config
+from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
+from tests.service.commands.test_cli import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    OVERLOADED,
+    complaint,
+    process,
+    stance,
+)
+from tests.service.serving.test_service import free_endpoint
+from tests.service.wire.test_messages import departures
+from tests.suite.helpers.asked import HEAVY, JSON, LIGHT, MSGPACK, put, wall_request
+from tests.suite.helpers.patience import PATIENCE
+
+__all__ = ["stance"]
+
+WRENCH = [1050.0, 10.0, -5.0, 2.0, 1.0, 0.0]
+
+
+def stream_request(request: dict | None = None, **more: object) -> dict:
+    """A declaration, as JSON."""
+    asked = wall_request() if request is None else request
+    kept = ("stance", "body_wrench", "load", "limits")
+    return {"v": 1} | {name: asked[name] for name in kept if name in asked} | more
+
+
+def declaration(**more: object) -> StreamRequest:
+    return decode_request(msgspec.json.encode(stream_request(**more)), StreamRequest)
+
+
+def answered(key: str, request: dict, known: Streams) -> dict:
+    answer = dispatch.handle(key, msgspec.json.encode(request), streams=known)
+    return json.loads(answer.payload) | {"good": answer.good}
+
+
+@pytest.fixture
+def known() -> Iterator[Streams]:
+    opened = Streams()
+    yield opened
+    opened.close()
+
+
+# Over zenoh ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def serving() -> Iterator[tuple[PlanService, str]]:
+    """A service of this process, on TCP loopback."""
+    endpoint = free_endpoint()
+    config = zenoh_config(mode="peer", listen=[endpoint], multicast=False)
+    with open_session(config) as session, PlanService(session) as service:
+        yield service, endpoint
+
+
+@pytest.fixture
+def client(serving) -> Iterator[CruxClient]:
+    config = zenoh_config(mode="client", connect=[serving[1]], multicast=False)
+    with CruxClient(config, timeout=PATIENCE) as opened:
+        yield opened
+
+
+def test_a_stance_is_declared_and_asked_for_set_points(client: CruxClient) -> None:
+    declared = client.stream(declaration())
+    assert (declared.status, declared.radius) == ("optimal", 30.0)
+    assert declared.gap < 1e-9
+    answer = client.plan(decode_request(msgspec.json.encode(wall_request()), PlanRequest))
+    assert declared.body_wrench == pytest.approx(answer.body_wrench)
+    assert declared.utilisation == pytest.approx(answer.utilisation, rel=1e-5)
+    wrench = tuple(np.add(answer.body_wrench, [5.0, -4.0, 3.0, 0.5, 0.0, 0.2]).tolist())
+    reply = client.set_points(SetPointsRequest(v=1, stream=declared.stream, body_wrench=wrench))
+    assert (reply.status, reply.source, reply.verified) == ("optimal", "interpolated", True)
+    assert (reply.stream, reply.v, reply.reason) == (declared.stream, 1, None)
+    asked = wall_request() | {"body_wrench": list(wrench)}
+    asked.pop("load", None)
+    whole = client.plan(decode_request(msgspec.json.encode(asked), PlanRequest))
+    assert -1e-6 <= reply.utilisation - whole.utilisation <= reply.gap + 1e-6
+    for mine, hand, columns in zip(reply.hands, whole.hands, declared.hands, strict=True):
+        assert mine.limb == hand.limb == columns.limb
+        assert columns.columns[:4] == [f"{finger.name}/tension" for finger in hand.fingers]
+        tensions = [finger.tendon_tension for finger in hand.fingers]
+        assert mine.tensions == pytest.approx(tensions, rel=0.1, abs=3.0)
+        per_newton = hand.fingers[0].motor_torque / tensions[0]
+        assert mine.motor_torque == pytest.approx([per_newton * f for f in mine.tensions])
+
+
+@pytest.mark.parametrize("form", Format)
+def test_messages_come_in_the_encoding_of_the_request(serving, form: Format) -> None:
+    config = zenoh_config(mode="client", connect=[serving[1]], multicast=False)
+    with zenoh.open(config) as session:
+
+        def ask(name: str, request: object) -> zenoh.Sample:
+            key = service_key("robosimian", name)
+            payload = form.encode(request)
+            (reply,) = session.get(key, payload=payload, encoding=form.value, timeout=PATIENCE)
+            return reply.ok
+
+        declared = ask(STREAM, declaration())
+        assert str(declared.encoding) == f"{form.value};crux.StreamReply@1"
+        identifier = form.decode(declared.payload.to_bytes(), StreamReply).stream
+        request = {"v": 1, "stream": identifier, "body_wrench": WRENCH}
+        told = ask(SET_POINTS, request)
+        assert str(told.encoding) == f"{form.value};crux.SetPointsReply@1"
+        assert form.decode(told.payload.to_bytes(), SetPointsReply).verified
+
+
+def test_set_points_do_not_wait_for_other_questions(serving, client: CruxClient) -> None:
+    declared = client.stream(declaration())
+    request = SetPointsRequest(v=1, stream=declared.stream, body_wrench=tuple(WRENCH))
+    with serving[0]._answering:
+        # while a question is answered that takes longer than anyone waits
+        assert client.set_points(request).verified
+
+
+def test_an_unknown_stream_is_an_error_that_names_the_field(client: CruxClient) -> None:
+    request = SetPointsRequest(v=1, stream="nobody", body_wrench=tuple(WRENCH))
+    with pytest.raises(ServiceError, match="no stream 'nobody'") as caught:
+        client.set_points(request)
+    assert (caught.value.kind, caught.value.field) == ("invalid", "stream")
+
+
+def test_a_service_that_ends_lets_its_streams_go() -> None:
+    def running() -> int:
+        return sum("crux-stream" in thread.name for thread in threading.enumerate())
+
+    before = running()
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(config) as session, PlanService(session) as service:
+        client = CruxClient(session, service.robot, timeout=PATIENCE)
+        declared = client.stream(declaration(radius=5.0))
+        far = tuple(part + 5.0 for part in declared.body_wrench)
+        client.set_points(SetPointsRequest(v=1, stream=declared.stream, body_wrench=far))
+        assert running() == before + 1
+    assert running() == before
+
+
+# Messages -----------------------------------------------------------------------------------------
+
+
+def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
+    closed: list[int] = []
+    count = iter(range(100))
+
+    def opened(request: StreamRequest, robots: object) -> SimpleNamespace:
+        number = next(count)
+        return SimpleNamespace(
+            first=np.array(WRENCH),
+            limbs=(),
+            columns=(),
+            interpolates=None,
+            set_points=lambda wrench: no_set_points(
+                "failed", np.array(wrench), "none", verified=False
+            ),
+            close=lambda: closed.append(number),
+        )
+
+    monkeypatch.setattr(streams, "opened", opened)
+    names = [known.declare(declaration()).stream for _ in range(KEPT)]
+    assert len(set(names)) == KEPT
+    known.set_points(SetPointsRequest(v=1, stream=names[0], body_wrench=tuple(WRENCH)))
+    names += [known.declare(declaration()).stream for _ in range(2)]
+    # the first was asked for since
+    assert closed == [1, 2]
+    request = {"v": 1, "stream": names[1], "body_wrench": WRENCH}
+    assert answered(SET_POINTS, request, known)["error"]["field"] == "stream"
+    assert answered(SET_POINTS, request | {"stream": names[0]}, known)["good"]
+    known.close()
+    assert sorted(closed) == list(range(KEPT + 2))
+
+
+def test_messages_are_of_the_schema(known: Streams) -> None:
+    request = stream_request(radius=10.0)
+    assert departures("StreamRequest", request) == []
+    declared = answered(STREAM, request, known)
+    assert declared.pop("good")
+    assert departures("StreamReply", declared) == []
+    asked = {"v": 1, "stream": declared["stream"], "body_wrench": WRENCH}
+    assert departures("SetPointsRequest", asked) == []
+    told = answered(SET_POINTS, asked, known)
+    assert told.pop("good")
+    assert departures("SetPointsReply", told) == []
+    assert len(json.dumps(told)) < 3000
+
+
+def test_numbers_that_are_not_there_are_null(known: Streams) -> None:
+    request = stream_request()
+    for hand in request["stance"]["hands"]:
+        hand["grasp"] = hand.get("grasp", {}) | {"palm": False}
+    request.pop("load", None)
+    request["body_wrench"] = [0.0, 0.0, 2000.0, 0.0, 0.0, 0.0]
+    declared = answered(STREAM, request, known)
+    assert (declared["status"], declared["radius"]) == ("infeasible", None)
+    assert declared["reason"]
+    asked = {"v": 1, "stream": declared["stream"], "body_wrench": [0.0, 0.0, 2500.0, 0.0, 0.0, 0.0]}
+    told = answered(SET_POINTS, asked, known)
+    assert (told["status"], told["verified"]) == ("infeasible", True)
+    assert told["utilisation"] is told["gap"] is told["hands"] is None
+
+
+WRONG = [
+    (("radius",), 0.0, "invalid", "radius"),
+    (("radius",), 1e5, "invalid", "radius"),
+    (("body_wrench",), [1.0] * 5, "invalid", "body_wrench"),
+    (("objective",), "max_margin", "invalid", "objective"),
+    (("limits",), {"tension_change": 5.0}, "unsupported", "limits.tension_change"),
+    (("limits",), {"utilisation": 2.0}, "invalid", "limits.utilisation"),
+    (("stance", "hands", 2, "wrist"), "floating", "unsupported", "stance.hands[2].wrist"),
+    (("stance", "hands", 1, "hold", "diameter"), -0.1, "invalid", "stance.hands[1].hold.diameter"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "kind", "field"), WRONG)
+def test_a_declaration_that_is_wrong_is_told_the_field(path, value, kind, field, known) -> None:
+    request = put(stream_request(), path, value)
+    told = answered(STREAM, request, known)
+    assert not told["good"]
+    assert (told["error"]["kind"], told["error"]["field"]) == (kind, field)
+
+
+@pytest.mark.parametrize(
+    ("request_", "field"),
+    [
+        ({"v": 1, "stream": "x"}, "body_wrench"),
+        ({"v": 1, "body_wrench": WRENCH}, "stream"),
+        ({"v": 1, "stream": "x", "body_wrench": [*WRENCH, 0.0]}, "body_wrench"),
+        ({"v": 1, "stream": "x", "body_wrench": [None] * 6}, "body_wrench[0]"),
+        ({"v": 1, "stream": "x", "body_wrench": WRENCH, "stance": {}}, "stance"),
+        ({"v": 1, "stream": "x", "body_wrench": WRENCH}, "stream"),
+    ],
+)
+def test_a_question_that_is_wrong_is_told_the_field(request_, field, known) -> None:
+    told = answered(SET_POINTS, request_, known)
+    assert not told["good"]
+    assert told["error"]["field"] == field
+
+
+def test_what_is_not_a_number_is_told_as_such(known) -> None:
+    request = {"v": 1, "stream": "x", "body_wrench": [*WRENCH[:5], float("nan")]}
+    answer = dispatch.handle(SET_POINTS, msgspec.msgpack.encode(request), MSGPACK, streams=known)
+    error = msgspec.msgpack.decode(answer.payload)["error"]
+    assert (error["field"], error["message"]) == (
+        "body_wrench[5]",
+        "must be a finite number, got nan",
+    )
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_the_hand_of_the_service_is_that_of_its_streams(form, known, tmp_path) -> None:
+    from hand_models.parameters import ParameterTable, Quantity
+
+    weak = ParameterTable(
+        {"structure": {"held_mass": Quantity(20.0, "kg", "assumed", "of a test")}}
+    )
+    used = []
+    for hand in (None, weak):
+        payload = Format.named(form).encode(stream_request())
+        answer = dispatch.handle(STREAM, payload, form, hand, streams=known)
+        declared = Format.named(form).decode(answer.payload, StreamReply)
+        used.append(declared.utilisation)
+    assert used[1] > used[0]
+
+
+# Command line -------------------------------------------------------------------------------------
+
+
+def given(monkeypatch: pytest.MonkeyPatch, *lines: object) -> None:
+    text = "".join(f"{line if isinstance(line, str) else json.dumps(line)}\n" for line in lines)
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
+
+
+HEAVIER = [9.81 * HEAVY, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("wrenches", "statuses", "code"),
+    [
+        ([WRENCH, WRENCH], ["optimal"] * 2, DONE),
+        ([HEAVIER, WRENCH], ["overloaded", "optimal"], OVERLOADED),
+        ([], [], DONE),
+    ],
+)
+def test_each_line_gives_a_line(wrenches, statuses, code, stance, monkeypatch, capfd) -> None:
+    given(monkeypatch, *wrenches, "")
+    path = stance(wall_request(LIGHT))
+    assert run(["stream", path, "--json"]) == code
+    out, err = capfd.readouterr()
+    assert err == ""
+    replies = [json.loads(line) for line in out.splitlines()]
+    assert [reply["status"] for reply in replies] == statuses
+    assert [reply["body_wrench"] for reply in replies] == wrenches
+    assert [len(hand["tensions"]) for reply in replies for hand in reply["hands"]] == (
+        [4] * 4 * len(wrenches)
+    )
+    given(monkeypatch, *wrenches)
+    assert run(["stream", path]) == code
+    out, err = capfd.readouterr()
+    header, *lines = out.splitlines()
+    assert err.count("\n") == 1
+    assert "within 30 N, 3 N·m of the first centre [490.5, " in err
+    assert "outer_left, inner_left, inner_right, outer_right" in err
+    assert "front_left [N]" in header
+    assert max(map(len, out.splitlines())) <= 100
+    assert [line.split()[0] for line in lines] == statuses
+    for line, reply in zip(lines, replies, strict=True):
+        cells = [line[start : start + 16] for start in range(36, len(line), 16)]
+        told = [[int(part) for part in cell.split("/")] for cell in cells]
+        assert told == [[round(part) for part in hand["tensions"]] for hand in reply["hands"]]
+
+
+def test_a_failure_is_worse_than_an_overload(stance, monkeypatch, capfd) -> None:
+    given(monkeypatch, HEAVIER, WRENCH)
+    answers = WrenchStream.set_points
+
+    def failing(self: WrenchStream, wrench: object) -> object:
+        if list(wrench) == WRENCH:
+            return no_set_points("failed", np.array(wrench), "a reason", verified=False)
+        return answers(self, wrench)
+
+    monkeypatch.setattr(WrenchStream, "set_points", failing)
+    assert run(["stream", stance(wall_request())]) == FAILED
+    assert capfd.readouterr().out.splitlines()[-1].endswith("a reason")
+
+
+@pytest.mark.parametrize("line", ["[1, 2]", "x", '{"v": 1}', "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
+def test_a_line_that_is_no_wrench_is_told_by_its_number(line, stance, monkeypatch, capfd) -> None:
+    path = stance(wall_request())
+    given(monkeypatch, "", line, WRENCH)
+    assert run(["stream", path, "--json"]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    error, reply = map(json.loads, out.splitlines())
+    assert err == ""
+    assert departures("ErrorReply", error) == []
+    assert (error["error"]["kind"], error["error"]["field"]) == ("malformed", "line 2")
+    assert error["error"]["message"].startswith("six finite numbers")
+    assert reply["body_wrench"] == WRENCH
+    given(monkeypatch, "", line, WRENCH)
+    assert run(["stream", path]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    assert len(out.splitlines()) == 2
+    assert err.splitlines()[1].startswith("crux: line 2: six finite numbers")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        (["-"], "STANCE"),
+        (["wall", "--radius", "0"], "--radius"),
+        (["wall-300-floating"], "stance.hands[1].wrist"),
+        (["no-such-stance"], "STANCE"),
+    ],
+)
+def test_what_cannot_be_streamed_is_bad_input(arguments, field, monkeypatch, capfd) -> None:
+    given(monkeypatch, WRENCH)
+    assert run(["stream", *arguments]) == BAD_INPUT
+    assert field in complaint(capfd)
+
+
+def test_another_objective_is_refused(stance, monkeypatch, capfd) -> None:
+    given(monkeypatch, WRENCH)
+    assert run(["stream", stance(wall_request() | {"objective": "min_effort"})]) == BAD_INPUT
+    assert "objective: min_effort is not for streams" in complaint(capfd)
+
+
+def test_a_line_is_answered_before_the_next_is_there() -> None:
+    """As a control loop asks: through pipes, one at a time."""
+    lines = iter([json.dumps(WRENCH).encode() + b"\n"])
+    assert list(stream_command._wrenches(lines)) == [(1, tuple(WRENCH))]
+    asked = process("stream", "wall", "--json", given=(json.dumps(WRENCH) + "\n").encode() * 3)
+    assert (asked.returncode, asked.stderr) == (0, b"")
+    assert len(asked.stdout.splitlines()) == 3

@@ -1,0 +1,93 @@
+"""Settled hands that the tests share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hand_models import (
+    Cylinder,
+    Edge,
+    Grasp,
+    InvalidInputError,
+    Plane,
+    Pose,
+    SettledHand,
+    Sphere,
+    SpinyHand,
+    Surface,
+    WrenchSpace,
+    spiny_hand,
+)
+from hand_models.parameters import ParameterTable, Quantity, hand_table
+from tests.suite.helpers.rocks import random_axes
+
+HAND = spiny_hand()
+ROCK = Surface.named("rock")
+PINCH = Grasp(outer_rotation=math.pi)
+
+
+def pinch(diameter: float = 0.3, surface: Surface = ROCK, **grasp) -> SettledHand:
+    """A hand that pinches a cylinder, seated."""
+    return HAND.settle(Cylinder(diameter), surface, Grasp(outer_rotation=math.pi, **grasp))
+
+
+def changed_hand(section: str, name: str, value: float | list[float]) -> SpinyHand:
+    """The SpinyHand with one number of its own."""
+    unit = hand_table().quantity(section, name).unit
+    own = {section: {name: Quantity(value, unit, "assumed", "of a test")}}
+    return SpinyHand(hand_table().replaced(ParameterTable(own)))
+
+
+def without_hand_load(space: WrenchSpace) -> WrenchSpace:
+    """The same set without its wrench rows, those of the whole hand's force."""
+    kept = len(space.s) - len(space.D)
+    return replace(
+        space,
+        rows=(*space.rows[:kept], *space.rows[len(space.s) :]),
+        L=space.L[:kept],
+        l0=space.l0[:kept],
+        s=space.s[:kept],
+        D=np.zeros((0, 6)),
+    )
+
+
+def random_surface(rng: np.random.Generator) -> Surface:
+    return Surface.from_values(
+        {
+            "shear_limit": rng.uniform(20.0, 120.0),
+            "pull_off_angle": rng.uniform(0.3, math.pi / 2),
+            "compression_gain": float(rng.choice([0.0, 0.2])),
+            "half_planes": int(rng.choice([1, 1, 1, 2, 3])),
+        }
+    )
+
+
+def random_hand(seed: int, lateral: bool | None = None) -> SettledHand:
+    """A hand on a random hold, seated or placed a little askew; closing may overload its tiles."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-1.0, 1.0)
+    kinds = (Plane(), Cylinder(size), Sphere(size), Edge(size / 4.0, rng.uniform(0.8, 3.0)))
+    hold = kinds[rng.choice(4, p=[0.15, 0.4, 0.25, 0.2])]
+    grasp = Grasp(
+        outer_rotation=float(rng.choice([0.0, math.pi, rng.uniform(0.0, math.pi)])),
+        closing_tension=float(rng.choice([37.0, rng.uniform(10.0, 60.0)])),
+        palm=bool(rng.random() < 0.8),
+        lateral=bool(rng.random() < 0.5) if lateral is None else lateral,
+    )
+    pose = None
+    if rng.random() < 0.5:
+        place = rng.uniform([-0.03, -0.02, 0.0], [0.05, 0.02, 0.008])
+        pose = Pose(place, random_axes(rng, 0.15))
+    surface = random_surface(rng)
+    return HAND.settle(hold, surface, grasp, pose)
+
+
+def settled_at(seed: int, lateral: bool | None = None) -> SettledHand | None:
+    """A random hand, or None where the hold stands in its palm."""
+    try:
+        return random_hand(seed, lateral)
+    except InvalidInputError:
+        return None
