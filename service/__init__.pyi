@@ -1,7 +1,14 @@
-from .replies import SetPointsRequest as SetPointsRequest, StreamRequest as StreamRequest
+from .processes import Planners as Planners, plan_many as plan_many
 from .requests import (
     BodySpaceRequest as BodySpaceRequest,
     PlanRequest as PlanRequest,
+    SetPointsRequest as SetPointsRequest,
+    StreamRequest as StreamRequest,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .serving import CruxClient as CruxClient
+from .wire import (
+    NoServiceError as NoServiceError,
+    ServiceError as ServiceError,
+    ServiceTimeout as ServiceTimeout,
+)

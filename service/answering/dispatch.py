@@ -24,16 +24,14 @@ from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question, stance
 from service.answering.streams import STREAMS, Streams
-from service.replies import (
-    BodySpaceReply,
-    PlanReply,
-    SetPointsReply,
+from service.replies import BodySpaceReply, PlanReply, SetPointsReply, StreamReply, WrenchSpaceReply
+from service.requests import (
+    BodySpaceRequest,
+    PlanRequest,
     SetPointsRequest,
-    StreamReply,
     StreamRequest,
-    WrenchSpaceReply,
+    WrenchSpaceRequest,
 )
-from service.requests import BodySpaceRequest, PlanRequest, WrenchSpaceRequest
 from service.wire import (
     BODY_SPACE,
     PLAN,

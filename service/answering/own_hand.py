@@ -16,8 +16,13 @@ import msgspec
 from hand_models.base import InvalidInputError
 from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable, load_own_hand, own_hand
-from service.replies import StreamRequest
-from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
+from service.requests import (
+    BodySpaceRequest,
+    PlanRequest,
+    RouteRequest,
+    StreamRequest,
+    WrenchSpaceRequest,
+)
 
 __all__ = ["over_default", "read_hand", "with_hand"]
 

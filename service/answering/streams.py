@@ -13,15 +13,8 @@ from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
-from service.replies import (
-    HandColumns,
-    HandSetPoints,
-    SetPointsReply,
-    SetPointsRequest,
-    StreamReply,
-    StreamRequest,
-)
-from service.requests import PlanRequest
+from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
+from service.requests import PlanRequest, SetPointsRequest, StreamRequest
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
 

@@ -17,8 +17,8 @@ from hand_models.parameters import ParameterTable
 from service.commands.options import asked, hand_option, json_option, robot_option
 from service.commands.stances import read_request
 from service.commands.terminal import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
-from service.replies import ErrorDetail, ErrorReply, SetPointsReply, StreamRequest
-from service.requests import PlanRequest, Wrench
+from service.replies import ErrorDetail, ErrorReply, SetPointsReply
+from service.requests import PlanRequest, StreamRequest, Wrench
 from service.wire import MalformedError
 
 if TYPE_CHECKING:

@@ -31,9 +31,7 @@ from .stream import (
     HandColumns as HandColumns,
     HandSetPoints as HandSetPoints,
     SetPointsReply as SetPointsReply,
-    SetPointsRequest as SetPointsRequest,
     StreamReply as StreamReply,
-    StreamRequest as StreamRequest,
 )
 from .wrench_set import Generator as Generator, Row as Row, WrenchSet as WrenchSet
 from .wrench_space import (

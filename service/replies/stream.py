@@ -1,50 +1,12 @@
-"""What travels of a wrench stream: a stance is declared once, then asked for set-points."""
+"""What a wrench stream says: what was declared, and the set-points of body wrenches."""
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from service.replies.reply import Reply, Vector
-from service.requests import Limits, Load, Name, Request, Stance, Wrench
 
-__all__ = [
-    "HandColumns",
-    "HandSetPoints",
-    "SetPointsReply",
-    "SetPointsRequest",
-    "StreamReply",
-    "StreamRequest",
-]
-
-Radius = Annotated[
-    float,
-    Meta(
-        gt=0.0,
-        le=1e4,
-        description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
-    ),
-]
-
-
-class StreamRequest(Request, frozen=True, kw_only=True):
-    """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
-
-    stance: Stance
-    body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
-        None
-    )
-    load: Load | None = None
-    limits: Limits = Limits()
-    radius: Radius = 30.0
-
-
-class SetPointsRequest(Request, frozen=True, kw_only=True):
-    """Asks a stream for the set-points of a body wrench."""
-
-    stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
-    body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
+__all__ = ["HandColumns", "HandSetPoints", "SetPointsReply", "StreamReply"]
 
 
 class HandColumns(Struct, kw_only=True):

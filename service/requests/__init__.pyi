@@ -30,3 +30,4 @@ from .spaces import (
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .stance import Grasp as Grasp, Hand as Hand, Stance as Stance
+from .stream import SetPointsRequest as SetPointsRequest, StreamRequest as StreamRequest

@@ -15,12 +15,17 @@ from service.replies import (
     PlanReply,
     Reply,
     SetPointsReply,
-    SetPointsRequest,
     StreamReply,
-    StreamRequest,
     WrenchSpaceReply,
 )
-from service.requests import BodySpaceRequest, PlanRequest, Request, WrenchSpaceRequest
+from service.requests import (
+    BodySpaceRequest,
+    PlanRequest,
+    Request,
+    SetPointsRequest,
+    StreamRequest,
+    WrenchSpaceRequest,
+)
 from service.serving.config import open_session
 from service.wire import (
     BODY_SPACE,

@@ -12,12 +12,17 @@ from service.replies import (
     ErrorReply,
     PlanReply,
     SetPointsReply,
-    SetPointsRequest,
     StreamReply,
-    StreamRequest,
     WrenchSpaceReply,
 )
-from service.requests import BodySpaceRequest, PlanRequest, RouteRequest, WrenchSpaceRequest
+from service.requests import (
+    BodySpaceRequest,
+    PlanRequest,
+    RouteRequest,
+    SetPointsRequest,
+    StreamRequest,
+    WrenchSpaceRequest,
+)
 
 __all__ = ["MESSAGES", "schema"]
 

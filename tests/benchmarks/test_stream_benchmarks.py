@@ -14,7 +14,8 @@ from planner.streaming import WrenchStream
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.stream_stance import StreamStance
 from service.answering import Streams, dispatch
-from service.replies import SetPointsReply, SetPointsRequest, StreamReply
+from service.replies import SetPointsReply, StreamReply
+from service.requests import SetPointsRequest
 from service.wire import SET_POINTS, STREAM
 from tests.service.serving.test_stream_service import stream_request
 from tests.suite.helpers.stances import ask, on_wall

@@ -1,0 +1,98 @@
+"""The house: rooms of few modules, indices that load lazily and hide nothing, imports of old."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.suite.helpers.checkout import ROOT
+
+PACKAGES = ("hand_models", "planner", "service")
+ROOMS = sorted(
+    path.parent for package in PACKAGES for path in (ROOT / package).glob("*/__init__.pyi")
+)
+INDICES = [*(ROOT / package for package in PACKAGES), *ROOMS]
+MODULES = 14
+LINES = 400
+
+
+def dotted(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
+
+
+def exported(index: Path) -> dict[str, str]:
+    """Names that an index exports, and the modules or rooms that it has them from."""
+    tree = ast.parse((index / "__init__.pyi").read_text("utf-8"))
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    assert len(imports) == len(tree.body)
+    names = [(alias, node) for node in imports for alias in node.names]
+    assert all(alias.asname == alias.name and node.level == 1 for alias, node in names)
+    found = {alias.name: f"{dotted(index)}.{node.module}" for alias, node in names}
+    assert len(found) == len(names)
+    return found
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=dotted)
+def test_a_room_is_a_dozen_modules_of_one_concept_each(room):
+    modules = [path for path in room.glob("*.py") if path.name != "__init__.py"]
+    assert 1 <= len(modules) <= MODULES
+    for module in modules:
+        assert len(module.read_text("utf-8").splitlines()) <= LINES, module
+
+
+@pytest.mark.parametrize("index", INDICES, ids=dotted)
+def test_what_an_index_exports_is_what_the_module_defines_and_no_module_hides_it(index):
+    package = importlib.import_module(dotted(index))
+    names = exported(index)
+    assert names
+    assert sorted(package.__all__) == sorted(names)
+    for name, module in names.items():
+        assert getattr(package, name) is getattr(importlib.import_module(module), name)
+        assert not (index / f"{name}.py").exists()
+        assert not (index / name / "__init__.py").exists()
+
+
+def test_every_room_has_an_index():
+    found = {path for package in PACKAGES for path in (ROOT / package).iterdir() if path.is_dir()}
+    others = {"__pycache__", "examples", "parameters"}
+    assert {path for path in found if path.name not in others} | {
+        ROOT / "hand_models" / "parameters"
+    } == set(ROOMS)
+
+
+@pytest.mark.parametrize(
+    ("statement", "absent"),
+    [
+        ("from hand_models import Pose", ("scipy", "trimesh", "hand_models.hand", "matplotlib")),
+        ("from planner import Load, Limits", ("cvxpy", "clarabel", "planner.solving")),
+        ("from service import PlanRequest", ("cvxpy", "zenoh", "planner", "hand_models.hand")),
+        ("from service import CruxClient", ("cvxpy", "pinocchio", "planner.solving")),
+    ],
+)
+def test_importing_a_name_does_not_load_the_house(statement, absent):
+    code = f"import sys; {statement}; print([n for n in {absent!r} if n in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("old", "room", "names"),
+    [
+        ("hand_models.wrist_inverse", "hand_models.compliance", ("wrist_pose",)),
+        ("hand_models.wrist_limit", "hand_models.compliance", ("farthest",)),
+        ("service.many", "service", ("Planners", "plan_many")),
+        ("service.config", "service.serving", ("zenoh_config",)),
+        ("service.errors", "service", ("NoServiceError", "ServiceError", "ServiceTimeout")),
+    ],
+)
+def test_imports_of_old_give_the_same(old, room, names):
+    before, now = importlib.import_module(old), importlib.import_module(room)
+    for name in names:
+        assert getattr(before, name) is getattr(now, name)
