@@ -45,7 +45,7 @@ from service.commands.terminal import (
     say,
     waiting,
 )
-from service.commands.zenoh import demo, query, serve
+from service.commands.network import demo, query, serve
 from service.replies import PlanReply
 from service.requests import PlanRequest
 from service.wire import REQUEST_KINDS, schema as message_schema
