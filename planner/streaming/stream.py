@@ -192,12 +192,12 @@ class WrenchStream:
         """Return loads, and what they do, as set-points, checked."""
         stance, check = self._stance, self._stance.check
         wrenches, utilisation = read
-        used = max(utilisation, check.idle)
+        used = float(max(utilisation, check.idle))
         return SetPoints(
             status="optimal" if used <= stance.cap + SLACK else "overloaded",
             body_wrench=wrench,
             utilisation=used,
-            gap=max(used - max(bound, check.idle), 0.0),
+            gap=float(max(used - max(bound, check.idle), 0.0)),
             tensions=loads[:, : len(FINGERS)],
             wrenches=wrenches,
             loads=loads,

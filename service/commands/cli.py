@@ -19,6 +19,7 @@ from hand_models import studies
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable, own_hand
 from service.commands.batch import batch
+from service.commands.network import demo, query, serve
 from service.commands.options import (
     asked,
     folder_option,
@@ -45,7 +46,6 @@ from service.commands.terminal import (
     say,
     waiting,
 )
-from service.commands.network import demo, query, serve
 from service.replies import PlanReply
 from service.requests import PlanRequest
 from service.wire import REQUEST_KINDS, schema as message_schema
