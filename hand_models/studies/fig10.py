@@ -87,7 +87,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     progress(2, steps)
     gaps = _gaps(surface)
     progress(3, steps)
-    hull = _hull_over_surface(surface)
+    hull = hull_over_surface(surface)
     lateral = fit_lateral(array, limit)
     progress(4, steps)
     data: dict[str, Any] = {
@@ -193,8 +193,13 @@ def _gaps(surface: Surface) -> list[dict[str, float]]:
     return gaps
 
 
-def _hull_over_surface(surface: Surface) -> float:
-    """Return the volume of the surface's convex hull over its own, for T ≥ 0 and N ≤ 0."""
+def hull_over_surface(surface: Surface) -> float:
+    """Return the volume of a surface's convex hull over its own, for T ≥ 0 and N ≤ 0.
+
+    Parameters
+    ----------
+    surface : Surface
+    """
     angle, azimuth = np.meshgrid(
         np.linspace(0.0, math.pi / 2, 181), np.linspace(-math.pi / 2, math.pi / 2, 181)
     )

@@ -10,11 +10,12 @@ from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
-__all__ = ["Overlap", "begin_overlap"]
+__all__ = ["Overlap", "begin_overlap", "waiting"]
 
 T = TypeVar("T")
 
-_waiting: Final[ContextVar[Overlap[Any] | None]] = ContextVar("waiting", default=None)
+waiting: Final[ContextVar[Overlap[Any] | None]] = ContextVar("waiting", default=None)
+"""What the next solver of the context begins."""
 
 
 class Overlap(Generic[T]):
@@ -24,14 +25,19 @@ class Overlap(Generic[T]):
     ----------
     work : callable
         Safe to call from another thread.
+
+    Attributes
+    ----------
+    begun : Future or None
+        The work, once a solver has begun it.
     """
 
     def __init__(self, work: Callable[[], T]) -> None:
         self._work = work
-        self._begun: Future[T] | None = None
+        self.begun: Future[T] | None = None
 
     def __enter__(self) -> Self:
-        _waiting.set(self)
+        waiting.set(self)
         return self
 
     def __exit__(
@@ -40,23 +46,23 @@ class Overlap(Generic[T]):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        _waiting.set(None)
+        waiting.set(None)
 
     def result(self) -> T:
         """Return what comes of it; raises what it raises."""
-        begun = self._begun
+        begun = self.begun
         # what still waits for the other thread is sooner done here
         return self._work() if begun is None or begun.cancel() else begun.result()
 
 
 def begin_overlap() -> None:
     """Begin what waits for a solver to run, which is just about to."""
-    waiting = _waiting.get()
-    if waiting is not None:
-        _waiting.set(None)
+    overlap = waiting.get()
+    if overlap is not None:
+        waiting.set(None)
         # at the interpreter's end there are no more threads
         with suppress(RuntimeError):
-            waiting._begun = _threads[0].submit(waiting._work)
+            overlap.begun = _threads[0].submit(overlap._work)
 
 
 def _new() -> ThreadPoolExecutor:

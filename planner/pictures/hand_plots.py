@@ -25,7 +25,7 @@ from hand_models.wrench_spaces import WrenchSpace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_wrench_space"]
+__all__ = ["direction_in_words", "draw_fingers", "plot_wrench_space"]
 
 COMPONENTS: Final = (
     ("F_x", "N"),
@@ -100,7 +100,7 @@ def plot_wrench_space(
     upper = rows[0, 0]
     grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.4))
     fingers = [upper.add_subplot(grid[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1))]
-    _draw_fingers(fingers, settled, tensions)
+    draw_fingers(fingers, settled, tensions)
     _draw_from_above(upper.add_subplot(grid[:, 2]), settled)
     seating = settled.seating.rule.replace("_", " ")
     held = f"closing tension of {settled.closing_tension:g} N"
@@ -128,8 +128,17 @@ def _listed(tensions: Array) -> str:
 # Fingers in their planes ------------------------------------------------------------------------
 
 
-def _draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> None:
-    """Draw every finger, its tiles loaded by the four tensions."""
+def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> None:
+    """Draw every finger in its own plane, its tiles loaded by the four tensions.
+
+    Parameters
+    ----------
+    panels : list of Axes
+        Of inner_left, outer_left, inner_right and outer_right.
+    settled : SettledHand
+    tensions : ndarray, shape (4,)
+        [N]
+    """
     loads = settled.tile_loads(tensions)
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
     chains = np.vstack([_chain(finger) for finger in settled.fingers])
@@ -193,7 +202,7 @@ def _draw_finger(
         low[0] + 8.0, low[1] + 11.0, f"{largest:.0f} N", va="top", color="tab:red", fontsize=8
     )
     axes.set(
-        title=f"{FINGERS[index].replace('_', ' ')}: plane {_direction(frame.along)}",
+        title=f"{FINGERS[index].replace('_', ' ')}: plane {direction_in_words(frame.along)}",
         xlabel="along the finger, from its proximal joint [mm]" if below else "",
         ylabel="into the rock, from the joint [mm]",
         xlim=(low[0], high[0]),
@@ -271,8 +280,14 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
         )  # fmt: skip
 
 
-def _direction(along: Array) -> str:
-    """Return a horizontal direction of H in words."""
+def direction_in_words(along: Array) -> str:
+    """Return a horizontal direction of H in words.
+
+    Parameters
+    ----------
+    along : ndarray, shape (3,)
+        In H.
+    """
     angle = math.degrees(math.atan2(float(along[1]), float(along[0])))
     for name, where in (("x", 0.0), ("y", 90.0), ("−y", -90.0)):
         if abs(angle - where) < 0.05:

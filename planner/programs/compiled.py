@@ -30,7 +30,7 @@ from planner import deadline
 from planner.programs.conic_extent import Extent, Layout, PaddedProgram
 from planner.programs.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
 
-__all__ = ["OUT_OF_TIME", "Compiled", "Solution"]
+__all__ = ["OUT_OF_TIME", "Compiled", "Solution", "Solver"]
 
 KEPT: Final = 32
 """Solvers that wait for queries of one problem."""
@@ -94,6 +94,14 @@ class Compiled:
     settings : sequence of mapping of str to value
         Of Clarabel. Later ones are tried, on a new solver, where those before come to no end; the
         first must let a solver be updated (no presolve, no chordal decomposition).
+
+    Attributes
+    ----------
+    parameters : sequence of Parameter
+    map : ConeMap or None
+        The conic program; None where CVXPY's internals have changed.
+    idle : list of Solver
+        Those that wait for queries, the last used last; `KEPT` at most.
     """
 
     def __init__(
@@ -108,7 +116,7 @@ class Compiled:
         self._settings = settings
         self._variables, self._constraints = variables, constraints
         self._lock = threading.Lock()
-        self._idle: list[_Solver] = []
+        self.idle: list[Solver] = []
         self._layouts: Recent[Extent, Layout] = Recent(LAYOUTS)
         self.map: ConeMap | None = None
         try:
@@ -144,22 +152,31 @@ class Compiled:
                 layout = self._layout(values, extent)
                 query = _Query(layout)
                 query.take(values)
-                solution = _Solver(extent, layout, chosen, query).solve()
+                solution = Solver(extent, layout, chosen, query).solve()
             ended = solution.status in (cp.OPTIMAL, cp.INFEASIBLE, cp.UNBOUNDED, OUT_OF_TIME)
             if ended or deadline.expired():
                 break
         return solution
 
     def _fast(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> Solution:
-        solver = self._ready(values, extent, settings)
+        solver = self.ready(values, extent, settings)
         solution = solver.solve()
         # one that has met what is no number, or was interrupted, may not forget it
         if solution.status != cp.SOLVER_ERROR:
-            self._put_back(solver)
+            self.put_back(solver)
         return solution
 
-    def _ready(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> _Solver:
-        """Return a solver that has taken the values over."""
+    def ready(self, values: Values, extent: Extent, settings: Mapping[str, Any]) -> Solver:
+        """Return a solver that has taken the values over; it no longer waits for queries.
+
+        Parameters
+        ----------
+        values : sequence
+            As in `solve`.
+        extent : Extent
+        settings : mapping of str to value
+            Of Clarabel.
+        """
         idle = self._take_idle(extent, lambda solver: 1 + solver.query.knows(values))
         query = _Query(self._layout(values, extent)) if idle is None else idle.query
         changed = query.take(values)
@@ -168,28 +185,29 @@ class Compiled:
                 idle.update(changed)
                 return idle
             idle.query = _Query(idle.layout)
-            self._put_back(idle)
+            self.put_back(idle)
             other = self._take_idle(extent, lambda solver: solver.pattern == query.pattern)
             if other is not None:
                 other.turn_to(query)
                 return other
-        return _Solver(extent, query.layout, settings, query)
+        return Solver(extent, query.layout, settings, query)
 
-    def _take_idle(self, extent: Extent, merit: Callable[[_Solver], int]) -> _Solver | None:
+    def _take_idle(self, extent: Extent, merit: Callable[[Solver], int]) -> Solver | None:
         """Take the solver of that extent with the most merit, the last used of such, if any has."""
         with self._lock:
             found, most = None, 0
-            for solver in reversed(self._idle):
+            for solver in reversed(self.idle):
                 if solver.extent == extent and (its := merit(solver)) > most:
                     found, most = solver, its
             if found is not None:
-                self._idle.remove(found)
+                self.idle.remove(found)
             return found
 
-    def _put_back(self, solver: _Solver) -> None:
+    def put_back(self, solver: Solver) -> None:
+        """Let a solver wait for queries again."""
         with self._lock:
-            self._idle.append(solver)
-            del self._idle[:-KEPT]
+            self.idle.append(solver)
+            del self.idle[:-KEPT]
 
     def _layout(self, values: Values, extent: Extent) -> Layout:
         """Return the conic program of an extent, found once."""
@@ -269,7 +287,7 @@ class _Query:
         return changed
 
 
-class _Solver:
+class Solver:
     """A solver with what it was given last, set up for a pattern of data.
 
     Parameters

@@ -33,6 +33,7 @@ from planner.programs.stance_program import StanceProgram
 __all__ = [
     "SLACK",
     "build_ahead",
+    "building",
     "built",
     "curved",
     "effort",
@@ -74,7 +75,7 @@ def built(kind: type[P], shape: Shape, *further: int) -> P | None:
 def _awaited(kind: type[P], shape: Shape, *further: int) -> P | None:
     """Return the program for that very shape; None if the deadline comes before."""
     try:
-        program = _built(kind, shape, *further).result(deadline.left())
+        program = building(kind, shape, *further).result(deadline.left())
     except TimeoutError:
         return None
     assert isinstance(program, kind)
@@ -82,7 +83,16 @@ def _awaited(kind: type[P], shape: Shape, *further: int) -> P | None:
 
 
 @lru_cache(maxsize=128)
-def _built(kind: type[StanceProgram], shape: Shape, *further: int) -> Future[StanceProgram]:
+def building(kind: type[StanceProgram], shape: Shape, *further: int) -> Future[StanceProgram]:
+    """Begin to build the program for that very shape, once; return what will be it.
+
+    Parameters
+    ----------
+    kind : type of StanceProgram
+    shape : Shape
+    *further : int
+        Of the kind, beside the shape.
+    """
     return _builders[0].submit(kind, shape, *further)
 
 
@@ -94,13 +104,13 @@ def build_ahead(hands: int) -> None:
     for count in range(hands, 0, -1):
         room = Shape(6, (ROOM,) * count)
         for kind in (Unique, LoadFactor):
-            _built(kind, room)
+            building(kind, room)
 
 
 def _after_fork() -> None:
     """Begin anew in a forked process: threads, and what they held, did not come along."""
     _builders[0] = ThreadPoolExecutor(1, "program-builder")
-    _built.cache_clear()
+    building.cache_clear()
 
 
 if hasattr(os, "register_at_fork"):

@@ -113,7 +113,7 @@ class StanceProgram(ABC):
             Values of the variables `further`; empty where there is no solution.
         """
         hands = data.hands
-        found = self.compiled.solve(self.values(data, *own), self._extent(data.shape))
+        found = self.compiled.solve(self.values(data, *own), self.extent(data.shape))
         solved = found.status in SOLVED and math.isfinite(found.value)
         duals, first = found.multipliers, 1 + len(self.limits)
         outcome = Outcome(
@@ -130,8 +130,14 @@ class StanceProgram(ABC):
         )
         return outcome, list(found.variables[len(hands) :]) if solved else []
 
-    def _extent(self, shape: Shape) -> Extent:
-        """Return how much there is of variables and constraints for a shape."""
+    def extent(self, shape: Shape) -> Extent:
+        """Return how much there is of variables and constraints for a shape.
+
+        Parameters
+        ----------
+        shape : Shape
+            For which the program has room.
+        """
         loads, limits, hard = [], [], []
         for m, nl, nh, _ in shape.hands:
             loads.append(m)

@@ -27,6 +27,7 @@ from hand_models.hand import FINGERS
 from planner.programs import SLACK
 from planner.question import Question, moderate
 from planner.result import SetPoints, SetPointSource, no_set_points
+from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
 from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
 
@@ -97,10 +98,15 @@ class WrenchStream:
         return self._stance.first
 
     @property
+    def newest(self) -> Interpolation | None:
+        """The newest interpolation; None where there is none."""
+        with self._lock:
+            return self._following.newest
+
+    @property
     def interpolates(self) -> float | None:
         """Radius of the newest interpolation [N]; None where there is none."""
-        with self._lock:
-            newest = self._following.newest
+        newest = self.newest
         return None if newest is None else newest.radius
 
     def __enter__(self) -> Self:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
     from planner.streaming import WrenchStream
 
-__all__ = ["stream"]
+__all__ = ["stream", "wrenches"]
 
 WORST_FIRST: Final = (BAD_INPUT, FAILED, OVERLOADED, DONE)
 """Exit statuses: that of a stream is the worst of its lines'."""
@@ -77,7 +77,7 @@ def stream(
     with opened(request, robots_of(robot)) as source:
         if not as_json:
             _say_columns(source)
-        for number, wrench in _wrenches(sys.stdin.buffer):
+        for number, wrench in wrenches(sys.stdin.buffer):
             start = time.perf_counter()
             try:
                 if isinstance(wrench, MalformedError):
@@ -116,8 +116,21 @@ def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
     )
 
 
-def _wrenches(lines: Iterable[bytes]) -> Iterator[tuple[int, Wrench | MalformedError]]:
-    """Yield the number of each line that is not blank, and its wrench, as soon as it is there."""
+def wrenches(lines: Iterable[bytes]) -> Iterator[tuple[int, Wrench | MalformedError]]:
+    """Yield the number of each line that is not blank, and its wrench, as soon as it is there.
+
+    Parameters
+    ----------
+    lines : iterable of bytes
+        Of JSON.
+
+    Yields
+    ------
+    number : int
+        From 1.
+    wrench : Wrench or MalformedError
+        What is wrong, where the line is no body wrench.
+    """
     for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue

@@ -21,7 +21,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
-__all__ = ["Lost", "Workers", "cores"]
+__all__ = ["Lost", "Worker", "Workers", "cores"]
 
 log = logging.getLogger(__name__)
 
@@ -81,14 +81,20 @@ class Workers(Generic[T, R]):
         results can be pickled. What it raises ends its process.
     count : int
         How many processes.
+
+    Attributes
+    ----------
+    running : list of Worker
+        Those that have been started and are not known to have died.
+    stillborn : int
+        Processes in a row that have died before they were ready.
     """
 
     def __init__(self, make: Callable[[], Callable[[T], R]], count: int) -> None:
         self._make = make
         self._count = max(1, count)
-        self._all: list[_Worker[T, R]] = []
-        self._stillborn = 0
-        """Processes in a row that have died before they were ready."""
+        self.running: list[Worker[T, R]] = []
+        self.stillborn = 0
 
     def __enter__(self) -> Self:
         self._hire()
@@ -100,20 +106,20 @@ class Workers(Generic[T, R]):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        for worker in self._all:
+        for worker in self.running:
             worker.pipe.close()
         until = time.monotonic() + PATIENCE
-        for worker in self._all:
+        for worker in self.running:
             worker.end(until)
-        self._all.clear()
+        self.running.clear()
 
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
-        for worker in [worker for worker in self._all if not worker.ready]:
+        for worker in [worker for worker in self.running if not worker.ready]:
             if worker.take() is None:
                 self._dismiss(worker)
             else:
-                self._stillborn = 0
+                self.stillborn = 0
 
     def each(
         self, items: Sequence[T], here: Callable[[T], R] | None = None
@@ -131,13 +137,13 @@ class Workers(Generic[T, R]):
         tried: set[int] = set()
         again: deque[int] = deque()
         try:
-            while todo or again or any(worker.hand for worker in self._all):
+            while todo or again or any(worker.hand for worker in self.running):
                 self._hire()
-                if not self._all and (here is None or not todo):
+                if not self.running and (here is None or not todo):
                     for i in (*todo, *again):
                         yield i, Lost(NO_START)
                     return
-                for worker in self._all:
+                for worker in self.running:
                     if worker.idle and again and not todo:
                         worker.give([(i := again.popleft(), items[i])])
                     # the next ones are there before these are done
@@ -148,15 +154,15 @@ class Workers(Generic[T, R]):
                 if here is not None and todo:
                     i = todo.popleft()
                     yield i, here(items[i])
-                if not self._all:
+                if not self.running:
                     continue
-                owed = bool(again) or any(worker.hand for worker in self._all)
+                owed = bool(again) or any(worker.hand for worker in self.running)
                 block = owed and not todo if here is not None else True
-                for pipe in wait([worker.pipe for worker in self._all], None if block else 0.0):
-                    worker = next(each for each in self._all if each.pipe is pipe)
+                for pipe in wait([worker.pipe for worker in self.running], None if block else 0.0):
+                    worker = next(each for each in self.running if each.pipe is pipe)
                     done = worker.take()
                     if done is not None:
-                        self._stillborn = 0
+                        self.stillborn = 0
                         yield from done
                         continue
                     self._dismiss(worker)
@@ -168,25 +174,41 @@ class Workers(Generic[T, R]):
                             again.append(i)
         finally:
             # what nobody waits for any more
-            for worker in [worker for worker in self._all if worker.hand]:
+            for worker in [worker for worker in self.running if worker.hand]:
                 self._dismiss(worker)
 
     def _hire(self) -> None:
-        while len(self._all) < self._count and self._stillborn < STARTS:
-            self._all.append(_Worker(self._make))
+        while len(self.running) < self._count and self.stillborn < STARTS:
+            self.running.append(Worker(self._make))
 
-    def _dismiss(self, worker: _Worker[T, R]) -> None:
-        self._all.remove(worker)
-        self._stillborn += not worker.ready
-        if self._stillborn == STARTS and not worker.ready:
+    def _dismiss(self, worker: Worker[T, R]) -> None:
+        self.running.remove(worker)
+        self.stillborn += not worker.ready
+        if self.stillborn == STARTS and not worker.ready:
             log.warning(NO_START)
         worker.pipe.close()
         worker.process.kill()
         worker.process.join()
 
 
-class _Worker(Generic[T, R]):
-    """One process, and what it has in hand."""
+class Worker(Generic[T, R]):
+    """One process, and what it has in hand.
+
+    Parameters
+    ----------
+    make : callable
+        As in `Workers`.
+
+    Attributes
+    ----------
+    process : Process
+    pipe : Connection
+        To it.
+    ready : bool
+        Whether it has said that it can work.
+    hand : set of int
+        Indices of the items that it has not returned.
+    """
 
     def __init__(self, make: Callable[[], Callable[[T], R]]) -> None:
         context = multiprocessing.get_context("spawn")

@@ -59,6 +59,15 @@ class PlanService:
         The robot that is planned for; RoboSimian by default.
     hand : ParameterTable, optional
         Entries in which its hands are not the bundled one; a request's own go on top.
+
+    Attributes
+    ----------
+    robot : str
+        Its name.
+    keys : tuple of str
+        That it answers at.
+    turn : Lock
+        Held by the one question that is answered.
     """
 
     def __init__(
@@ -73,7 +82,7 @@ class PlanService:
         self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
         self._alive = service_key(self.robot, ALIVE)
         self._session = session
-        self._answering = threading.Lock()
+        self.turn = threading.Lock()
         self._streams = Streams()
         self._threads: list[threading.Thread] = []
         self._queryables: list[zenoh.Queryable[Handler[zenoh.Query]]] = []
@@ -137,7 +146,7 @@ class PlanService:
             self._hand,
             self._robots,
             started=started,
-            turn=self._answering,
+            turn=self.turn,
             streams=self._streams,
         )
         if answer.good:

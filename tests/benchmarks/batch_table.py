@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 
-from planner.deadline import overlap as beside
+from planner import deadline
 from planner.solving import plan
 from service.processes import Planners
 from tests.benchmarks.measured_stances import question_of, request
@@ -59,11 +59,11 @@ def batches(rounds: int, tick: Callable[[], object]) -> Race:
         kept = [[request(i, twin=1) for i in numbers(k)] for k in range(rounds + WARM)]
 
         def one_core(number: int) -> None:
-            begin, beside.begin_overlap = beside.begin_overlap, lambda: None
+            begin, deadline.begin_overlap = deadline.begin_overlap, lambda: None
             try:
                 alone.plan_many(kept[number])
             finally:
-                beside.begin_overlap = begin
+                deadline.begin_overlap = begin
 
         ways[ONE_CORE, 1] = one_core
         return race(ways, rounds, tick)

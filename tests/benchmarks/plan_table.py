@@ -181,7 +181,7 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         return replace(question, stance=replace(question.stance, hands=hands))
 
     def compiled(number: int) -> None:
-        solvers._built.cache_clear()
+        solvers.building.cache_clear()
         plan(late[number])
 
     def heavy(number: int, twin: int, deadline: float | None) -> Question:

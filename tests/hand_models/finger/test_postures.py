@@ -8,7 +8,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Edge, Ellipsoid, Sphere
-from hand_models.finger import OpenFinger, close_all, settle_finger as settle_one
+from hand_models.finger import OpenFinger, close_all, settle_finger
 from hand_models.finger.contact_states import close
 from hand_models.finger.limit_postures import PATTERNS, at_limits
 from hand_models.finger.posture_loads import TendonBatch, left_torque, loads
@@ -63,7 +63,7 @@ def test_many_fingers_settle_as_each_does(seed):
     with np.errstate(invalid="ignore", divide="ignore"):
         fingers = settle_fingers(MODEL, section_rows(sections), len(sections))
     for i, section in enumerate(sections):
-        assert_alike(fingers.finger(MODEL, i), settle_one(MODEL, section, (0.0, 0.0)))
+        assert_alike(fingers.finger(MODEL, i), settle_finger(MODEL, section, (0.0, 0.0)))
 
 
 @settings(max_examples=100, deadline=None)

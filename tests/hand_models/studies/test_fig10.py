@@ -122,4 +122,4 @@ def test_the_gap_of_each_number_of_half_planes_is_told(study):
 
 def test_the_hull_of_a_ball_has_no_more_volume():
     ball = Surface(10.0, 10.0, math.pi / 2, 10.0, 0.0)
-    assert fig10._hull_over_surface(ball) == pytest.approx(1.0, abs=2e-3)
+    assert fig10.hull_over_surface(ball) == pytest.approx(1.0, abs=2e-3)

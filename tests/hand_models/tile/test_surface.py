@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from hand_models import InvalidInputError, Surface
 from hand_models.tile import (
     bounds_gap,
-    directional_strength as reach_of,
+    directional_strength,
     inner_half_planes,
     outer_half_planes,
     surface_names,
@@ -219,8 +219,8 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
     surface = replace(Surface.named(name), half_planes=count)
     directions = random_directions(100_000)
     exact = boat(surface, directions)
-    assert (reach_of(inner_half_planes(surface), directions) <= exact).all()
-    assert (reach_of(outer_half_planes(surface), directions) >= exact).all()
+    assert (directional_strength(inner_half_planes(surface), directions) <= exact).all()
+    assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
 
 
 @settings(max_examples=150, deadline=None)
@@ -228,8 +228,12 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
-    assert (reach_of(inner_half_planes(surface), directions) <= exact * (1.0 + 1e-9)).all()
-    assert (reach_of(outer_half_planes(surface), directions) >= exact * (1.0 - 1e-9)).all()
+    assert (
+        directional_strength(inner_half_planes(surface), directions) <= exact * (1.0 + 1e-9)
+    ).all()
+    assert (
+        directional_strength(outer_half_planes(surface), directions) >= exact * (1.0 - 1e-9)
+    ).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -242,7 +246,7 @@ def test_no_bound_could_be_nearer_to_the_surface(surface):
     for piece in outer_half_planes(surface):
         loads = points @ [piece.a_shear, -piece.a_normal, piece.a_lateral]
         assert loads.max() >= piece.capacity * 0.97
-    inner = reach_of(inner_half_planes(surface), directions)
+    inner = directional_strength(inner_half_planes(surface), directions)
     slack = inner / np.linalg.norm(points, axis=1)
     assert slack.max() >= 0.97
 
@@ -276,7 +280,8 @@ def test_what_one_straight_line_costs_sideways():
     rock = Surface.named("rock")
     sideways = np.array([[0.0, 0.0, 1.0]])
     reaches = [
-        reach_of(inner_half_planes(replace(rock, half_planes=k)), sideways)[0] for k in (1, 2, 4, 8)
+        directional_strength(inner_half_planes(replace(rock, half_planes=k)), sideways)[0]
+        for k in (1, 2, 4, 8)
     ]
     assert np.array(reaches) / 63.0 == pytest.approx([0.227, 0.363, 0.843, 0.866], abs=2e-3)
     assert rock.strength(0.0, math.pi / 2) == pytest.approx(rock.lateral_limit)

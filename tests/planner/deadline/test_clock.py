@@ -18,9 +18,9 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from hand_models.rock import Plane
-from planner import programs
-from planner.deadline import Budget, DeadlineError, clock as deadline
-from planner.explanation import certificate as certificates
+from planner import deadline, programs
+from planner.deadline import Budget, DeadlineError
+from planner.explanation import certificate
 from planner.explanation.infeasibility import vertex
 from planner.floating import continuation
 from planner.programs import WRENCH_UNIT, program, solvers
@@ -30,10 +30,10 @@ from planner.robots import pose_search
 from planner.solving import (
     dual_bounds,
     plan,
-    prepared_stance as grounds,
+    prepared_stance,
     reading,
     solve,
-    unique_plan as least_utilisation,
+    unique_plan,
 )
 from service.answering import dispatch, questions
 from service.commands.cli import run
@@ -73,7 +73,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch) -> Clock:
     clock = Clock()
-    for module in (deadline, solve, reading):
+    monkeypatch.setattr("planner.deadline.clock.time", clock)
+    for module in (solve, reading):
         monkeypatch.setattr(module, "time", clock)
     return clock
 
@@ -182,7 +183,10 @@ def test_time_enough_changes_nothing(clock):
 
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
-    [(grounds, "assemble", "the hands were closed"), (programs, "unique", "a plan was found")],
+    [
+        (prepared_stance, "assemble", "the hands were closed"),
+        (programs, "unique", "a plan was found"),
+    ],
 )
 def test_without_a_plan_there_is_an_error(monkeypatch, clock, module, name, missing):
     late_at(monkeypatch, clock, module, name)
@@ -213,7 +217,7 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
 
 
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):
-    monkeypatch.setattr(least_utilisation, "active_set_optimum", lambda *_: None)
+    monkeypatch.setattr(unique_plan, "active_set_optimum", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
     late_at(monkeypatch, clock, programs, "margin")
     answer = late(QUESTION)
@@ -225,7 +229,7 @@ def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock)
 
 
 def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypatch, clock):
-    monkeypatch.setattr(least_utilisation, "active_set_optimum", lambda *_: None)
+    monkeypatch.setattr(unique_plan, "active_set_optimum", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
     late_at(monkeypatch, clock, solvers, "tie_break")
     answer = late(QUESTION)
@@ -282,7 +286,7 @@ def test_that_there_is_no_plan_is_proven_by_the_first_solve_already(monkeypatch,
 
 
 def test_a_proof_without_its_explanation(monkeypatch, clock):
-    late_at(monkeypatch, clock, certificates, "irreducible_set")
+    late_at(monkeypatch, clock, certificate, "irreducible_set")
     answer = late(IMPOSSIBLE)
     assert answer.status == "infeasible"
     assert answer.unfinished == ("explanation", "load_factor")
@@ -321,7 +325,7 @@ def held(question: Question, ticks: int, monkeypatch) -> tuple[Plan | None, int]
     """The answer where the time is over after so many looks at the clock, and how many it took."""
     clock = Clock(tick=1.0)
     with monkeypatch.context() as patch:
-        patch.setattr(deadline, "time", clock)
+        patch.setattr("planner.deadline.clock.time", clock)
         for module in (solve, reading):
             patch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
         begun = clock.now
@@ -414,7 +418,7 @@ def test_a_search_that_is_cut_short_after_its_first_plan_gives_that_plan(monkeyp
 
 
 def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock, monkeypatch):
-    gate, waits, built = threading.Event(), [], solvers._built
+    gate, waits, built = threading.Event(), [], solvers.building
 
     def waited_for(*asked):
         """The program that is being built, for which all the time that is allowed goes by."""
@@ -427,23 +431,24 @@ def test_a_program_that_is_not_built_in_time_is_there_for_a_later_question(clock
 
         return SimpleNamespace(result=result)
 
-    solvers._builders[0].submit(gate.wait, 2.0 * PATIENCE)
+    # the one thread that builds is busy
+    built(lambda _: gate.wait(2.0 * PATIENCE), stance_shape())
     built.cache_clear()
     try:
         with monkeypatch.context() as patch:
-            patch.setattr(solvers, "_built", waited_for)
+            patch.setattr(solvers, "building", waited_for)
             with pytest.raises(DeadlineError, match="a plan was found"):
                 late(QUESTION)
         assert waits[0] == pytest.approx(LONG)
-        assert not built(program.Unique, ground_shape()).done()
+        assert not built(program.Unique, stance_shape()).done()
     finally:
         gate.set()
     assert late(QUESTION).verified
 
 
-def ground_shape():
-    ground = grounds.prepare_stance(QUESTION)
-    return ground.hands.sets(ground.hands.at_rest(ground.hands.idle)).data.shape
+def stance_shape():
+    hands = prepared_stance.prepare_stance(QUESTION).hands
+    return hands.sets(hands.at_rest(hands.idle)).data.shape
 
 
 # Over the wire ------------------------------------------------------------------------------------

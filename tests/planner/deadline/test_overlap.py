@@ -10,9 +10,9 @@ import threading
 import pytest
 
 from planner import deadline
-from planner.deadline import Overlap, overlap as beside
+from planner.deadline import Overlap, begin_overlap, overlap
 from planner.programs import solvers
-from planner.solving import KnownStance, answer as answering, solve
+from planner.solving import KnownStance, answer, solve
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.stances import ask, on_wall, program_data
@@ -26,12 +26,12 @@ def test_a_solver_that_runs_has_the_work_done_by_another_thread():
     data = program_data(ask(on_wall()))
     solvers.unique(data)
     with Overlap(me) as work:
-        assert work._begun is None
+        assert work.begun is None
         solvers.unique(data)
-        begun = work._begun
+        begun = work.begun
         # the first solver has taken it
         solvers.unique(data)
-        assert work._begun is begun
+        assert work.begun is begun
     assert begun.result() == work.result() != me()
 
 
@@ -39,17 +39,17 @@ def test_without_a_solver_the_caller_does_it():
     with Overlap(me) as work:
         pass
     # it is over: no later solver begins it
-    beside.begin_overlap()
-    assert work._begun is None
+    begin_overlap()
+    assert work.begun is None
     assert work.result() == me()
 
 
 def test_who_finds_the_other_thread_busy_does_it_alone():
     free = threading.Event()
     with Overlap(free.wait) as long:
-        beside.begin_overlap()
+        begin_overlap()
     with Overlap(me) as work:
-        beside.begin_overlap()
+        begin_overlap()
     assert work.result() == me()
     free.set()
     assert long.result()
@@ -60,13 +60,13 @@ def test_what_the_work_raises_is_raised_to_its_caller():
         raise ZeroDivisionError
 
     with Overlap(fails) as work:
-        beside.begin_overlap()
+        begin_overlap()
     with pytest.raises(ZeroDivisionError):
         work.result()
     # the thread goes on
     with Overlap(me) as after:
-        beside.begin_overlap()
-    after._begun.result()
+        begin_overlap()
+    after.begun.result()
 
 
 AT_THE_END = """
@@ -95,7 +95,7 @@ def test_plans_are_made_while_the_interpreter_ends():
 
 def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):
     threads = []
-    prepare, begin = answering.prepare_checks, deadline.begin_overlap
+    prepare, begin = answer.prepare_checks, deadline.begin_overlap
     taken = threading.Event()
 
     def noted(*given):
@@ -105,18 +105,18 @@ def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monke
 
     def begun():
         """Let no solver be done before the other thread has the work."""
-        waiting = beside._waiting.get() is not None
+        waits = overlap.waiting.get() is not None
         begin()
-        assert not waiting or taken.wait(PATIENCE)
+        assert not waits or taken.wait(PATIENCE)
 
-    monkeypatch.setattr(answering, "prepare_checks", noted)
+    monkeypatch.setattr(answer, "prepare_checks", noted)
     monkeypatch.setattr(deadline, "begin_overlap", begun)
     question = ask(on_wall())
-    answer = solve.plan(question)
-    assert answer.verified
+    found = solve.plan(question)
+    assert found.verified
     assert len(threads) == 1
     assert threads[0] != me()
     # of a stance that is known, it is known, too
     known = KnownStance(question)
-    assert known.plan(known.prepared.wrench).utilisation == answer.utilisation
+    assert known.plan(known.prepared.wrench).utilisation == found.utilisation
     assert len(threads) == 1

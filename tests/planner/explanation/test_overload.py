@@ -17,8 +17,8 @@ from planner.question import ForceCap, Limits
 from planner.result import LimitName
 from planner.robots import robosimian
 from planner.solving import plan
+from service.answering import questions
 from service.answering.answers import plan_reply
-from service.answering.questions import question as planner_question
 from service.commands.tables import print_plan
 from service.replies import Certificate, PlanReply
 from service.requests import PlanRequest
@@ -253,7 +253,7 @@ def test_weak_joints_are_named():
 
 
 def reply_of(request: dict) -> tuple[PlanReply, Certificate]:
-    question = planner_question(msgspec.convert(request, PlanRequest))
+    question = questions.question(msgspec.convert(request, PlanRequest))
     reply = plan_reply(plan(question), None, model=True)
     read = msgspec.json.decode(msgspec.json.encode(reply), type=PlanReply)
     assert read.certificate is not None
@@ -268,7 +268,7 @@ def test_a_reply_alone_proves_itself():
     assert proof.utilisation == 1.0
     assert proof.needed == pytest.approx(np.dot(proof.direction, reply.body_wrench))
     assert isinstance(proof.wrench_spaces, msgspec.UnsetType)
-    question = planner_question(msgspec.convert(request, PlanRequest))
+    question = questions.question(msgspec.convert(request, PlanRequest))
     body = question.stance.body
     most = 0.0
     for place, hand in zip(question.stance.hands, reply.hands, strict=True):
@@ -310,7 +310,7 @@ def test_a_reply_without_a_plan_carries_the_sets():
     reply, proof = reply_of(request)
     assert reply.status == "infeasible"
     assert proof.utilisation is None
-    question = planner_question(msgspec.convert(request, PlanRequest))
+    question = questions.question(msgspec.convert(request, PlanRequest))
     most = sum(
         support_in_body(
             proof, proof.wrench_spaces[place.limb], question.stance.body, place.pose, None

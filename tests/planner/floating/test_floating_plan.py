@@ -17,8 +17,7 @@ from planner.question import HandOnHold, Question, Stance
 from planner.result import Plan
 from planner.solving import plan
 from planner.verification import problems
-from service.answering import handle
-from service.answering.questions import question as asked
+from service.answering import handle, questions
 from service.commands.stances import read_request
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
@@ -60,7 +59,7 @@ NEAR = np.array([-0.8e-3, 0.1e-3, 0.2e-3, 1e-3, 4e-3, -2e-3])
 @cache
 def mixed() -> tuple[Question, Plan]:
     """The bundled stance: two hands with fixed wrists above two floating ones."""
-    question = asked(read_request("wall-300-floating"))
+    question = questions.question(read_request("wall-300-floating"))
     question = replace(question, want=frozenset(["load_factor", "prices"]))
     return question, plan(question)
 

@@ -39,7 +39,7 @@ def test_every_hold_has_a_picture(hold, rotation, tmp_path):
 def test_contacts_and_forces_are_drawn_where_they_are():
     settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
     axes = Figure().subplots(2, 2).ravel()
-    hand_plots._draw_fingers(list(axes), settled, np.full(4, settled.closing_tension))
+    hand_plots.draw_fingers(list(axes), settled, np.full(4, settled.closing_tension))
     drawn = axes[0]  # inner_left
     finger = settled.fingers[1]
     dots = [line for line in drawn.lines if line.get_color() == "black"]
@@ -82,4 +82,4 @@ def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypa
     ],
 )
 def test_planes_are_named_by_their_direction(along, words):
-    assert hand_plots._direction(np.array(along)) == words
+    assert hand_plots.direction_in_words(np.array(along)) == words

@@ -542,7 +542,7 @@ def test_rock_that_is_far_away_is_not_drawn():
 def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
     settled = HAND.settle(Plane(), ROCK, Grasp())
     panels = list(Figure().subplots(2, 2).ravel())
-    hand_plots._draw_fingers(panels, settled, np.full(4, settled.closing_tension))
+    hand_plots.draw_fingers(panels, settled, np.full(4, settled.closing_tension))
     named = {line.get_color(): line.get_label() for line in panels[0].get_legend().get_lines()}
     bars = {line.get_color() for line in panels[0].lines if line.get_linewidth() in (3, 4)}
     assert named[hand_plots.PALM] == "palm"

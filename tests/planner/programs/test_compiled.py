@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import product
 
+import clarabel
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -99,7 +100,7 @@ def test_the_solver_has_the_data_of_cvxpy_to_the_last_bit(kind):
         second = [value if i % 2 else 1.5 * value for i, value in enumerate(first)]
         third = [np.zeros(p.shape) for p in parameters]
         for values in (first, second, third, first):
-            solver = serving._ready(values, built._extent(shape), SETTINGS)
+            solver = serving.ready(values, built.extent(shape), SETTINGS)
             P, q, A, b = solver.data()
             P_cvxpy, q_cvxpy, A_cvxpy, b_cvxpy = cvxpy_data(built.problem, parameters, values)
             assert is_the_same(A, A_cvxpy)
@@ -109,8 +110,8 @@ def test_the_solver_has_the_data_of_cvxpy_to_the_last_bit(kind):
             assert [(type(c), c.dim) for c in solver.layout.cones] == [
                 (type(c), c.dim) for c in built.compiled.map.cones
             ]
-            serving._put_back(solver)
-        assert len(serving._idle) == 2
+            serving.put_back(solver)
+        assert len(serving.idle) == 2
 
 
 @pytest.fixture(scope="module")
@@ -131,13 +132,11 @@ def test_an_answer_does_not_depend_on_the_questions_before(data):
 
 
 def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
-    built = program.Unique(data.shape)
-    built.solve(data)
     given = []
 
     class Spy:
-        def __init__(self, solver):
-            self.solver = solver
+        def __init__(self, *problem, original=clarabel.DefaultSolver):
+            self.solver = original(*problem)
 
         def update(self, **blocks):
             given.append(set(blocks))
@@ -146,8 +145,11 @@ def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
         def solve(self):
             return self.solver.solve()
 
-    (solver,) = built.compiled._idle
-    solver._solver = Spy(solver._solver)
+    built = program.Unique(data.shape)
+    with monkeypatch.context() as patch:
+        patch.setattr(clarabel, "DefaultSolver", Spy)
+        built.solve(data)
+    assert given == []
     turned = built.solve(data.turned(1.1 * data.wrench))
     assert given == [{"b"}]
     assert turned.value == program.Unique(data.shape).solve(data.turned(1.1 * data.wrench)).value
@@ -162,7 +164,7 @@ def test_threads_do_not_disturb_each_other(data):
     with ThreadPoolExecutor(6) as pool:
         together = list(pool.map(lambda w: built.solve(data.turned(w)).value, wrenches * 4))
     assert together == alone * 4
-    assert len(built.compiled._idle) <= compiled.KEPT
+    assert len(built.compiled.idle) <= compiled.KEPT
 
 
 def test_the_solvers_that_wait_are_bounded(data):
@@ -173,7 +175,7 @@ def test_the_solvers_that_wait_are_bounded(data):
         G = hand.G.copy()
         G[j, i] = 0.0
         built.solve(type(data)((hand._replace(G=G), *data.hands[1:]), data.wrench))
-    assert len(built.compiled._idle) == compiled.KEPT
+    assert len(built.compiled.idle) == compiled.KEPT
 
 
 def test_numbers_that_are_none_cost_only_their_own_question(data):
@@ -233,37 +235,44 @@ def test_where_cvxpy_has_changed_answers_are_the_same(data, monkeypatch, kind):
         assert not built.solve(data).solved
 
 
+class Without:
+    """An object of CVXPY's that lacks an attribute."""
+
+    def __init__(self, whole, lost=None):
+        self.whole, self.lost = whole, lost
+
+    def __getattr__(self, name):
+        if name == self.lost:
+            raise AttributeError(name)
+        return getattr(self.whole, name)
+
+
+def change_cvxpy(monkeypatch, changed):
+    """Let the compiled problem that CVXPY gives away be another."""
+    original = cp.Problem.get_problem_data
+
+    def problem_data(*asked, **options):
+        data, *others = original(*asked, **options)
+        key = cp.settings.PARAM_PROB
+        return data | {key: changed(data[key])}, *others
+
+    monkeypatch.setattr(cp.Problem, "get_problem_data", problem_data)
+
+
 @pytest.mark.parametrize("lost", ["reduced_A", "param_id_to_col", "q"])
 def test_an_attribute_that_is_gone_is_noticed(monkeypatch, lost):
-    shape = SHAPES[0]
-    original = cvxpy_internals._read
-
-    class Without:
-        def __init__(self, whole):
-            self._whole = whole
-
-        def __getattr__(self, name):
-            if name == lost:
-                raise AttributeError(name)
-            return getattr(self._whole, name)
-
-    monkeypatch.setattr(
-        cvxpy_internals,
-        "_read",
-        lambda problem, p, whole, data: original(problem, p, Without(whole), data),
-    )
+    change_cvxpy(monkeypatch, lambda whole: Without(whole, lost))
     with pytest.warns(RuntimeWarning, match=lost):
-        assert program.Margin(shape).compiled.map is None
+        assert program.Margin(SHAPES[0]).compiled.map is None
 
 
 def test_a_map_that_gives_other_data_is_noticed(monkeypatch):
-    original = cvxpy_internals._read
+    def twisted(whole):
+        changed = Without(whole)
+        changed.q = 2.0 * whole.q
+        return changed
 
-    def twisted(*arguments):
-        found = original(*arguments)
-        return found._replace(b=found.b._replace(values=2.0 * found.b.values))
-
-    monkeypatch.setattr(cvxpy_internals, "_read", twisted)
+    change_cvxpy(monkeypatch, twisted)
     with pytest.warns(RuntimeWarning, match="other data"):
         program.Margin(SHAPES[0])
 
@@ -330,14 +339,14 @@ def test_a_forked_process_builds_programs_of_its_own():
 
 
 def test_what_is_built_ahead_is_what_plans_need():
-    solvers._built.cache_clear()
+    solvers.building.cache_clear()
     solvers.build_ahead(4)
-    before = solvers._built.cache_info().misses
+    before = solvers.building.cache_info().misses
     for count in (4, 3):
         question = ask(on_wall(limbs=tuple(PLACES)[:count]), load=Load(50.0))
         answer = plan(replace(question, want=frozenset(["load_factor"])))
         assert answer.status == "optimal"
-    assert solvers._built.cache_info().misses == before
+    assert solvers.building.cache_info().misses == before
 
 
 @given(

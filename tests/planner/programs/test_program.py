@@ -100,9 +100,9 @@ def test_every_program_is_disciplined_in_its_parameters(kind):
 
 def test_stances_of_one_shape_share_their_programs():
     plan(ask(on_wall(), "load_factor"))
-    before = solvers._built.cache_info()
+    before = solvers.building.cache_info()
     plan(ask(on_wall(overhang=0.1, off=0.25), "load_factor"))
-    after = solvers._built.cache_info()
+    after = solvers.building.cache_info()
     assert after.misses == before.misses
     assert after.hits == before.hits + 2
 

@@ -14,12 +14,12 @@ from hand_models.rock import Cylinder
 from planner.programs import used_effort
 from planner.question import Limits, Question
 from planner.result import LoadRecovery, SetPoints
-from planner.solving import plan
+from planner.solving import KnownStance, plan
 from planner.streaming import WrenchStream
 from planner.streaming.interpolation import PER_RADIUS, Interpolation
 from planner.streaming.stream import RADIUS
 from planner.streaming.stream_stance import StreamStance
-from planner.verification import Check
+from planner.verification import Check, LoadsCheck
 from tests.planner.verification.test_loads_check import streamable
 from tests.suite.helpers import peer
 from tests.suite.helpers.barred import KINDS
@@ -56,23 +56,23 @@ def size(wrench: np.ndarray) -> float:
 def checked_by(question: Question):
     """The check that plans pass, and what reads loads for it."""
     known = StreamStance(question)
-    ground = known._known.prepared
-    spaces, data = ground.hands.sets(ground.hands.at_rest(ground.hands.idle))
-    check = Check(ground.question, ground.settled, ground.where)
-    return known, data, LoadRecovery(ground.settled, spaces), check
+    prepared = KnownStance(replace(question, body_wrench=known.first)).prepared
+    spaces, data = prepared.hands.sets(prepared.hands.at_rest(prepared.hands.idle))
+    check = Check(prepared.question, prepared.settled, prepared.where)
+    return known, data, LoadRecovery(prepared.settled, spaces), check
 
 
 def complaints(question: Question, points: SetPoints) -> list[str]:
     """What the check of plans says of set-points."""
     known, data, reader, check = checked_by(question)
     loads = [row[: len(names)] for row, names in zip(points.loads, known.columns, strict=True)]
-    carried = reader.read(loads).arrays
-    np.testing.assert_allclose(points.wrenches, carried.wrenches, rtol=1e-9, atol=1e-7)
-    np.testing.assert_allclose(points.tensions.ravel(), carried.tensions, atol=1e-9)
-    np.testing.assert_allclose(points.motor_torque.ravel(), carried.drives[0], rtol=1e-9)
-    np.testing.assert_allclose(points.motor_current.ravel(), carried.drives[1], rtol=1e-9)
+    told = reader.read(loads).arrays
+    np.testing.assert_allclose(points.wrenches, told.wrenches, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(points.tensions.ravel(), told.tensions, atol=1e-9)
+    np.testing.assert_allclose(points.motor_torque.ravel(), told.drives[0], rtol=1e-9)
+    np.testing.assert_allclose(points.motor_current.ravel(), told.drives[1], rtol=1e-9)
     effort = used_effort(data, loads)
-    return check.problems(carried, points.utilisation, points.body_wrench, effort)
+    return check.problems(told, points.utilisation, points.body_wrench, effort)
 
 
 # Plans --------------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ def test_a_proof_serves_all_the_wrenches_that_it_is_for(monkeypatch):
     with WrenchStream(BARE) as stream:
         first = stream.set_points(UP)
         assert (first.status, first.verified) == ("infeasible", True)
-        monkeypatch.setattr(stream._stance, "plan", None)
+        monkeypatch.setattr(StreamStance, "plan", None)
         second = stream.set_points(2.0 * UP)
         assert (second.status, second.verified, second.tensions) == ("infeasible", True, None)
         assert stream.set_points(OFF).status == "optimal"
@@ -194,7 +194,7 @@ def test_set_points_are_continuous_where_interpolations_follow(step, stream):
         sources += [each.source for each in points]
         last = way[-1] + (stride / step) * towards
         assert stream.wait(PATIENCE)
-        used.append(stream._following.newest)
+        used.append(stream.newest)
     assert len(set(map(id, used))) >= 4
     assert set(sources) == {"interpolated"}
     assert max(found) < SLOPE
@@ -281,7 +281,7 @@ def test_an_interpolation_keeps_to_the_cap_where_its_centre_does():
     used = plan(WALL).utilisation
     for cap, radius in ((used + 0.1, 100.0), (used + 0.02, 25.0), (used - 0.1, 100.0)):
         with WrenchStream(replace(WALL, limits=Limits(utilisation=cap)), radius=100.0) as stream:
-            found = stream._following.newest
+            found = stream.newest
         assert found.radius == stream.interpolates == radius
         assert (found.most <= cap) == (found.utilisation <= cap)
 
@@ -318,7 +318,7 @@ def test_an_error_in_the_thread_is_logged_and_the_stream_goes_on(stream, monkeyp
 
 
 def test_a_plan_that_is_not_verified_never_leaves(stream, monkeypatch):
-    monkeypatch.setattr(stream._stance.check, "fault", lambda *_: "a fault on purpose")
+    monkeypatch.setattr(LoadsCheck, "fault", lambda *_: "a fault on purpose")
     points = stream.set_points(WEIGHT)
     assert (points.status, points.verified, points.loads) == ("failed", False, None)
     monkeypatch.undo()

@@ -10,7 +10,7 @@ from hand_models.rock import Cylinder
 from planner.prepare import settle_hand
 from planner.result import Plan, PlanArrays
 from planner.solving import plan
-from planner.verification import check as verify, problems, recomputation as recomputing
+from planner.verification import Check, problems, recomputation
 from planner.verification.equilibrium import equilibrium
 from planner.verification.limit_surface import LimitCurves
 from tests.suite.helpers.hands import changed_hand
@@ -166,7 +166,7 @@ def test_half_planes_that_promise_more_than_the_limit_curve_are_found():
 
 
 def test_rows_that_promise_more_than_a_hand_holds_are_found(monkeypatch):
-    monkeypatch.setattr(recomputing, "HELD", 0.5 * recomputing.HELD)
+    monkeypatch.setattr(recomputation, "HELD", 0.5 * recomputation.HELD)
     assert any("more than its rows say" in each for each in complaints(honest()))
 
 
@@ -227,7 +227,7 @@ def test_equilibrium_is_the_affine_map_of_tension():
 def test_the_check_of_known_hands_is_made_once():
     """Another body wrench on the same settled hands: one `Check` finds what a new one does."""
     settled = tuple(settle_hand(hand, QUESTION.stance) for hand in QUESTION.stance.hands)
-    check = verify.Check(QUESTION, settled)
+    check = Check(QUESTION, settled)
     for lateral in (0.0, 0.1, -0.1):
         answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, lateral, 0.0))))
         numbers = PlanArrays.of(answer.hands), answer.utilisation, answer.body_wrench

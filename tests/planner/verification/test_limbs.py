@@ -11,7 +11,7 @@ from planner.prepare import Posture, posture, settle_hand
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
-from planner.verification import limbs as verify_limbs, problems
+from planner.verification import limbs, problems
 from tests.suite.helpers.jointed import random_jointed_question
 from tests.suite.helpers.stances import on_wall
 
@@ -155,7 +155,7 @@ def test_another_wrench_that_was_asked_for_is_found():
 
 
 def test_rows_that_promise_less_force_than_there_is_are_found(monkeypatch):
-    monkeypatch.setattr(verify_limbs, "BALL", 0.5 * verify_limbs.BALL)
+    monkeypatch.setattr(limbs, "BALL", 0.5 * limbs.BALL)
     assert any("more than its rows say" in each for each in complaints())
 
 

@@ -6,10 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from planner.question import Question
+from hand_models.base import wrench_transport
+from planner.prepare import settle_hand
+from planner.question import Question, Stance
 from planner.result import Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
+from planner.verification import loads_check
+from planner.verification.hand_check import hand_check
 from planner.verification.limit_surface import LimitCurves
 from tests.hand_models.finger.test_fingernail import STRONG, hung, one_hand
 from tests.suite.helpers.barred import KINDS
@@ -43,9 +47,14 @@ def fault(known: StreamStance, loads, wrench, **told) -> str | None:
     return known.check.fault(loads, body_wrench=wrench, **told)
 
 
-def given_by(known: StreamStance, loads) -> np.ndarray:
+def given_by(stance: Stance, known: StreamStance, loads) -> np.ndarray:
     """The body wrench that loads give."""
-    return known.check._body @ loads.ravel() + known.check._from_rest
+    body = stance.body.inverse()
+    wrenches = known.read(loads).wrenches
+    return -sum(
+        wrench_transport(body @ hand.pose) @ wrench
+        for hand, wrench in zip(stance.hands, wrenches, strict=True)
+    )
 
 
 CASES = [
@@ -76,7 +85,9 @@ def test_plans_that_hang_on_nails_pass(pull):
     assert fault(known, loads, known.first) is None
     # more along a nail than rock and finger bear, with the balance that this gives
     loads[0, known.columns[0].index("inner_left/nail")] += 1e4
-    assert fault(known, loads, given_by(known, loads)) == "a load of the wrong sign"
+    assert (
+        fault(known, loads, given_by(question.stance, known, loads)) == "a load of the wrong sign"
+    )
 
 
 @cache
@@ -123,33 +134,42 @@ SIGNED = {
 def test_no_load_has_the_wrong_sign(name):
     loads = honest()[0].copy()
     loads[1, stance().columns[1].index(name)] = -1.0
-    assert fault(stance(), loads, given_by(stance(), loads)) == "a load of the wrong sign"
+    assert (
+        fault(stance(), loads, given_by(WALL.stance, stance(), loads)) == "a load of the wrong sign"
+    )
 
 
 def test_a_tendon_with_friction_must_not_be_slackened():
     hand = changed_hand("tendon", "friction", 0.1)
     robot = replace(WALL.stance.robot, hand=hand)
-    known = StreamStance(replace(WALL, stance=replace(WALL.stance, robot=robot)))
+    question = replace(WALL, stance=replace(WALL.stance, robot=robot))
+    known = StreamStance(question)
     loads = known.solve(known.first).loads
-    closing = known._known.prepared.settled[0].closing_tension
+    closing = settle_hand(question.stance.hands[0], question.stance).closing_tension
     for slack, expected in ((0.0, None), (0.01, "a load of the wrong sign")):
         loads[0, 0] = closing - slack
-        assert fault(known, loads, given_by(known, loads)) == expected
+        assert fault(known, loads, given_by(WALL.stance, known, loads)) == expected
 
 
-def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes():
-    known = StreamStance(WALL)
+def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes(monkeypatch):
+    def weak(surfaces, of_tile):
+        weaker = [replace(each, shear_limit=20.0, pull_off_limit=2.0) for each in surfaces]
+        return LimitCurves(weaker, of_tile)
+
     loads, _ = honest()
-    weak = replace(known._known.prepared.settled[0].surface, shear_limit=20.0, pull_off_limit=2.0)
-    count = len(known.check._curves._numbers.gain)
-    known.check._curves = LimitCurves([weak], np.zeros(count, dtype=int))
+    monkeypatch.setattr(loads_check, "LimitCurves", weak)
+    known = StreamStance(WALL)
     assert fault(known, loads, known.first) == "a tile's limit curve"
 
 
-def test_a_hand_holds_no_more_than_its_rows_say():
-    known = StreamStance(WALL)
+def test_a_hand_holds_no_more_than_its_rows_say(monkeypatch):
+    def less(*asked):
+        rows = hand_check(*asked)
+        return replace(rows, held=0.9 * rows.held)
+
     loads, _ = honest()
-    known.check._matrix[:, known.check._held] *= 0.9
+    monkeypatch.setattr(loads_check, "hand_check", less)
+    known = StreamStance(WALL)
     assert fault(known, loads, known.first) == "what a hand holds"
 
 

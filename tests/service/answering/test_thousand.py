@@ -20,7 +20,7 @@ from planner.prepare import assemble, posture
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
-from service.answering.questions import question as planner_question
+from service.answering import questions
 from service.requests import PlanRequest
 from tests.suite.helpers import peer
 from tests.suite.helpers.random_requests import random_request
@@ -37,7 +37,7 @@ def asked(request: dict) -> Question | None:
         if stance.get("joints") is None:
             limits.pop("joint_torque", None)
         whole = {**request, "stance": stance, "limits": limits}
-        question = planner_question(msgspec.convert(whole, PlanRequest))
+        question = questions.question(msgspec.convert(whole, PlanRequest))
         try:
             gathered(question)
         except InvalidInputError:

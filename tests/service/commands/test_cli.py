@@ -15,8 +15,7 @@ import trimesh
 from rich.console import Console
 
 from service.answering import dispatch
-from service.commands import cli as command
-from service.commands.cli import run
+from service.commands.cli import crux, run
 from service.commands.stances import bundled
 from service.commands.tables import print_plan
 from service.requests import PlanRequest
@@ -439,7 +438,7 @@ def test_wrong_usage_leads_to_the_commands_own_help(
 def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["--help"]) == DONE
     out = capfd.readouterr().out
-    for name in command.crux.commands:
+    for name in crux.commands:
         assert f"  {name} " in out
 
 

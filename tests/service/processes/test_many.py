@@ -20,7 +20,7 @@ from service.answering import dispatch
 from service.commands.cli import run
 from service.processes import Planners, plan_many, worth
 from service.processes.many import WORTH_A_PROCESS
-from service.processes.workers import Lost, cores
+from service.processes.workers import Lost, Workers, cores
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import decode_request, schema
@@ -113,16 +113,18 @@ def test_a_process_that_is_killed_while_it_plans_costs_no_reply(two):
 
     def kill_one(done: int, total: int) -> None:
         if not killed:
-            worker = two._workers._all[0]
-            os.kill(worker.process.pid, signal.SIGKILL)
-            worker.process.join(PATIENCE)
-            killed.append(worker)
+            (process,) = multiprocessing.active_children()
+            os.kill(process.pid, signal.SIGKILL)
+            process.join(PATIENCE)
+            killed.append(process)
 
     replies = two.plan_many(requests, kill_one)
     assert killed
     assert [reply.id for reply in replies] == [str(i) for i in range(40)]
     assert {reply.status for reply in replies} <= {"optimal", "overloaded"}
-    assert killed[0] not in two._workers._all
+    # another has taken its place
+    (process,) = multiprocessing.active_children()
+    assert process.pid != killed[0].pid
 
 
 def test_few_requests_are_not_worth_processes():
@@ -153,15 +155,13 @@ def test_errors_carry_the_identifier_where_it_can_be_read(monkeypatch):
     named = [reply.id for reply in plan_many(mixed(), workers=1) if isinstance(reply, ErrorReply)]
     assert named == ["number 0", "number 1", "number 1", None]
     with Planners(2) as planners:
-        monkeypatch.setattr(
-            planners._workers, "each", lambda items, here: iter([(0, Lost("a reason"))])
-        )
+        monkeypatch.setattr(Workers, "each", lambda *_: iter([(0, Lost("a reason"))]))
         (reply,) = planners.plan_many([asked(50.0, "a")])
     assert (reply.error.kind, reply.error.message, reply.id) == ("lost", "a reason", "a")
 
 
 SCRIPT = """
-import sys
+import logging
 from tests.suite.helpers.asked import wall_request
 from tests.service.serving.test_service import plan_request
 from service.processes.many import Planners, plan_many
@@ -195,8 +195,16 @@ def test_processes_that_come_too_late_are_not_heard_of(tmp_path):
 
 def test_a_program_without_its_guard_is_told_so_and_answered(tmp_path):
     body = """
+told = []
+
+class Handler(logging.StreamHandler):
+    def emit(self, record):
+        told.append(record)
+        super().emit(record)
+
+logging.getLogger().addHandler(Handler())
 with Planners(3) as planners:
-    while planners._workers._stillborn < 2:
+    while not told:
         reply = planners.plan_many([plan_request(wall_request())] * 20)[-1]
     print(reply.status)
 """

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from service.processes import workers as workers_module
 from service.processes.workers import NO_START, THREADS, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
@@ -29,7 +28,7 @@ def done(workers: Workers, items: list) -> dict:
 
 def kill(workers: Workers, pid: int) -> None:
     """Kill a process from outside, and see that it is dead."""
-    (process,) = (worker.process for worker in workers._all if worker.process.pid == pid)
+    (process,) = (worker.process for worker in workers.running if worker.process.pid == pid)
     os.kill(pid, 9)
     process.join(PATIENCE)
     assert process.exitcode == -9
@@ -81,17 +80,17 @@ def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
 def test_all_processes_are_ready_once_they_are_waited_for():
     with Workers(workshop.naps, 2) as workers:
         workers.wait()
-        assert [worker.ready for worker in workers._all] == [True, True]
+        assert [worker.ready for worker in workers.running] == [True, True]
         workers.wait()
         assert len(set(done(workers, [0.2] * 4).values())) == 2
     with Workers(workshop.nothing, 2) as workers:
         workers.wait()
-        assert workers._all == []
+        assert workers.running == []
 
 
 def test_who_stops_listening_leaves_no_work_behind(nappers):
     for _ in nappers.each([0.0, *[2.0 * PATIENCE] * 5]):
-        busy = [worker.process for worker in nappers._all if worker.hand]
+        busy = [worker.process for worker in nappers.running if worker.hand]
         break
     assert busy
     assert {process.exitcode for process in busy} == {-9}
@@ -105,12 +104,12 @@ def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
 
 
 def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
-    monkeypatch.setattr(workers_module, "PATIENCE", 1e5)
+    monkeypatch.setattr("service.processes.workers.PATIENCE", 1e5)
     with Workers(workshop.sleepers, 2) as workers:
         # well before any is ready
         found = dict(workers.each(list(range(5)), lambda item: -item))
-        assert not any(worker.ready for worker in workers._all)
-        processes = [worker.process for worker in workers._all]
+        assert not any(worker.ready for worker in workers.running)
+        processes = [worker.process for worker in workers.running]
     assert found == {i: -i for i in range(5)}
     # what is not ready is not waited for
     assert [process.exitcode for process in processes] == [-9, -9]
@@ -118,10 +117,10 @@ def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
         found = {}
         for i, result in workers.each([0.0] * 20, workshop.nap_here):
             found[i] = result
-            for worker in workers._all:
+            for worker in workers.running:
                 worker.process.join(PATIENCE)
-        assert workers._stillborn == 2
-        assert workers._all == []
+        assert workers.stillborn == 2
+        assert workers.running == []
     assert set(found.values()) == {os.getpid()}
     assert sorted(found) == list(range(20))
 

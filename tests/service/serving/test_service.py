@@ -23,7 +23,7 @@ from zenoh.handlers import FifoChannel
 
 from hand_models.base import InvalidInputError
 from planner import solving
-from planner.prepare import settled_stance as settling
+from planner.prepare import settled_stance
 from planner.robots import RobotFile
 from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest
 from service.answering import dispatch
@@ -333,7 +333,7 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         raise InvalidInputError("done", field="stance")
 
     monkeypatch.setattr(solving, "plan", exclusive)
-    monkeypatch.setattr(settling, "resting_hand", exclusive)
+    monkeypatch.setattr(settled_stance, "resting_hand", exclusive)
     monkeypatch.setattr(dispatch, "explore", exclusive)
     stance = wall_request()["stance"]
     questions = {
@@ -342,7 +342,7 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         BODY_SPACE: {"v": 1, "stance": stance, "axes": ["fx", "fz"]},
     }
     service = PlanService(alone)
-    monkeypatch.setattr(service, "_answering", turn)
+    monkeypatch.setattr(service, "turn", turn)
     with service:
         # no more than fit into the channels while nothing is answered
         channels = [

@@ -18,8 +18,8 @@ from planner.streaming import WrenchStream
 from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
 from service.answering import Streams, dispatch, streams
 from service.answering.streams import KEPT
-from service.commands import stream as stream_command
 from service.commands.cli import run
+from service.commands.stream import wrenches
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
@@ -131,7 +131,7 @@ def test_messages_come_in_the_encoding_of_the_request(serving, form: Format) -> 
 def test_set_points_do_not_wait_for_other_questions(serving, client: CruxClient) -> None:
     declared = client.stream(declaration())
     request = SetPointsRequest(v=1, stream=declared.stream, body_wrench=tuple(WRENCH))
-    with serving[0]._answering:
+    with serving[0].turn:
         # while a question is answered that takes longer than anyone waits
         assert client.set_points(request).verified
 
@@ -388,7 +388,7 @@ def test_another_objective_is_refused(stance, monkeypatch, capfd) -> None:
 def test_a_line_is_answered_before_the_next_is_there() -> None:
     """As a control loop asks: through pipes, one at a time."""
     lines = iter([json.dumps(WRENCH).encode() + b"\n"])
-    assert list(stream_command._wrenches(lines)) == [(1, tuple(WRENCH))]
+    assert list(wrenches(lines)) == [(1, tuple(WRENCH))]
     asked = process("stream", "wall", "--json", given=(json.dumps(WRENCH) + "\n").encode() * 3)
     assert (asked.returncode, asked.stderr) == (0, b"")
     assert len(asked.stdout.splitlines()) == 3
