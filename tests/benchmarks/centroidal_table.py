@@ -9,8 +9,8 @@ import numpy as np
 from planner.programs import solvers
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Line, Table, span, times
-from tests.planner.programs.test_centroidal import EDGES, our_margin, random_case, stance_of
 from tests.suite.helpers import centroidal_peer
+from tests.suite.helpers.friction_contacts import EDGES, our_margin, random_case, stance_of
 
 __all__ = ["centroidal_tables"]
 

@@ -22,7 +22,7 @@ from planner.solving import plan
 from tests.benchmarks.measured_stances import question_of, twin_of
 from tests.benchmarks.plain_programs import Clarabel, scaled, unique
 from tests.benchmarks.race import TURN, WARM, Way, race
-from tests.planner.prepare.test_many_hands import crawler_in, question as crawler_question
+from tests.suite.helpers.crawlers import crawler_in, crawler_question
 
 __all__ = ["Curve", "draw", "growth", "steps"]
 

@@ -13,7 +13,7 @@ from planner.question import Question
 from service.answering.questions import question
 from service.requests import PlanRequest
 from service.wire import decode_request
-from tests.suite.helpers.asked import wall_request
+from tests.suite.helpers.requests import wall_request
 
 __all__ = ["document", "payload", "question_of", "request", "twin_of"]
 

@@ -17,7 +17,7 @@ from service.answering import Streams, dispatch
 from service.replies import SetPointsReply, StreamReply
 from service.requests import SetPointsRequest
 from service.wire import SET_POINTS, STREAM
-from tests.service.serving.test_stream_service import stream_request
+from tests.suite.helpers.requests import stream_request
 from tests.suite.helpers.stances import ask, on_wall
 
 QUESTION = ask(on_wall())

@@ -30,7 +30,7 @@ from hand_models.rock import Hold
 from planner.explanation import warnings
 from planner.pictures import plot_plan, plot_wrench_space
 from planner.prepare import settle_hand
-from planner.question import HandOnHold, Question, Stance
+from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
 from planner.verification import problems
@@ -38,12 +38,9 @@ from service.answering import dispatch, questions
 from service.commands.stances import read_request
 from service.replies import PlanReply
 from service.wire import Format, schema
-from tests.suite.helpers.asked import HEAVY, JSON, MSGPACK, at, put, wall_request
+from tests.suite.helpers.fingernails import PIN, STRONG, hung, nail_rows, one_hand, step
 from tests.suite.helpers.hands import HAND, ROCK, changed_hand, pinch, without_hand_load
-from tests.suite.helpers.stances import PALM_TO_WALL
-
-PIN = {"inner": 0.06615 + 3 * 0.0431, "outer": 0.03275 + 0.0346 + 3 * 0.0431}
-"""x of the nails' pins in H, all fingers along x [m]."""
+from tests.suite.helpers.requests import HEAVY, JSON, MSGPACK, at, put, wall_request
 
 JOINT = -0.0006
 """z of the joints in H [m]."""
@@ -51,19 +48,10 @@ JOINT = -0.0006
 LENGTH, RADIUS, STIFFNESS, FRICTION = 0.010, 0.0075, 0.025, 0.5
 
 
-def step(deep: float) -> Profile:
-    """Flat rock that falls away at x = 0."""
-    return Profile([[-0.3, 0.0], [0.0, 0.0], [0.0, deep], [0.3, deep]])
-
-
 def cling(hold: Hold, x: float, z: float = 0.006, hand=HAND, **grasp) -> SettledHand:
     """A hand that clings to a hold whose frame is at (x, z) of H."""
     pose = Pose(np.array([x, 0.0, z]), np.eye(3))
     return hand.settle(hold, ROCK, Grasp(fingernail=True, **grasp), pose)
-
-
-def nail_rows(settled: SettledHand) -> list[int]:
-    return [i for i, tile in enumerate(settled.tiles) if tile.phalanx == "nail"]
 
 
 def contacts(settled: SettledHand) -> list[str]:
@@ -372,37 +360,6 @@ def test_the_set_gives_the_wrench_of_the_nails_forces(tension, axial, ahead):
 
 
 # Plans --------------------------------------------------------------------------------------------
-
-LIMB = "front_left"
-
-
-def one_hand(hand=HAND, hold: Hold | None = None, place: float = 0.001) -> Stance:
-    """A robot that hangs on the nails of one hand, on a wall."""
-    body = Pose(np.zeros(3), np.column_stack([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]).astype(float))
-    there = HandOnHold(
-        LIMB,
-        body @ Pose(np.array([0.5, 0.4, -0.3]), PALM_TO_WALL),
-        step(0.02) if hold is None else hold,
-        ROCK,
-        hold_in_hand=Pose(np.array([PIN["inner"] + place, 0.0, 0.006]), np.eye(3)),
-        grasp=Grasp(fingernail=True),
-    )
-    stance = Stance((there,), body)
-    return replace(stance, robot=replace(stance.robot, hand=hand))
-
-
-def hung(stance: Stance, pull: float) -> Question:
-    """Ask the hand to pull with so much along −x and half a tenth of it into the rock."""
-    settled = settle_hand(stance.hands[0], stance)
-    places = settled.positions[nail_rows(settled)]
-    force = pull / 4.0 * np.array([-1.0, 0.0, 0.05])
-    wrench = np.concatenate([4.0 * force, np.cross(places, force).sum(axis=0)])
-    carried = wrench_transport(stance.body.inverse() @ stance.hands[0].pose) @ -wrench
-    return Question(stance, body_wrench=carried)
-
-
-STRONG = changed_hand("structure", "held_mass", 1000.0)
-"""Holds more than its nails do."""
 
 
 @pytest.mark.parametrize(("pull", "status"), [(1000.0, "optimal"), (2200.0, "overloaded")])

@@ -27,26 +27,20 @@ from service.replies import PlanReply
 from service.requests import PlanRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
 from service.wire import ServiceError, decode_request
-from tests.service.commands.test_cli import process
-from tests.service.serving.test_service import Served, client_config, free_endpoint
-from tests.suite.helpers.asked import HEAVY, full_request, put, wall_request
-from tests.suite.helpers.hands import PINCH, ROCK
+from tests.suite.helpers.commands import process
+from tests.suite.helpers.hands import PINCH, ROCK, entry_toml
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import HEAVY, full_request, put, wall_request
 from tests.suite.helpers.rocks import cylinder_mesh
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 
 X, Z = np.eye(3)[[0, 2]]
 BUNDLED = [(section, name) for section, name, _ in hand_table()]
 IDS = [f"{section}.{name}" for section, name in BUNDLED]
 
 
-def line(section: str, name: str, value: Any, unit: str | None = None) -> str:
-    """A file with one entry."""
-    unit = hand_table().quantity(section, name).unit if unit is None else unit
-    return f'[{section}]\n{name} = {{ value = {value}, unit = "{unit}", source = "assumed" }}\n'
-
-
 def own(section: str, name: str, value: Any) -> ParameterTable:
-    return ParameterTable.read(line(section, name, value), "own.toml")
+    return ParameterTable.read(entry_toml(section, name, value), "own.toml")
 
 
 def request_for(*parts: ParameterTable, mass: float | None = 50.0) -> PlanRequest:
@@ -85,7 +79,7 @@ def file(tmp_path: Path):
 def test_every_entry_may_be_one_per_cent_off(section: str, name: str, file) -> None:
     value = hand_table().quantity(section, name).value
     off = [1.01 * v for v in value] if isinstance(value, list) else 1.01 * value
-    table = own_hand(read_hand(Path(file(line(section, name, off)))))
+    table = own_hand(read_hand(Path(file(entry_toml(section, name, off)))))
     changed = table.difference(hand_table()).sections
     if np.any(value):
         assert {(s, n): q.value for s, ns in changed.items() for n, q in ns.items()} == {
@@ -190,7 +184,7 @@ def test_a_file_with_the_bundled_numbers_gives_the_same_plan(
     text = ""
     for section, entries in hand_table().sections.items():
         text += f"[{section}]\n" + "".join(
-            line(section, n, q.value).partition("\n")[2] for n, q in entries.items()
+            entry_toml(section, n, q.value).partition("\n")[2] for n, q in entries.items()
         )
     replies = []
     for more in ([], ["--hand", file(text)]):
@@ -211,79 +205,79 @@ BAD = {
         "finger.pulley_radius: unknown entry; known are pulley_radii,",
     ),
     "millimetres": (
-        line("finger", "joint_spacing", 43.1, "mm"),
+        entry_toml("finger", "joint_spacing", 43.1, "mm"),
         "finger.joint_spacing: must be in 'm', got 43.1 in 'mm'",
     ),
     "millimetres that say metres": (
-        line("finger", "joint_spacing", 43.1),
+        entry_toml("finger", "joint_spacing", 43.1),
         "finger.joint_spacing: must be from 0 to 1 m, got 43.1",
     ),
     "degrees": (
-        line("finger", "joint_upper", [100, 100, 100], "deg"),
+        entry_toml("finger", "joint_upper", [100, 100, 100], "deg"),
         "finger.joint_upper: must be in 'rad', got [100.0, 100.0, 100.0] in 'deg'",
     ),
     "a number for a list": (
-        line("finger", "pulley_radii", 0.005),
+        entry_toml("finger", "pulley_radii", 0.005),
         "finger.pulley_radii: a list of 3 numbers is needed, got 0.005",
     ),
     "a list for a number": (
-        line("finger", "joint_spacing", [0.04, 0.04, 0.04]),
+        entry_toml("finger", "joint_spacing", [0.04, 0.04, 0.04]),
         "finger.joint_spacing: one number is needed, got a list of 3",
     ),
     "a short list": (
-        line("palm", "tile_x", [0.01, 0.02]),
+        entry_toml("palm", "tile_x", [0.01, 0.02]),
         "palm.tile_x: a list of 4 numbers is needed, got [0.01, 0.02]",
     ),
     "a negative length": (
-        line("finger", "tile_height", -0.004),
+        entry_toml("finger", "tile_height", -0.004),
         "finger.tile_height: must be from 0 to 1 m, got -0.004",
     ),
     "joints in one place": (
-        line("finger", "joint_spacing", 0.0),
+        entry_toml("finger", "joint_spacing", 0.0),
         "finger.joint_spacing: must be above 0, got 0",
     ),
     "no pulley": (
-        line("finger", "pulley_radii", [0.005, 0.0, 0.003]),
+        entry_toml("finger", "pulley_radii", [0.005, 0.0, 0.003]),
         "finger.pulley_radii: must be above 0 m, got [0.005, 0.0, 0.003]",
     ),
     "a tile beyond its phalanx": (
-        line("finger", "joint_spacing", 0.03),
+        entry_toml("finger", "joint_spacing", 0.03),
         "finger.tile_centre: a tile must lie on its phalanx, from 0 to 0.03 m, got 0.0085 to",
     ),
     "a joint that cannot turn": (
-        line("finger", "joint_lower", [1.8, -0.3, -0.3]),
+        entry_toml("finger", "joint_lower", [1.8, -0.3, -0.3]),
         "finger.joint_upper: must be above finger.joint_lower, both within half a turn, got 1.75",
     ),
     "friction of one": (
-        line("tendon", "friction", 1.0),
+        entry_toml("tendon", "friction", 1.0),
         "tendon.friction: must be in [0, 1), got 1",
     ),
     "friction of the palm": (
-        line("palm", "pulley_friction", 2.0),
+        entry_toml("palm", "pulley_friction", 2.0),
         "palm.pulley_friction: must be in [0, 2), got 2",
     ),
     "own friction of the palm": (
-        line("palm", "own_pulley_friction", 2.5),
+        entry_toml("palm", "own_pulley_friction", 2.5),
         "palm.own_pulley_friction: must be in [0, 2), got 2.5",
     ),
     "a palm without contact": (
-        line("palm", "contact_stiffness", [0.0] * 8),
+        entry_toml("palm", "contact_stiffness", [0.0] * 8),
         "palm.contact_stiffness: stiffnesses above 0 N/m are needed",
     ),
     "a palm that may not press": (
-        line("palm", "pressing_limit", 0.0),
+        entry_toml("palm", "pressing_limit", 0.0),
         "palm.pressing_limit: must be above 0, got 0",
     ),
     "closing beyond the tendon": (
-        line("tendon", "closing_tension", 800.0),
+        entry_toml("tendon", "closing_tension", 800.0),
         "tendon.closing_tension: must be at most the tendon's 700 N, got 800",
     ),
     "a gear that gains": (
-        line("motor", "efficiency", 1.2),
+        entry_toml("motor", "efficiency", 1.2),
         "motor.efficiency: must be in (0, 1], got 1.2",
     ),
     "not a number": (
-        line("finger", "pulley_radii", "[0.005, nan, 0.003]"),
+        entry_toml("finger", "pulley_radii", "[0.005, nan, 0.003]"),
         "finger.pulley_radii.value[1]: must be finite, got nan",
     ),
     "no unit": (
@@ -343,7 +337,7 @@ def told(capfd: pytest.CaptureFixture[str]) -> dict:
 def test_a_plan_is_for_the_hand_of_the_file(file, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["plan", "wall-300", "--json"]) == 0
     assert told(capfd)["limiting"]["limit"] != "tendon_tension"
-    path = file(line("tendon", "maximum_tension", 60.0))
+    path = file(entry_toml("tendon", "maximum_tension", 60.0))
     assert run(["plan", "wall-300", "--json", "--hand", path]) == 3
     reply = told(capfd)
     assert reply["limiting"]["limit"] == "tendon_tension"
@@ -357,7 +351,10 @@ def test_the_file_has_the_last_word_over_the_stance(
     request = put(wall_request(None), ("stance", "hand"), msgspec.to_builtins(THICK.sections))
     request["stance"]["hand"]["hand"] = {"mass": {"value": 9.0, "unit": "kg", "source": "assumed"}}
     stance = file(json.dumps(request), "stance.json")
-    assert run(["plan", stance, "--json", "--hand", file(line("hand", "mass", 4.6))]) in (0, 3)
+    assert run(["plan", stance, "--json", "--hand", file(entry_toml("hand", "mass", 4.6))]) in (
+        0,
+        3,
+    )
     weight = 9.81 * (robosimian().mass + 4 * 2.0)
     got = told(capfd)
     np.testing.assert_allclose(np.linalg.norm(got["body_wrench"][:3]), weight, rtol=1e-9)
@@ -367,7 +364,7 @@ def test_the_file_has_the_last_word_over_the_stance(
 
 
 def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixture[str]) -> None:
-    path = file(line("hand", "mass", 3.0))
+    path = file(entry_toml("hand", "mass", 3.0))
     assert run(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
     assert f"one FILE at most, got {path}, {path}" in capfd.readouterr().err
     assert run(["plan", "wall-300", "--hand", "front_left"]) == 2
@@ -375,7 +372,7 @@ def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixtur
 
 
 def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixture[str]) -> None:
-    path = file(line("tendon", "maximum_tension", 60.0))
+    path = file(entry_toml("tendon", "maximum_tension", 60.0))
     limits = {}
     for more in ([], ["--hand", path]):
         assert run(["wrench-space", "wall-300", "--json", "--hand", "front_left", *more]) == 0
@@ -390,7 +387,7 @@ def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixtu
 def test_a_route_is_climbed_with_the_hand(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = file(line("structure", "held_mass", 20.0))
+    path = file(entry_toml("structure", "held_mass", 20.0))
     tables = {}
     for workers in ("1", "2"):
         flags = ["--json", "--hand", path, "--workers", workers]
@@ -404,7 +401,7 @@ def test_a_route_is_climbed_with_the_hand(
 def test_the_demo_asks_for_the_hand(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = file(line("tendon", "maximum_tension", 60.0))
+    path = file(entry_toml("tendon", "maximum_tension", 60.0))
     assert run(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
     assert told(capfd)["limiting"]["limit"] == "tendon_tension"
     assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
@@ -413,7 +410,7 @@ def test_the_demo_asks_for_the_hand(
 def test_a_study_is_of_the_hand_and_says_so(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = file(line("palm", "spring_stiffness", 400.0))
+    path = file(entry_toml("palm", "spring_stiffness", 400.0))
     assert run(["study", "fig06", "-o", str(tmp_path), "--json", "--hand", path]) == 0
     reply = told(capfd)
     assert reply["hand"]["palm"]["spring_stiffness"]["value"] == 400.0
@@ -427,7 +424,7 @@ def test_a_study_is_of_the_hand_and_says_so(
 def test_the_studies_of_the_palm_bear_any_possible_palm(
     friction: float, file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = file(line("palm", "pulley_friction", friction))
+    path = file(entry_toml("palm", "pulley_friction", friction))
     for name in ("fig06", "fig07"):
         assert run(["study", name, "-o", str(tmp_path), "--json", "--hand", path]) == 0
         assert told(capfd)["data"]["friction"] == friction
@@ -474,7 +471,7 @@ def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Se
 def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(file) -> None:
     plain = request_for(mass=HEAVY)
     heavy = own("hand", "mass", 12.6)
-    served = Served(free_endpoint(), "--hand", file(line("structure", "held_mass", 20.0)))
+    served = Served(free_endpoint(), "--hand", file(entry_toml("structure", "held_mass", 20.0)))
     default = own("structure", "held_mass", 20.0)
     try:
         with zenoh.open(client_config(served.endpoint)) as session:
@@ -487,7 +484,7 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(file) -> No
         stance = file(json.dumps(wall_request(HEAVY)), "stance.json")
         flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
         flags += ["--timeout", str(PATIENCE)]
-        hand = file(line("structure", "held_mass", 45.0), "mine.toml")
+        hand = file(entry_toml("structure", "held_mass", 45.0), "mine.toml")
         asked = process("query", stance, *flags, "--json", "--hand", hand)
         want = dispatch.plan(with_hand(plain, own("structure", "held_mass", 45.0)))
         assert json.loads(asked.stdout)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)

@@ -12,8 +12,8 @@ from hypothesis import given, settings, strategies as st
 from hand_models import Cylinder, Ellipsoid, Grasp, InvalidInputError, Sphere
 from service.answering import dispatch
 from service.wire import PLAN
-from tests.suite.helpers.asked import wall_request
 from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.requests import wall_request
 
 size = st.floats(0.03, 3.0)
 axes = st.tuples(size, size, size)

@@ -19,18 +19,24 @@ from planner.prepare import hand_space, posture
 from planner.programs import SLACK
 from planner.question import ForceCap, Limits, Load, Question
 from planner.solving import plan
-from service.answering import dispatch
-from service.answering.questions import question as asked_by
+from service.answering import dispatch, questions
 from service.commands.cli import run
 from service.replies import BodySpaceReply, ErrorReply
 from service.requests import PlanRequest
 from service.wire import Format, decode_request
-from tests.planner.capability.test_polygon import hull_of
-from tests.planner.floating.test_floating_plan import NEAR, PAIR, body_wrench
-from tests.service.commands.test_cli import BAD_INPUT, DONE, OVERLOADED, complaint, result, stance  # noqa: F401
-from tests.service.wire.test_messages import KINDS
 from tests.suite.helpers import peer
-from tests.suite.helpers.asked import HEAVY, flat_request, jointed_request, put, spoil, wall_request
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
+from tests.suite.helpers.floating_hands import NEAR, PAIR, body_wrench
+from tests.suite.helpers.polygons import hull_of
+from tests.suite.helpers.replies import ERROR_KINDS
+from tests.suite.helpers.requests import (
+    HEAVY,
+    flat_request,
+    put,
+    request_with_joints,
+    spoil,
+    wall_request,
+)
 from tests.suite.helpers.stances import ask, attainable_wrench, on_wall, random_stance
 
 KEY = "crux/robosimian/body_space"
@@ -44,18 +50,18 @@ def wall_space() -> BodySpace:
 
 
 @cache
-def jointed() -> Question:
+def with_joints() -> Question:
     """The wall with joints that are known, under the robot's own weight on a small planet."""
-    request = jointed_request()
+    request = request_with_joints()
     for extra in ("objective", "limits", "present", "want", "load"):
         del request[extra]
     del request["stance"]["hands"][1]["wrench"]
-    return asked_by(decode_request(json.dumps(request).encode(), PlanRequest))
+    return questions.question(decode_request(json.dumps(request).encode(), PlanRequest))
 
 
 @cache
-def jointed_space() -> BodySpace:
-    return BodySpace(jointed())
+def space_with_joints() -> BodySpace:
+    return BodySpace(with_joints())
 
 
 def random_space(seed: int) -> BodySpace:
@@ -230,7 +236,7 @@ def test_a_plan_holds_up_to_the_largest_acceleration(way):
 
 @pytest.mark.parametrize("index", range(6))
 def test_so_it_does_with_joints_and_turning(index):
-    space = jointed_space()
+    space = space_with_joints()
     for sign in (1.0, -1.0):
         way = sign * np.eye(6)[index]
         most = space.acceleration(way)
@@ -240,7 +246,7 @@ def test_so_it_does_with_joints_and_turning(index):
 
 def test_torques_change_with_the_acceleration():
     # weak knees: the joints end the way, and would not if only gravity loaded them
-    question = replace(jointed(), limits=Limits(joint_torque=60.0))
+    question = replace(with_joints(), limits=Limits(joint_torque=60.0))
     space = BodySpace(question)
     ends = {}
     for way in AXES:
@@ -253,7 +259,7 @@ def test_torques_change_with_the_acceleration():
 
 
 def test_a_limb_in_the_air_ends_it_too():
-    whole = jointed()
+    whole = with_joints()
     hands = tuple(h for h in whole.stance.hands if h.limb != "front_left")
     question = replace(whole, stance=replace(whole.stance, hands=hands))
     gravity = np.abs(posture(question).joints["front_left"].gravity)
@@ -273,9 +279,9 @@ def test_a_limb_in_the_air_ends_it_too():
 
 
 def test_accelerations_are_from_rest_whatever_is_asked_for():
-    rest = jointed_space()
+    rest = space_with_joints()
     load = Load(acceleration=(0.3, -0.2, 0.4), angular_acceleration=(0.1, 0.0, -0.2))
-    moving = BodySpace(replace(jointed(), load=load))
+    moving = BodySpace(replace(with_joints(), load=load))
     np.testing.assert_allclose(moving.weight, rest.needed, atol=1e-6)
     assert np.abs(moving.needed - rest.needed).max() > 10.0
     for way in np.eye(6)[[0, 2, 4]]:
@@ -322,9 +328,9 @@ def test_turning_needs_joints_and_the_robots_own_load():
     with pytest.raises(InvalidInputError, match="3 components are needed, got 6"):
         wall_space().acceleration(np.eye(6)[4])
     with pytest.raises(InvalidInputError, match="3 or 6 components"):
-        jointed_space().acceleration([1.0, 0.0])
+        space_with_joints().acceleration([1.0, 0.0])
     with pytest.raises(InvalidInputError, match="not zero"):
-        jointed_space().acceleration(np.zeros(3))
+        space_with_joints().acceleration(np.zeros(3))
 
 
 # Monotone -----------------------------------------------------------------------------------------
@@ -435,7 +441,9 @@ def test_a_reply_says_what_the_planner_says():
     diagonal = [0.0, 3.0, 4.0]
     request = space_request(axes=["fy", "mz"], others="free", directions=[diagonal])
     reply = reply_to(request)
-    space = BodySpace(asked_by(decode_request(json.dumps(wall_request()).encode(), PlanRequest)))
+    space = BodySpace(
+        questions.question(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
+    )
     assert (reply.id, reply.robot, reply.status) == ("wall", "robosimian", "optimal")
     assert (reply.exact, reply.error, reply.warnings) == (True, 0.0, [])
     np.testing.assert_allclose(reply.body_wrench, space.needed)
@@ -471,7 +479,7 @@ def test_spoilt_requests_get_a_reply_or_an_error():
     chance = random.Random(5)
     seen = {}
     for i in range(48):
-        asked = (jointed_request, flat_request, flat_request, flat_request)[i % 4]()
+        asked = (request_with_joints, flat_request, flat_request, flat_request)[i % 4]()
         request = space_request(asked, axes=["fx", "mz"], others="free", directions=[[1, 2, 3]])
         payload, encoding = spoil(request, chance)
         answer = dispatch.handle(KEY, payload, encoding)
@@ -481,13 +489,13 @@ def test_spoilt_requests_get_a_reply_or_an_error():
         else:
             outcome = form.decode(answer.payload, ErrorReply).error.kind
         seen[outcome] = seen.get(outcome, 0) + 1
-    assert set(seen) <= {*KINDS, "optimal", "overloaded", "infeasible"}
+    assert set(seen) <= {*ERROR_KINDS, "optimal", "overloaded", "infeasible"}
     assert seen["invalid"] > 12
     assert seen["overloaded"] > 1
 
 
 def test_a_reply_with_joints_tells_of_turning():
-    request = jointed_request()
+    request = request_with_joints()
     reply = reply_to(space_request(request))
     assert set(reply.angular_acceleration) == {s + a for a in "xyz" for s in "+-"}
     assert all(one.acceleration > 0.0 for one in reply.angular_acceleration.values())
@@ -540,8 +548,8 @@ def test_requests_are_strict(more, field, text):
 # The command --------------------------------------------------------------------------------------
 
 
-def test_the_command_prints_what_the_reply_says(stance, capfd):  # noqa: F811
-    path = stance(wall_request())
+def test_the_command_prints_what_the_reply_says(stance_file, capfd):
+    path = stance_file(wall_request())
     assert run(["body-space", path, "--axes", "fy,fz", "--projection", "--json"]) == DONE
     reply = msgspec.convert(result(capfd), BodySpaceReply)
     assert (reply.section.axes, reply.section.others) == (["fy", "fz"], "free")
@@ -558,7 +566,7 @@ def test_the_command_prints_what_the_reply_says(stance, capfd):  # noqa: F811
     assert f"{len(reply.section.inner)} corners" in out
 
 
-def test_the_command_draws(stance, tmp_path: Path, capfd):  # noqa: F811
+def test_the_command_draws(stance_file, tmp_path: Path, capfd):
     pair = wall_request(limbs=("front_left", "front_right"))
     pair["load"] = {"mass": 15.0, "com": [0.5, 0.0, -0.3]}
     for name, request, status in (
@@ -566,20 +574,20 @@ def test_the_command_draws(stance, tmp_path: Path, capfd):  # noqa: F811
         ("pair.png", pair, DONE),
     ):
         picture = tmp_path / name
-        arguments = ["body-space", stance(request), "--pure", "--json", "--plot", str(picture)]
+        arguments = ["body-space", stance_file(request), "--pure", "--json", "--plot", str(picture)]
         assert run(arguments) == status
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert result(capfd)["section"]["others"] == "zero"
 
 
-def test_an_overloaded_body_ends_with_three(stance, capfd):  # noqa: F811
-    assert run(["body-space", stance(wall_request(HEAVY))]) == OVERLOADED
+def test_an_overloaded_body_ends_with_three(stance_file, capfd):
+    assert run(["body-space", stance_file(wall_request(HEAVY))]) == OVERLOADED
     out, _ = capfd.readouterr()
     assert "OVERLOADED" in out
     assert "cannot be held at rest" in out
 
 
 @pytest.mark.parametrize("axes", ["fx", "fx,fx", "fx,fq", "fx,fy,fz", ""])
-def test_wrong_axes_are_one_line(stance, axes, capfd):  # noqa: F811
-    assert run(["body-space", stance(wall_request()), "--axes", axes]) == BAD_INPUT
+def test_wrong_axes_are_one_line(stance_file, axes, capfd):
+    assert run(["body-space", stance_file(wall_request()), "--axes", axes]) == BAD_INPUT
     assert "two different ones of fx, fy, fz, mx, my, mz" in complaint(capfd)

@@ -10,23 +10,9 @@ from scipy.spatial import ConvexHull
 from hand_models.base import SolverError
 from planner.capability import Polygon
 from planner.capability.polygon import SupportPoint, enclose
+from tests.suite.helpers.polygons import hull_of
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-
-
-def hull_of(points, calls=None):
-    """How far the hull of points reaches; touches an edge in its middle."""
-    points = np.asarray(points, dtype=float)
-
-    def touching(normal):
-        if calls is not None:
-            calls.append(normal)
-        along = points @ normal
-        most = along.max()
-        far = points[along >= most - 1e-9 * (1.0 + abs(most))]
-        return SupportPoint(far.mean(axis=0), float(most))
-
-    return touching
 
 
 def disc(radius, centre=(0.0, 0.0)):

@@ -40,11 +40,11 @@ from service.commands.cli import run
 from service.commands.stances import read_request
 from service.serving import CruxClient
 from service.wire import ServiceError
-from tests.service.serving.test_service import Served, client_config, free_endpoint, plan_request
 from tests.suite.helpers import peer
-from tests.suite.helpers.asked import HEAVY, MSGPACK, wall_request
-from tests.suite.helpers.barred import barred, most_given
+from tests.suite.helpers.named_rows import most_given, named_rows
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import HEAVY, MSGPACK, plan_request, wall_request
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 
 LONG = 1e4
@@ -263,7 +263,7 @@ def assert_proven(question: Question, answer: Plan, cap: float | None) -> None:
     """No loads that keep to the rows give what is needed, says HiGHS on its own data."""
     proof = answer.certificate
     assert proof.utilisation == cap
-    most = most_given(barred(question, cap), proof.direction, proof.held)
+    most = most_given(named_rows(question, cap), proof.direction, proof.held)
     assert most is None or most <= proof.supremum + 1e-6 * max(1.0, abs(most))
     assert proof.supremum < proof.needed
     assert proof.blocking

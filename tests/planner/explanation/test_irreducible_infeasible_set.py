@@ -13,7 +13,8 @@ from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.programs import UNLIMITED
 from planner.result import LimitName
-from tests.suite.helpers.barred import barred, explained, few_and_all, have_loads
+from tests.suite.helpers.named_rows import have_loads, named_rows
+from tests.suite.helpers.random_questions import explained, few_and_all
 
 LIMB = "front_left"
 
@@ -170,7 +171,7 @@ def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_
         proof = answer.certificate
         assert proof is not None, label
         assert proof.irreducible is not None, label
-        parts = barred(question, proof.utilisation)
+        parts = named_rows(question, proof.utilisation)
         assert set(proof.irreducible) <= parts.constraints, label
         assert not have_loads(parts, proof.irreducible), label
         for name in proof.irreducible:
@@ -191,7 +192,7 @@ def test_of_random_stances_those_are_told_that_would_do_alone(status, seeds):
             assert len(proof.irreducible) > 16, label
             continue
         told.append(proof.sufficient)
-        parts = barred(question, proof.utilisation)
+        parts = named_rows(question, proof.utilisation)
         alone = {
             name
             for name in {*proof.irreducible, *proof.blocking}

@@ -14,8 +14,8 @@ from planner.result import Price
 from planner.robots import robosimian
 from planner.solving import plan
 from tests.suite.helpers import peer
-from tests.suite.helpers.jointed import at_joints
 from tests.suite.helpers.stances import ask, on_wall
+from tests.suite.helpers.stances_with_joints import at_joints
 
 ROBOT = robosimian()
 ANGLES = {
@@ -25,7 +25,7 @@ ANGLES = {
 WRENCH = np.array([150.0, 40.0, 60.0, 5.0, -8.0, 3.0])
 
 
-def jointed(limbs: tuple[str, ...], torque: dict) -> Question:
+def with_joints(limbs: tuple[str, ...], torque: dict) -> Question:
     stance = at_joints(ROBOT, ANGLES, limbs, body=Pose.identity())
     return ask(stance, "prices", body_wrench=WRENCH, limits=Limits(joint_torque=torque))
 
@@ -72,7 +72,7 @@ def with_torque(question: Question, price: Price):
 @pytest.mark.parametrize("limbs", [ROBOT.limbs, ROBOT.limbs[:3], ROBOT.limbs[:2]], ids=len)
 def test_price_of_a_joint_lies_between_the_one_sided_differences(limbs):
     torque = {limb: tuple(np.linspace(60.0, 20.0, 7)) for limb in ROBOT.limbs}
-    question = jointed(limbs, torque)
+    question = with_joints(limbs, torque)
     answer = plan(question)
     prices = [price for price in answer.prices if price.name.limit == "joint_torque"]
     assert prices
@@ -86,7 +86,7 @@ def test_price_of_a_joint_lies_between_the_one_sided_differences(limbs):
 
 def test_price_of_a_limb_that_holds_nothing_is_its_joints_alone():
     torque = {ROBOT.limbs[3]: (0.5,) * 7}
-    question = jointed(ROBOT.limbs[:3], torque)
+    question = with_joints(ROBOT.limbs[:3], torque)
     (price,) = plan(question).prices
     assert price.name.limb == ROBOT.limbs[3]
     more, less = slopes(*with_torque(question, price))

@@ -23,18 +23,11 @@ from service.commands.tables import print_plan
 from service.replies import Certificate, PlanReply
 from service.requests import PlanRequest
 from tests.suite.helpers import peer
-from tests.suite.helpers.asked import HEAVY, wall_request
-from tests.suite.helpers.barred import (
-    barred,
-    distance,
-    explained,
-    few_and_all,
-    have_loads,
-    miss,
-    most_given,
-)
-from tests.suite.helpers.jointed import at_joints
+from tests.suite.helpers.named_rows import distance, have_loads, miss, most_given, named_rows
+from tests.suite.helpers.random_questions import explained, few_and_all
+from tests.suite.helpers.requests import HEAVY, wall_request
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
+from tests.suite.helpers.stances_with_joints import at_joints
 
 STATUSES = ("infeasible", "overloaded")
 HEAVILY = replace(CALIBRATION_LOAD, mass=150.0)
@@ -56,7 +49,7 @@ def test_no_loads_give_what_is_needed_in_the_certificates_direction(status, seed
             needed += sum(c * v for c, v in zip(part, given, strict=True) if v is not None)
         assert proof.needed == pytest.approx(needed, rel=1e-9, abs=1e-9), label
         assert proof.supremum < proof.needed, label
-        most = most_given(barred(question, proof.utilisation), proof.direction, proof.held)
+        most = most_given(named_rows(question, proof.utilisation), proof.direction, proof.held)
         if most is not None:
             assert most <= proof.supremum + 1e-6 * max(1.0, abs(most)), label
         if not np.any(proof.direction) and not any(part.any() for part in proof.held.values()):
@@ -69,7 +62,7 @@ def test_the_nearest_body_wrench_can_be_held_and_no_nearer_one(status, seeds):
     seen = 0
     for label, question, answer in explained(status, seeds):
         proof = answer.certificate
-        parts = barred(question, proof.utilisation)
+        parts = named_rows(question, proof.utilisation)
         if proof.nearest is None:
             assert proof.shortfall is None
             assert not have_loads(replaced(parts), parts.constraints), label
@@ -204,7 +197,7 @@ def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way
     proof = answer.certificate
     assert answer.status == "overloaded"
     assert proof.irreducible[0] == proof.blocking[0] == own
-    parts = barred(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})), 1.0)
+    parts = named_rows(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})), 1.0)
     alone = {n for n in proof.irreducible if have_loads(parts, parts.constraints - {n})}
     assert own in alone
     assert set(proof.sufficient) == alone

@@ -17,8 +17,8 @@ from planner.solving import plan
 from service.answering.answers import plan_reply
 from service.commands.tables import print_plan
 from tests.suite.helpers import peer
-from tests.suite.helpers.jointed import random_jointed_question
 from tests.suite.helpers.stances import ask, on_wall, random_question
+from tests.suite.helpers.stances_with_joints import random_question_with_joints
 
 ROOM = 0.1
 """What is no room on the way [N]."""
@@ -197,12 +197,12 @@ def test_an_overloaded_plan_has_no_safe_way():
 
 
 @pytest.mark.parametrize(
-    ("jointed", "plain"),
+    ("with_joints", "plain"),
     [((1, 4), (1, 9)), pytest.param((6, 14), (10, 11), marks=pytest.mark.slow)],
     ids=["few", "more"],
 )
-def test_ways_of_random_stances(jointed, plain):
-    seen = {_checked(random_jointed_question(seed), seed) for seed in jointed}
+def test_ways_of_random_stances(with_joints, plain):
+    seen = {_checked(random_question_with_joints(seed), seed) for seed in with_joints}
     seen |= {_checked(random_question(seed), seed) for seed in plain}
     assert seen == {True, False}
 

@@ -10,20 +10,13 @@ import pytest
 from scipy.optimize import minimize
 
 from hand_models.base import wrench_transport
-from planner.prepare import assemble, posture
+from planner.prepare import posture
 from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
 from planner.question import ForceCap, Limits, Question
-from planner.result import HandPlan, Plan
+from planner.result import Plan
 from planner.solving import plan
-from tests.planner.floating.test_floating_plan import (
-    NEAR,
-    PAIR,
-    REAR,
-    body_wrench,
-    floating,
-    wrist_of,
-)
-from tests.suite.helpers import peer
+from tests.suite.helpers.efforts import promised, told_effort
+from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 from tests.suite.helpers.stances import on_wall
 
 chance = np.random.default_rng(1)
@@ -38,7 +31,7 @@ def least(question: Question) -> Plan:
 
 
 @cache
-def jointed() -> Question:
+def with_joints() -> Question:
     """Four hands on a wall, the rear ones floating, with the joints that inverse kinematics gives.
 
     Its joints' limits are halved, so that they count.
@@ -57,73 +50,11 @@ def pair() -> Question:
 @cache
 def both(name: str) -> tuple[Question, Plan, Plan]:
     """A question, its plan of least utilisation and that of least effort."""
-    question = {"pair": pair, "jointed": jointed}[name]()
+    question = {"pair": pair, "with joints": with_joints}[name]()
     return question, plan(question), least(question)
 
 
-def told_effort(question: Question, answer: Plan) -> float:
-    """The sum of squared relative tensions and torques, from the plan's numbers alone."""
-    total = 0.0
-    for hand in answer.hands:
-        most = next(
-            s for row, s in zip(hand.space.rows, hand.space.s, strict=False) if is_tension(row)
-        )
-        total += sum((finger.tendon_tension / most) ** 2 for finger in hand.fingers)
-        if answer.joint_torque is not None:
-            most = question.limits.joint_torque or question.stance.robot.torque_limits[hand.limb]
-            total += float(np.sum((answer.joint_torque[hand.limb] / most) ** 2))
-    return total
-
-
-def is_tension(row) -> bool:
-    return row.limit == "tendon_tension"
-
-
-def loads_of(hand: HandPlan) -> np.ndarray:
-    """The loads y of a hand's set that its plan tells."""
-    if hand.wrist is not None:
-        return hand.wrist.twist
-    told = {"palm_shear": -hand.palm.force[0], "palm_pressing": hand.palm.force[2]}
-    for finger in hand.fingers:
-        told[f"{finger.name}/tension"] = finger.tendon_tension
-        told[f"{finger.name}/lateral"] = sum(tile.lateral for tile in finger.tiles)
-    y = np.array([told[column] for column in hand.space.columns])
-    np.testing.assert_allclose(hand.space.wrench(y), hand.wrench, atol=1e-6)
-    return y
-
-
-def promised(question: Question, answer: Plan, cap: float) -> float:
-    """How much less effort the sets about a plan promise, at most: to first order, by HiGHS.
-
-    Effort is convex on them, so that it lies above its tangent at the plan.
-    """
-    _, hands = assemble(question, posture(question), answer.body_wrench)
-    data = hands.sets(hands.at_rest(hands.idle)).data.hands
-    spaces = [hand.space for hand in answer.hands]
-    loads = [loads_of(hand) for hand in answer.hands]
-    slopes = []
-    for space, y, scaled in zip(spaces, loads, data, strict=True):
-        those = [
-            i
-            for i, row in enumerate(space.rows[: len(space.s)])
-            if is_tension(row) or (row.limit == "joint_torque" and row.label.endswith("+"))
-        ]
-        E, e0 = space.L[those] / space.s[those, None], space.l0[those] / space.s[those]
-        slopes.append(2.0 * (E.T @ (E @ y + e0) + scaled.rest / scaled.unit**2 * y))
-    cost = np.concatenate(slopes)
-    r = peer.rows(question, spaces)
-    result = peer.solve(
-        cost,
-        np.vstack([r.L, r.H]),
-        np.concatenate([cap * r.s - r.l0, r.h]),
-        r.B,
-        answer.body_wrench - r.b,
-    )
-    assert result.status == 0, result.message
-    return float(cost @ np.concatenate(loads) - result.fun)
-
-
-@pytest.mark.parametrize("name", ["pair", "jointed"])
+@pytest.mark.parametrize("name", ["pair", "with joints"])
 def test_least_effort_is_no_more_and_its_sets_promise_no_less(name):
     question, margin, effort = both(name)
     assert effort.status == "optimal"
@@ -208,7 +139,7 @@ def test_another_solver_finds_nothing_less_on_the_model_itself():
 
 
 def test_a_tighter_cap_costs_effort_and_is_kept():
-    question, margin, effort = both("jointed")
+    question, margin, effort = both("with joints")
     efforts = []
     for cap in (margin.utilisation + 0.02, 0.5 * (1.0 + margin.utilisation)):
         limits = replace(question.limits, utilisation=cap)
@@ -220,7 +151,7 @@ def test_a_tighter_cap_costs_effort_and_is_kept():
 
 
 def test_the_least_utilisation_itself_may_be_the_cap():
-    question, margin, _ = both("jointed")
+    question, margin, _ = both("with joints")
     limits = replace(question.limits, utilisation=margin.utilisation)
     answer = least(replace(question, limits=limits))
     assert answer.status == "optimal"
@@ -229,7 +160,7 @@ def test_the_least_utilisation_itself_may_be_the_cap():
 
 
 def test_beyond_the_cap_the_least_utilisation_is_told():
-    question, margin, _ = both("jointed")
+    question, margin, _ = both("with joints")
     limits = replace(question.limits, utilisation=margin.utilisation - 0.01)
     answer = least(replace(question, limits=limits))
     assert answer.status == "overloaded"
@@ -238,7 +169,7 @@ def test_beyond_the_cap_the_least_utilisation_is_told():
 
 
 def test_an_ended_budget_leaves_a_plan_and_says_so(monkeypatch):
-    question, margin, _ = both("jointed")
+    question, margin, _ = both("with joints")
     monkeypatch.setattr("planner.floating.effort.PROGRAMS", 0)
     answer = least(question)
     assert answer.status == "optimal"
@@ -251,7 +182,7 @@ def test_an_ended_budget_leaves_a_plan_and_says_so(monkeypatch):
 
 
 def test_joints_of_floating_hands_bear_gravity_and_the_hand_where_it_rests():
-    question, margin, effort = both("jointed")
+    question, margin, effort = both("with joints")
     where = posture(question)
     for answer in (margin, effort):
         for hand in answer.hands:
@@ -278,7 +209,7 @@ def of_force(question: Question, force: float) -> Question:
 )
 def test_prices_at_floating_hands_are_slopes(limited, at, step, limit):
     """One-sided differences on the limit itself, each from a search of its own."""
-    question = replace(jointed(), want=frozenset(["prices"]))
+    question = replace(with_joints(), want=frozenset(["prices"]))
     low, here, high = (plan(limited(question, at + d)) for d in (-step, 0.0, step))
     told = [p.price for p in here.prices if p.name.limit == limit]
     assert len(told) == 1
@@ -288,7 +219,7 @@ def test_prices_at_floating_hands_are_slopes(limited, at, step, limit):
 
 
 def test_effort_prices_at_floating_hands_are_slopes():
-    question, step = jointed(), 1.0
+    question, step = with_joints(), 1.0
     low, here, high = (least(of_force(question, 80.0 + d)) for d in (-step, 0.0, step))
     told = [p.price for p in here.effort_prices if p.name.limit == "force_cap"]
     assert len(told) == 1
@@ -308,13 +239,13 @@ GIVEN = {
     [*(("rear_right", name) for name in GIVEN), ("front_right", "one force")],
 )
 def test_given_components_of_a_wrench_are_met(limb, name):
-    question = jointed()
+    question = with_joints()
     hands = tuple(
         replace(hand, wrench=GIVEN[name]) if hand.limb == limb else hand
         for hand in question.stance.hands
     )
     given = replace(question, stance=replace(question.stance, hands=hands))
-    _, free, _ = both("jointed")
+    _, free, _ = both("with joints")
     margin, effort = plan(given), least(given)
     assert margin.utilisation >= free.utilisation * (1.0 - 1e-5)
     assert effort.effort <= margin.effort
@@ -327,7 +258,7 @@ def test_given_components_of_a_wrench_are_met(limb, name):
 
 
 def test_load_factor_leaves_given_components_as_they_are():
-    question = jointed()
+    question = with_joints()
     hands = tuple(
         replace(hand, wrench=GIVEN["three forces"]) if hand.limb == "rear_right" else hand
         for hand in question.stance.hands
@@ -341,7 +272,7 @@ def test_load_factor_leaves_given_components_as_they_are():
 
 
 def test_fixed_hands_beside_floating_ones_keep_near_their_present_tensions():
-    question, margin, _ = both("jointed")
+    question, margin, _ = both("with joints")
     now = {
         hand.limb: np.array([finger.tendon_tension for finger in hand.fingers])
         for hand in margin.hands

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError, UnsupportedError, wrench_transport
-from hand_models.compliance import CompliantHand, FloatingWrist
 from hand_models.finger import settle_finger
 from planner.prepare import settle_hand
 from planner.programs import TWIST_UNIT
-from planner.question import HandOnHold, Question, Stance
+from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
 from planner.verification import problems
@@ -22,38 +21,10 @@ from service.commands.stances import read_request
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
 from service.wire import decode_request
-from tests.suite.helpers.asked import LIGHT, spoil, wall_request
+from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import LIGHT, spoil, wall_request
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
-
-REAR = ("rear_right", "rear_left")
-
-
-def floating(stance: Stance, *limbs: str, preload=None) -> Stance:
-    hands = tuple(
-        replace(hand, wrist="floating", tendon_preload=preload) if hand.limb in limbs else hand
-        for hand in stance.hands
-    )
-    return replace(stance, hands=hands)
-
-
-def wrist_of(hand: HandOnHold, stance: Stance) -> FloatingWrist:
-    return FloatingWrist(CompliantHand(settle_hand(hand, stance), hand.tendon_preload))
-
-
-def body_wrench(stance: Stance, twists) -> np.ndarray:
-    """What floating hands give the body at some twists of their wrists, by the model alone."""
-    body, total = stance.body.inverse(), np.zeros(6)
-    for hand, twist in zip(stance.hands, twists, strict=True):
-        model = wrist_of(hand, stance).hand
-        wrench = model.wrenches(model.loads(np.asarray(twist)[None]))[0]
-        total -= wrench_transport(body @ hand.pose) @ wrench
-    return total
-
-
-PAIR = floating(on_wall(limbs=REAR), *REAR, preload=np.full(4, 50.0))
-NEAR = np.array([-0.8e-3, 0.1e-3, 0.2e-3, 1e-3, 4e-3, -2e-3])
-"""A small twist that a hand of `PAIR` bears, its palm dragging and pressing."""
 
 
 @cache

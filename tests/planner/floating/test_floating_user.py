@@ -21,11 +21,12 @@ from planner.programs import solvers, stance_program
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
-from service.answering.own_robot import ROBOTS
 from service.answering.questions import question
-from service.commands import cli as command, terminal as screens
+from service.commands import terminal
+from service.commands.cli import run
 from service.commands.stances import read_request
 from service.requests import PlanRequest
+from tests.suite.helpers.commands import DONE, OVERLOADED
 
 REAR = ("rear_right", "rear_left")
 
@@ -144,11 +145,14 @@ def test_preload_that_alone_overloads_is_named():
     assert any("tendon_preload of 95 N is above the limit of 60 N" in t for t in capped.warnings)
 
 
-def test_no_raw_warning_leaves():
-    asked = request(preload=20.0, closing=20.0)
+def test_no_raw_warning_leaves(stance_file, capfd):
+    path = stance_file(msgspec.to_builtins(request(preload=20.0, closing=20.0)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert command._without_palms(asked, ROBOTS) is not None
+        assert run(["plan", path]) in (DONE, OVERLOADED)
+    out, err = capfd.readouterr()
+    assert "load factor without the palms: " in out
+    assert err == ""
 
 
 @pytest.mark.parametrize(
@@ -166,15 +170,15 @@ def test_far_wrist_is_told(twist, told):
     assert bool(list(far_wrists([hand]))) == told
 
 
-@pytest.mark.parametrize("terminal", [True, False])
-def test_wait_is_shown_on_terminals_alone(monkeypatch, capsys, terminal):
+@pytest.mark.parametrize("shown", [True, False])
+def test_wait_is_shown_on_terminals_alone(monkeypatch, capsys, shown):
     monkeypatch.setattr(
-        screens,
+        terminal,
         "console",
-        lambda stderr=False: Console(file=sys.stderr, force_terminal=terminal, width=80),
+        lambda stderr=False: Console(file=sys.stderr, force_terminal=shown, width=80),
     )
-    with screens.waiting("planning this", request()):
+    with terminal.waiting("planning this", request()):
         pass
     captured = capsys.readouterr()
-    assert ("planning this" in captured.err) == terminal
+    assert ("planning this" in captured.err) == shown
     assert captured.out == ""

@@ -16,9 +16,13 @@ from planner.question import EARTH, Limits, Load, Question
 from planner.result import Plan
 from planner.robots import LinkTree, RobotFile, robosimian, robot_of
 from planner.solving import plan
-from tests.suite.helpers.jointed import at_joints, random_jointed_question, two_link_robot
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 from tests.suite.helpers.stances import moved, on_wall
+from tests.suite.helpers.stances_with_joints import (
+    at_joints,
+    random_question_with_joints,
+    two_link_robot,
+)
 
 G = 9.81
 SEEDS = st.integers(0, 10_000)
@@ -118,7 +122,7 @@ def test_a_plan_of_one_arm_balances_its_trunk_by_hand():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_moments_about_each_axis_are_the_jacobians_and_newton_euler(seed):
-    question = random_jointed_question(seed)
+    question = random_question_with_joints(seed)
     rng = np.random.default_rng(seed)
     where, robot = posture(question), question.stance.robot
     body = question.stance.body.rotation.T
@@ -146,7 +150,7 @@ def test_acceleration_is_the_rate_of_momentum(seed):
 
     Places of the masses after a small time t are those of B moved by a t²/2 and turned by α t²/2.
     """
-    question = random_jointed_question(seed)
+    question = random_question_with_joints(seed)
     robot = question.stance.robot
     where = posture(question)
     model, tree = robot.model, tree_of(robot)
@@ -184,7 +188,7 @@ def momentum_rate(mass, place, linear, angular, step):
 
 
 def test_falling_freely_nothing_bears_anything():
-    question = replace(random_jointed_question(3), limits=Limits())
+    question = replace(random_question_with_joints(3), limits=Limits())
     fall = Load(acceleration=tuple(question.stance.gravity))
     where = posture(replace(question, load=fall))
     np.testing.assert_allclose(where.body_wrench, np.zeros(6), atol=1e-9)
@@ -193,7 +197,7 @@ def test_falling_freely_nothing_bears_anything():
 
 
 def test_a_body_wrench_that_is_given_leaves_acceleration_out_of_the_torques():
-    question = random_jointed_question(4)
+    question = random_question_with_joints(4)
     given_wrench = replace(question, body_wrench=np.zeros(6))
     still = posture(replace(question, load=Load()))
     for limb, joints in posture(given_wrench).joints.items():
@@ -203,7 +207,7 @@ def test_a_body_wrench_that_is_given_leaves_acceleration_out_of_the_torques():
 @pytest.mark.parametrize("part", [1.62 / 9.81, 3.71 / 9.81, 2.0])
 def test_torques_and_the_body_wrench_scale_with_gravity(part):
     """Moon, Mars and twice the Earth, the same stance."""
-    earth = random_jointed_question(5)
+    earth = random_question_with_joints(5)
     earth = replace(earth, load=Load(), stance=replace(earth.stance, gravity=np.array(EARTH)))
     other = replace(earth, stance=replace(earth.stance, gravity=part * np.array(EARTH)))
     here, there = posture(earth), posture(other)
@@ -219,13 +223,13 @@ def test_torques_and_the_body_wrench_scale_with_gravity(part):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_plans_with_joints_pass_the_check(seed):
-    answer = plan(random_jointed_question(seed))
+    answer = plan(random_question_with_joints(seed))
     assert answer.status in ("optimal", "overloaded", "infeasible")
     assert answer.verified
     if answer.hands is not None:
         shares = [
             np.abs(answer.joint_torque[limb]) / limits
-            for limb, limits in _limits(random_jointed_question(seed)).items()
+            for limb, limits in _limits(random_question_with_joints(seed)).items()
         ]
         assert answer.utilisation >= np.max(shares) - 1e-6
 

@@ -23,12 +23,12 @@ from service.commands.cli import run
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import NoServiceError, ServiceError, decode_request, service_key
-from tests.hand_models.parameters.test_own_hand import line
-from tests.service.commands.test_cli import process
-from tests.service.serving.test_service import Served, client_config, free_endpoint
-from tests.suite.helpers.asked import pose, put, wall_request
+from tests.suite.helpers.commands import process
+from tests.suite.helpers.hands import entry_toml
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import pose, put, wall_request
 from tests.suite.helpers.robots import arm
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 
 ANGLES = {"left": [0.3, -0.4, 0.2, 0.5, -0.2, -0.3], "right": [-0.3, -0.4, -0.2, 0.5, 0.2, -0.3]}
 """Of the two arms [rad]: the palms face the rock."""
@@ -233,7 +233,7 @@ def test_a_hand_and_a_robot_of_ones_own_go_together(
     file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     hand = tmp_path / "hand.toml"
-    hand.write_text(line("hand", "mass", 5.6))
+    hand.write_text(entry_toml("hand", "mass", 5.6))
     path = written(hanging(file))
     assert run(["plan", path, "--robot", str(file), "--hand", str(hand), "--json"]) == 0
     weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
@@ -337,7 +337,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
 
 def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path) -> None:
     hand = tmp_path / "hand.toml"
-    hand.write_text(line("structure", "held_mass", 20.0))
+    hand.write_text(entry_toml("structure", "held_mass", 20.0))
     own = read_robot(file)
     served = Served(free_endpoint(), "--robot", str(file))
     flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting", "--json"]

@@ -15,9 +15,9 @@ from planner.result import Price
 from planner.robots import RobotFile, robot_of
 from planner.solving import dual_bounds, plan
 from tests.suite.helpers import peer
-from tests.suite.helpers.jointed import at_joints, random_jointed_question
 from tests.suite.helpers.robots import arm
 from tests.suite.helpers.stances import ask, on_wall, random_question
+from tests.suite.helpers.stances_with_joints import at_joints, random_question_with_joints
 
 TENDON = 700.0
 """What a tendon holds [N]."""
@@ -108,7 +108,7 @@ class Quadratic:
         return np.concatenate(outcome.loads)
 
 
-def carried(stance, tension: float, palm: float) -> np.ndarray:
+def pressing_wrench(stance, tension: float, palm: float) -> np.ndarray:
     """The body wrench of hands with equal tensions whose palms drag and press."""
     question = Question(stance, body_wrench=np.zeros(6))
     total = np.zeros(6)
@@ -131,8 +131,8 @@ QUESTIONS = {
     "weak tendons": ask(on_wall(), limits=Limits(tendon_tension=120.0)),
     "joints": held(solved_wall(0.2)),
     "joints with a margin": held(solved_wall(0.45, limits=Limits(utilisation=0.8))),
-    "two hands": Question(PAIR, body_wrench=carried(PAIR, 90.0, 40.0)),
-    "one hand": Question(SINGLE, body_wrench=carried(SINGLE, 90.0, 40.0)),
+    "two hands": Question(PAIR, body_wrench=pressing_wrench(PAIR, 90.0, 40.0)),
+    "one hand": Question(SINGLE, body_wrench=pressing_wrench(SINGLE, 90.0, 40.0)),
     "three hands": ask(on_wall(off=0.15, limbs=("rear_right", "rear_left", "front_left"))),
     "forces capped": ask(on_wall(), limits=Limits(per_hand={"front_left": ForceCap(250.0)})),
 }
@@ -193,7 +193,7 @@ def test_least_effort_is_that_of_sequential_quadratic_programming(name):
 def test_random_stances_within_their_caps_have_the_least_effort():
     proven = 0
     for seed in (1, 14):
-        question = least(random_jointed_question(seed))
+        question = least(random_question_with_joints(seed))
         answer = plan(question)
         assert answer.status == "optimal", answer.reason
         by_hand = Quadratic(question)

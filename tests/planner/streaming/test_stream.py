@@ -20,11 +20,11 @@ from planner.streaming.interpolation import PER_RADIUS, Interpolation
 from planner.streaming.stream import RADIUS
 from planner.streaming.stream_stance import StreamStance
 from planner.verification import Check, LoadsCheck
-from tests.planner.verification.test_loads_check import streamable
 from tests.suite.helpers import peer
-from tests.suite.helpers.barred import KINDS
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.random_questions import KINDS
 from tests.suite.helpers.stances import ask, on_wall
+from tests.suite.helpers.streams import streamable
 
 WALL = ask(on_wall())
 WEIGHT = WALL.needed_wrench()
@@ -92,7 +92,7 @@ def test_set_points_within_the_radius_are_plans_with_a_true_gap(seed, stream):
 
 CASES = [
     *(("plain", seed) for seed in (0, 1, 8, 11, 14)),
-    *(("jointed", seed) for seed in (1, 3, 7)),
+    *(("with joints", seed) for seed in (1, 3, 7)),
     *(("request", seed) for seed in (6, 25, 28, 54, 82)),
 ]
 

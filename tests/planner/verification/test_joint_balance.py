@@ -107,9 +107,9 @@ def test_a_balance_off_by_little_tells_loads_that_are_off_by_little(stance):
 def test_tiles_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agree(what):
     """A distal tile 10 mm off, or turned, and normals, forces, wrench and shares that fit it."""
     question = ask(on_wall())
-    ground = prepare_stance(question)
-    answer = plan_on(ground, time.perf_counter())
-    check = Check(question, ground.settled, None)
+    prepared = prepare_stance(question)
+    answer = plan_on(prepared, time.perf_counter())
+    check = Check(question, prepared.settled, None)
     honest = PlanArrays.of(answer.hands)
     tiles = [
         t
@@ -148,4 +148,4 @@ def test_tiles_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agree(w
     )
     wrong = check.problems(lie, float(lie.utilisations.max()), reactions)
     assert any("distal tile of inner_left" in words for words in wrong)
-    assert check.problems(honest, answer.utilisation, ground.wrench) == []
+    assert check.problems(honest, answer.utilisation, prepared.wrench) == []

@@ -12,8 +12,8 @@ from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
 from planner.verification import limbs, problems
-from tests.suite.helpers.jointed import random_jointed_question
 from tests.suite.helpers.stances import on_wall
+from tests.suite.helpers.stances_with_joints import random_question_with_joints
 
 LIMB = "rear_left"
 INDEX = 2
@@ -85,7 +85,7 @@ def test_an_honest_plan_passes():
 @pytest.mark.parametrize("objective", ["max_margin", "min_effort"])
 def test_honest_plans_of_random_questions_pass(objective):
     for seed in range(20, 26):
-        assert plan(random_jointed_question(seed, objective=objective)).verified
+        assert plan(random_question_with_joints(seed, objective=objective)).verified
 
 
 @pytest.mark.parametrize(

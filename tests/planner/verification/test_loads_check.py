@@ -8,30 +8,20 @@ import pytest
 
 from hand_models.base import wrench_transport
 from planner.prepare import settle_hand
-from planner.question import Question, Stance
+from planner.question import Stance
 from planner.result import Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
 from planner.verification import loads_check
 from planner.verification.hand_check import hand_check
 from planner.verification.limit_surface import LimitCurves
-from tests.hand_models.finger.test_fingernail import STRONG, hung, one_hand
-from tests.suite.helpers.barred import KINDS
+from tests.suite.helpers.fingernails import STRONG, hung, one_hand
 from tests.suite.helpers.hands import changed_hand
+from tests.suite.helpers.random_questions import KINDS
 from tests.suite.helpers.stances import ask, on_wall
+from tests.suite.helpers.streams import streamable
 
 WALL = ask(on_wall())
-
-
-def streamable(question: Question) -> Question:
-    """The question without what streams refuse, under the wrench that its load needs."""
-    question = replace(
-        question,
-        objective="max_margin",
-        limits=replace(question.limits, tension_change=None),
-        present={},
-    )
-    return replace(question, body_wrench=StreamStance(question).first)
 
 
 @cache
@@ -59,7 +49,7 @@ def given_by(stance: Stance, known: StreamStance, loads) -> np.ndarray:
 
 CASES = [
     *(("plain", seed) for seed in (0, 1, 2, 8, 14)),
-    *(("jointed", seed) for seed in (0, 1, 3, 7)),
+    *(("with joints", seed) for seed in (0, 1, 3, 7)),
     *(("request", seed) for seed in (6, 9, 25, 28, 55)),
 ]
 

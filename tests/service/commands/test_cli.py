@@ -20,56 +20,27 @@ from service.commands.stances import bundled
 from service.commands.tables import print_plan
 from service.requests import PlanRequest
 from service.wire import decode_request
-from tests.service.serving.test_service import Served, free_endpoint
-from tests.suite.helpers.asked import HEAVY, LIGHT, flat_request, jointed_request, put, wall_request
 from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.commands import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    OVERLOADED,
+    complaint,
+    process,
+    result,
+)
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import (
+    HEAVY,
+    LIGHT,
+    flat_request,
+    put,
+    request_with_joints,
+    wall_request,
+)
 from tests.suite.helpers.rocks import cylinder_mesh
-
-DONE, FAILED, BAD_INPUT, OVERLOADED = 0, 1, 2, 3
-
-
-@pytest.fixture
-def stance(tmp_path: Path):
-    """Writes a request to a file, and returns its path."""
-
-    def write(request: object, name: str = "stance.json") -> str:
-        path = tmp_path / name
-        path.write_text(request if isinstance(request, str) else json.dumps(request))
-        return str(path)
-
-    return write
-
-
-def result(capfd: pytest.CaptureFixture[str]) -> dict:
-    """The one line of JSON on standard output, with nothing on standard error."""
-    out, err = capfd.readouterr()
-    assert err == ""
-    assert out.endswith("\n")
-    assert out.count("\n") == 1
-    return json.loads(out)
-
-
-def complaint(capfd: pytest.CaptureFixture[str]) -> str:
-    """The one line on standard error, with nothing on standard output."""
-    out, err = capfd.readouterr()
-    assert out == ""
-    assert err.startswith("crux: ")
-    assert err.count("\n") == 1
-    return err
-
-
-def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run(
-        [sys.executable, "-m", "service.commands.cli", *arguments],
-        input=given,
-        capture_output=True,
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
-        timeout=PATIENCE,
-        check=False,
-    )
-
+from tests.suite.helpers.served import Served, free_endpoint
 
 # plan ---------------------------------------------------------------------------------------------
 
@@ -87,11 +58,11 @@ def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[
     ],
 )
 def test_the_exit_status_of_a_plan(
-    request_: dict, status: str, code: int, stance, capfd: pytest.CaptureFixture[str]
+    request_: dict, status: str, code: int, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["plan", stance(request_), "--json"]) == code
+    assert run(["plan", stance_file(request_), "--json"]) == code
     assert result(capfd)["status"] == status
-    assert run(["plan", stance(request_)]) == code
+    assert run(["plan", stance_file(request_)]) == code
     out, err = capfd.readouterr()
     assert err == ""
     assert out.startswith(status.upper())
@@ -99,7 +70,7 @@ def test_the_exit_status_of_a_plan(
 
 
 def test_a_failed_plan_is_a_failure(
-    stance, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*asked: object) -> dispatch.Planned:
         answer = good(*asked)
@@ -108,12 +79,14 @@ def test_a_failed_plan_is_a_failure(
 
     good = dispatch.planned
     monkeypatch.setattr(dispatch, "planned", fail)
-    assert run(["plan", stance(wall_request()), "--json"]) == FAILED
+    assert run(["plan", stance_file(wall_request()), "--json"]) == FAILED
     assert result(capfd)["status"] == "failed"
 
 
-def test_a_plan_says_how_much_hangs_on_the_palms(stance, capfd: pytest.CaptureFixture[str]) -> None:
-    path = stance(wall_request())
+def test_a_plan_says_how_much_hangs_on_the_palms(
+    stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance_file(wall_request())
     run(["plan", path, "--json"])
     reply = result(capfd)
     assert 0.0 < reply["load_factor_without_palm"] < reply["load_factor"]
@@ -128,9 +101,9 @@ def test_a_plan_says_how_much_hangs_on_the_palms(stance, capfd: pytest.CaptureFi
 
 
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
-    stance, capfd: pytest.CaptureFixture[str]
+    stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    run(["plan", stance(wall_request() | {"want": ["model", "prices"]}), "--json"])
+    run(["plan", stance_file(wall_request() | {"want": ["model", "prices"]}), "--json"])
     reply = result(capfd)
     assert reply["hands"][0]["wrench_space"]["rows"]
     assert reply["load_factor"] is not None
@@ -170,10 +143,10 @@ def test_bundled_stances(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_bad_input_is_one_line(
-    text: str, line: str, stance, capfd: pytest.CaptureFixture[str]
+    text: str, line: str, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     for flags in ([], ["--json"]):
-        assert run(["plan", stance(text), *flags]) == BAD_INPUT
+        assert run(["plan", stance_file(text), *flags]) == BAD_INPUT
         assert complaint(capfd).startswith(line)
 
 
@@ -185,9 +158,9 @@ def test_a_stance_that_is_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_person_reads_torques_effort_and_whose_joint_it_is(
-    stance, capfd: pytest.CaptureFixture[str]
+    stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = stance(jointed_request() | {"limits": {"joint_torque": 10.0}, "present": {}})
+    path = stance_file(request_with_joints() | {"limits": {"joint_torque": 10.0}, "present": {}})
     assert run(["plan", path, "--json"]) == DONE
     reply = result(capfd)
     assert run(["plan", path]) == DONE
@@ -224,12 +197,12 @@ def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFix
 
 
 def test_hands_out_of_reach_are_bad_input_in_one_line(
-    stance, capfd: pytest.CaptureFixture[str]
+    stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = put(wall_request(), ("stance", "joints"), "solve")
     for i in (0, 2):
         request["stance"]["hands"][i]["pose"]["position"][2] *= 3.0
-    assert run(["plan", stance(request)]) == BAD_INPUT
+    assert run(["plan", stance_file(request)]) == BAD_INPUT
     line = complaint(capfd)
     assert line.startswith("crux: stance.hands[0].pose: front_right is out of reach by ")
     assert "; rear_left is out of reach by " in line
@@ -238,8 +211,8 @@ def test_hands_out_of_reach_are_bad_input_in_one_line(
 # wrench-space -------------------------------------------------------------------------------------
 
 
-def test_a_wrench_space(stance, capfd: pytest.CaptureFixture[str]) -> None:
-    path = stance(flat_request())
+def test_a_wrench_space(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance_file(flat_request())
     assert run(["wrench-space", path, "--hand", "front_left", "--json"]) == DONE
     reply = result(capfd)
     assert run(["wrench-space", path, "--hand", "front_left"]) == DONE
@@ -254,25 +227,32 @@ def test_a_wrench_space(stance, capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_wrench_space_of_a_hand_that_is_not_there(
-    stance, capfd: pytest.CaptureFixture[str]
+    stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["wrench-space", stance(flat_request()), "--hand", "nose"]) == BAD_INPUT
+    assert run(["wrench-space", stance_file(flat_request()), "--hand", "nose"]) == BAD_INPUT
     assert complaint(capfd).startswith("crux: limb: no hand 'nose' in this stance; it has front_")
 
 
-def test_a_picture_of_a_wrench_space(stance, tmp_path: Path) -> None:
+def test_a_picture_of_a_wrench_space(stance_file, tmp_path: Path) -> None:
     picture = tmp_path / "space.png"
-    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+    arguments = ["wrench-space", stance_file(flat_request()), "--hand", "front_left"]
     assert run([*arguments, "--plot", str(picture), "--json"]) == DONE
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_picture_of_a_hand_that_can_carry_nothing(stance, tmp_path: Path) -> None:
+def test_a_picture_of_a_hand_that_can_carry_nothing(stance_file, tmp_path: Path) -> None:
     request = flat_request()
     # a tile of this surface is overloaded as soon as the finger closes
     request["stance"]["hands"][0]["surface"] = {"shear_limit": 0.01}
     picture = tmp_path / "space.png"
-    arguments = ["wrench-space", stance(request), "--hand", "front_left", "--plot", str(picture)]
+    arguments = [
+        "wrench-space",
+        stance_file(request),
+        "--hand",
+        "front_left",
+        "--plot",
+        str(picture),
+    ]
     assert run([*arguments, "--json"]) == OVERLOADED
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -288,12 +268,12 @@ def scanned(file: str) -> dict:
 
 
 def test_a_scan_is_read_beside_the_stance_that_names_it(
-    stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     trimesh.Trimesh(*cylinder_mesh(0.3), process=False).export(tmp_path / "log.stl")
-    assert run(["plan", stance(wall_request()), "--json"]) == DONE
+    assert run(["plan", stance_file(wall_request()), "--json"]) == DONE
     want = result(capfd)
-    assert run(["plan", stance(scanned("log.stl")), "--json"]) == DONE
+    assert run(["plan", stance_file(scanned("log.stl")), "--json"]) == DONE
     assert result(capfd)["load_factor"] == pytest.approx(want["load_factor"], rel=0.01)
 
 
@@ -301,11 +281,15 @@ def test_a_scan_is_read_beside_the_stance_that_names_it(
     ("content", "words"), [(None, "no such file"), (b"solid\nendsolid\n", "no triangles")]
 )
 def test_a_scan_that_cannot_be_read(
-    content: bytes | None, words: str, stance, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    content: bytes | None,
+    words: str,
+    stance_file,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     if content is not None:
         (tmp_path / "rock.stl").write_bytes(content)
-    assert run(["plan", stance(scanned("rock.stl"))]) == BAD_INPUT
+    assert run(["plan", stance_file(scanned("rock.stl"))]) == BAD_INPUT
     error = complaint(capfd)
     assert error.startswith("crux: stance.hands[0].hold.file: ")
     assert words in error
@@ -313,16 +297,18 @@ def test_a_scan_that_cannot_be_read(
 
 
 def test_a_scan_is_in_a_file_or_in_the_message_not_in_both(
-    stance, capfd: pytest.CaptureFixture[str]
+    stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = put(scanned("a.stl"), ("stance", "hands", 0, "hold", "vertices"), [])
-    assert run(["plan", stance(request)]) == BAD_INPUT
+    assert run(["plan", stance_file(request)]) == BAD_INPUT
     assert complaint(capfd).startswith("crux: stance.hands[0].hold.file: give a file, or ")
 
 
 @pytest.mark.parametrize("picture", ["space.xyz", "no/folder/space.png"])
-def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = ["wrench-space", stance(flat_request()), "--hand", "front_left"]
+def test_a_picture_that_cannot_be(
+    picture: str, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["wrench-space", stance_file(flat_request()), "--hand", "front_left"]
     assert run([*arguments, "--plot", picture]) == BAD_INPUT
     assert picture in complaint(capfd)
 
@@ -330,12 +316,12 @@ def test_a_picture_that_cannot_be(picture: str, stance, capfd: pytest.CaptureFix
 # serve and query ----------------------------------------------------------------------------------
 
 
-def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
+def test_query_and_serve(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
     server = Served(free_endpoint())
     flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
     flags += ["--timeout", str(PATIENCE)]
     try:
-        asked = process("query", stance(wall_request()), *flags, "--json")
+        asked = process("query", stance_file(wall_request()), *flags, "--json")
         assert (asked.returncode, asked.stderr) == (DONE, b"")
         reply = json.loads(asked.stdout)
         assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
@@ -345,7 +331,7 @@ def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
         assert (asked.returncode, asked.stderr) == (OVERLOADED, b"")
         assert asked.stdout.startswith(b"OVERLOADED")
         twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
-        assert run(["query", stance(twice), *flags, "--json"]) == BAD_INPUT
+        assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
         assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
         taken = process("serve", "-l", server.endpoint, "--no-multicast-scouting", "--json")
         assert (taken.returncode, taken.stdout) == (FAILED, b"")
@@ -353,13 +339,19 @@ def test_query_and_serve(stance, capfd: pytest.CaptureFixture[str]) -> None:
     finally:
         server.process.terminate()
         server.process.communicate()
-    asked = process("query", stance(wall_request()), *flags, "--json")
+    asked = process("query", stance_file(wall_request()), *flags, "--json")
     assert (asked.returncode, asked.stdout) == (FAILED, b"")
     assert asked.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
 
 
-def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
-    arguments = ["query", stance(wall_request()), "--no-multicast-scouting", "-l", free_endpoint()]
+def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
+    arguments = [
+        "query",
+        stance_file(wall_request()),
+        "--no-multicast-scouting",
+        "-l",
+        free_endpoint(),
+    ]
     asked = subprocess.run(
         [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
         capture_output=True,
@@ -382,8 +374,10 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance) -> None:
         (["--timeout", "0"], "crux: Invalid value for '--timeout'"),
     ],
 )
-def test_bad_flags(flags: list[str], line: str, stance, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["query", stance(wall_request()), *flags]) == BAD_INPUT
+def test_bad_flags(
+    flags: list[str], line: str, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
     assert complaint(capfd).startswith(line)
 
 
@@ -443,13 +437,16 @@ def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
-    stance, tmp_path, capfd: pytest.CaptureFixture[str]
+    stance_file, tmp_path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "plan.png"
-    assert run(["plan", stance(wall_request()), "--plot", str(picture), "--json"]) == DONE
+    assert run(["plan", stance_file(wall_request()), "--plot", str(picture), "--json"]) == DONE
     assert picture.read_bytes().startswith(b"\x89PNG")
     result(capfd)
-    assert run(["plan", stance(wall_request()), "--plot", str(tmp_path / "a.nothing")]) == BAD_INPUT
+    assert (
+        run(["plan", stance_file(wall_request()), "--plot", str(tmp_path / "a.nothing")])
+        == BAD_INPUT
+    )
     error = capfd.readouterr().err
     assert error.startswith("crux: --plot: cannot write ")
     assert len(error.splitlines()) == 1

@@ -24,10 +24,9 @@ from service.processes.workers import Lost, Workers, cores
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import decode_request, schema
-from tests.service.serving.test_service import plan_request
-from tests.suite.helpers.asked import HEAVY, flat_request, put, wall_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import HEAVY, flat_request, plan_request, put, wall_request
 
 MASSES = [40.0, HEAVY, 60.0, 80.0, 100.0, 55.0]
 
@@ -162,8 +161,7 @@ def test_errors_carry_the_identifier_where_it_can_be_read(monkeypatch):
 
 SCRIPT = """
 import logging
-from tests.suite.helpers.asked import wall_request
-from tests.service.serving.test_service import plan_request
+from tests.suite.helpers.requests import plan_request, wall_request
 from service.processes.many import Planners, plan_many
 {guard}
 {body}

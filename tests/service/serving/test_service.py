@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import random
 import signal
-import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,9 +19,8 @@ from zenoh.handlers import FifoChannel
 
 from hand_models.base import InvalidInputError
 from planner import solving
-from planner.prepare import settled_stance
 from planner.robots import RobotFile
-from service import BodySpaceRequest, CruxClient, PlanRequest, WrenchSpaceRequest
+from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
 from service.answering import dispatch
 from service.answering.dispatch import Answer
 from service.replies import ErrorReply, PlanReply
@@ -35,22 +30,22 @@ from service.wire import (
     NoServiceError,
     ServiceError,
     ServiceTimeout,
-    decode_request,
     service_key,
 )
-from tests.service.wire.test_messages import check_answer
-from tests.suite.helpers.asked import (
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.replies import check_answer
+from tests.suite.helpers.requests import (
     HEAVY,
     JSON,
     MSGPACK,
     flat_request,
     full_request,
-    jointed_request,
+    plan_request,
+    request_with_joints,
     spoil,
     wall_request,
 )
-from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 
 PLAN = service_key("robosimian", "plan")
 WRENCH_SPACE = service_key("robosimian", "wrench_space")
@@ -58,36 +53,6 @@ BODY_SPACE = service_key("robosimian", "body_space")
 STREAM = service_key("robosimian", "stream")
 SET_POINTS = service_key("robosimian", "set_points")
 KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-class Served:
-    """A ``crux serve`` process."""
-
-    def __init__(self, endpoint: str, *more: str) -> None:
-        self.endpoint = endpoint
-        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "service.commands.cli", "serve", *flags],
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )
-        line = self.process.stdout.readline()
-        assert line, self.process.stderr.read().decode()
-        self.ready = json.loads(line)
-
-    def stop(self, number: int) -> tuple[str, str]:
-        """Send a signal; what the process had to say until its end."""
-        self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=PATIENCE)
-        return out.decode(), err.decode()
 
 
 @pytest.fixture(scope="module")
@@ -98,18 +63,10 @@ def served() -> Iterator[Served]:
     assert server.process.returncode == 0
 
 
-def client_config(endpoint: str) -> zenoh.Config:
-    return zenoh_config(mode="client", connect=[endpoint], multicast=False)
-
-
 @pytest.fixture
 def session(served: Served) -> Iterator[zenoh.Session]:
     with zenoh.open(client_config(served.endpoint)) as opened:
         yield opened
-
-
-def plan_request(request: dict | None = None) -> PlanRequest:
-    return decode_request(msgspec.json.encode(request or wall_request()), PlanRequest)
 
 
 def ask(
@@ -177,7 +134,7 @@ def test_the_service_is_alive_while_it_serves(session: zenoh.Session) -> None:
 def test_fuzz_over_the_network(session: zenoh.Session) -> None:
     chance = random.Random(7)
     for i in range(200):
-        asked = (full_request, flat_request, jointed_request, flat_request)[i % 4]
+        asked = (full_request, flat_request, request_with_joints, flat_request)[i % 4]
         payload, encoding = spoil(asked(), chance)
         (answer,) = ask(session, payload, encoding)
         check_answer(answer, payload[:500])
@@ -333,7 +290,8 @@ def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.Monkey
         raise InvalidInputError("done", field="stance")
 
     monkeypatch.setattr(solving, "plan", exclusive)
-    monkeypatch.setattr(settled_stance, "resting_hand", exclusive)
+    # not where hands are settled: these may be known already
+    monkeypatch.setattr(dispatch, "tension_limits", exclusive)
     monkeypatch.setattr(dispatch, "explore", exclusive)
     stance = wall_request()["stance"]
     questions = {

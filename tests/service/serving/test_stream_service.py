@@ -23,30 +23,21 @@ from service.commands.stream import wrenches
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
-from tests.service.commands.test_cli import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
-    OVERLOADED,
-    complaint,
-    process,
-    stance,
-)
-from tests.service.serving.test_service import free_endpoint
-from tests.service.wire.test_messages import departures
-from tests.suite.helpers.asked import HEAVY, JSON, LIGHT, MSGPACK, put, wall_request
+from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process
 from tests.suite.helpers.patience import PATIENCE
-
-__all__ = ["stance"]
+from tests.suite.helpers.replies import departures
+from tests.suite.helpers.requests import (
+    HEAVY,
+    JSON,
+    LIGHT,
+    MSGPACK,
+    put,
+    stream_request,
+    wall_request,
+)
+from tests.suite.helpers.served import free_endpoint
 
 WRENCH = [1050.0, 10.0, -5.0, 2.0, 1.0, 0.0]
-
-
-def stream_request(request: dict | None = None, **more: object) -> dict:
-    """A declaration, as JSON."""
-    asked = wall_request() if request is None else request
-    kept = ("stance", "body_wrench", "load", "limits")
-    return {"v": 1} | {name: asked[name] for name in kept if name in asked} | more
 
 
 def declaration(**more: object) -> StreamRequest:
@@ -303,9 +294,9 @@ HEAVIER = [9.81 * HEAVY, 0.0, 0.0, 0.0, 0.0, 0.0]
         ([], [], DONE),
     ],
 )
-def test_each_line_gives_a_line(wrenches, statuses, code, stance, monkeypatch, capfd) -> None:
+def test_each_line_gives_a_line(wrenches, statuses, code, stance_file, monkeypatch, capfd) -> None:
     given(monkeypatch, *wrenches, "")
-    path = stance(wall_request(LIGHT))
+    path = stance_file(wall_request(LIGHT))
     assert run(["stream", path, "--json"]) == code
     out, err = capfd.readouterr()
     assert err == ""
@@ -331,7 +322,7 @@ def test_each_line_gives_a_line(wrenches, statuses, code, stance, monkeypatch, c
         assert told == [[round(part) for part in hand["tensions"]] for hand in reply["hands"]]
 
 
-def test_a_failure_is_worse_than_an_overload(stance, monkeypatch, capfd) -> None:
+def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) -> None:
     given(monkeypatch, HEAVIER, WRENCH)
     answers = WrenchStream.set_points
 
@@ -341,13 +332,15 @@ def test_a_failure_is_worse_than_an_overload(stance, monkeypatch, capfd) -> None
         return answers(self, wrench)
 
     monkeypatch.setattr(WrenchStream, "set_points", failing)
-    assert run(["stream", stance(wall_request())]) == FAILED
+    assert run(["stream", stance_file(wall_request())]) == FAILED
     assert capfd.readouterr().out.splitlines()[-1].endswith("a reason")
 
 
 @pytest.mark.parametrize("line", ["[1, 2]", "x", '{"v": 1}', "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
-def test_a_line_that_is_no_wrench_is_told_by_its_number(line, stance, monkeypatch, capfd) -> None:
-    path = stance(wall_request())
+def test_a_line_that_is_no_wrench_is_told_by_its_number(
+    line, stance_file, monkeypatch, capfd
+) -> None:
+    path = stance_file(wall_request())
     given(monkeypatch, "", line, WRENCH)
     assert run(["stream", path, "--json"]) == BAD_INPUT
     out, err = capfd.readouterr()
@@ -379,9 +372,9 @@ def test_what_cannot_be_streamed_is_bad_input(arguments, field, monkeypatch, cap
     assert field in complaint(capfd)
 
 
-def test_another_objective_is_refused(stance, monkeypatch, capfd) -> None:
+def test_another_objective_is_refused(stance_file, monkeypatch, capfd) -> None:
     given(monkeypatch, WRENCH)
-    assert run(["stream", stance(wall_request() | {"objective": "min_effort"})]) == BAD_INPUT
+    assert run(["stream", stance_file(wall_request() | {"objective": "min_effort"})]) == BAD_INPUT
     assert "objective: min_effort is not for streams" in complaint(capfd)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,12 @@ def changed_hand(section: str, name: str, value: float | list[float]) -> SpinyHa
     unit = hand_table().quantity(section, name).unit
     own = {section: {name: Quantity(value, unit, "assumed", "of a test")}}
     return SpinyHand(hand_table().replaced(ParameterTable(own)))
+
+
+def entry_toml(section: str, name: str, value: Any, unit: str | None = None) -> str:
+    """The file of a hand with one entry."""
+    unit = hand_table().quantity(section, name).unit if unit is None else unit
+    return f'[{section}]\n{name} = {{ value = {value}, unit = "{unit}", source = "assumed" }}\n'
 
 
 def without_hand_load(space: WrenchSpace) -> WrenchSpace:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
-from tests.suite.helpers.asked import pose
+from tests.suite.helpers.requests import pose
 from tests.suite.helpers.stances import PALM_TO_WALL, PLACES, wall
 
 GRAVITIES = (9.81, 3.71, 1.62)

@@ -1,34 +1,25 @@
-"""Stances whose loads do not balance, put to another solver: SI data for HiGHS, by names."""
+"""The rows of a question by their names, in SI units, and what other solvers say of them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from functools import cache
 from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
-import pytest
-from msgspec import convert
 
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import assemble, posture
 from planner.programs import WRENCH_UNIT
 from planner.question import Question
-from planner.result import LimitName, Plan
-from planner.solving import plan
-from service.answering.questions import question as planner_question
-from service.requests import PlanRequest
+from planner.result import LimitName
 from tests.suite.helpers import peer
-from tests.suite.helpers.jointed import random_jointed_question
-from tests.suite.helpers.random_requests import random_request
-from tests.suite.helpers.stances import random_question
 
 LOAD, SIZE = 100.0, 100.0
 """Units of loads and of rows [N] in the quadratic program."""
 
 
-class Barred(NamedTuple):
+class NamedRows(NamedTuple):
     """``A y ≤ b`` with a name for each row, ``E y = e``: given components, ``B y + o``: the body's.
 
     Limit rows are there at a cap on the utilisation, if there is one.
@@ -50,7 +41,7 @@ class Barred(NamedTuple):
         return {*self.names, *self.owners}
 
 
-def barred(question: Question, cap: float | None) -> Barred:
+def named_rows(question: Question, cap: float | None) -> NamedRows:
     """The rows of a question; what joints, caps and present tensions say is in the hands' sets."""
     where = posture(question)
     wrench = question.needed_wrench(None if where is None else where.body_wrench)
@@ -82,7 +73,7 @@ def barred(question: Question, cap: float | None) -> Barred:
                 E.append(row)
                 e.append(value - space.origin[j])
                 owners.append(LimitName(hand.limb, None, None, "held_wrench"))
-    return Barred(
+    return NamedRows(
         A,
         b,
         names,
@@ -96,7 +87,7 @@ def barred(question: Question, cap: float | None) -> Barred:
     )
 
 
-def have_loads(parts: Barred, constraints: Collection[LimitName]) -> bool:
+def have_loads(parts: NamedRows, constraints: Collection[LimitName]) -> bool:
     """Whether HiGHS finds loads up to `peer.HUGE` that balance and keep to these constraints."""
     rows = [name in constraints for name in parts.names]
     tied = [name in constraints for name in parts.owners]
@@ -112,7 +103,9 @@ def have_loads(parts: Barred, constraints: Collection[LimitName]) -> bool:
     return result.status == 0
 
 
-def most_given(parts: Barred, direction: np.ndarray, held: dict[str, np.ndarray]) -> float | None:
+def most_given(
+    parts: NamedRows, direction: np.ndarray, held: dict[str, np.ndarray]
+) -> float | None:
     """Max of direction · w + Σ held · v within the constraints: w the body's, v hands' wrenches.
 
     None where the constraints contradict each other.
@@ -130,7 +123,7 @@ def most_given(parts: Barred, direction: np.ndarray, held: dict[str, np.ndarray]
     return rest - float(result.fun) if result.status == 0 else None
 
 
-def distance(parts: Barred) -> float:
+def distance(parts: NamedRows) -> float:
     """How far the body wrenches that the constraints and given components allow are, by SCS.
 
     In `WRENCH_UNIT`, as a quadratic program without a box on the loads.
@@ -147,7 +140,7 @@ def distance(parts: Barred) -> float:
     return float(np.sqrt(problem.value))
 
 
-def miss(parts: Barred, wrench: np.ndarray) -> float:
+def miss(parts: NamedRows, wrench: np.ndarray) -> float:
     """How far the body wrenches that the constraints allow stay from one: the largest component."""
     unit = np.ones((6, 1))
     none = np.zeros((len(parts.A), 1))
@@ -166,51 +159,3 @@ def miss(parts: Barred, wrench: np.ndarray) -> float:
     )
     assert result.status == 0, result.message
     return float(result.fun)
-
-
-def requested(seed: int) -> Question:
-    """A random request as a question."""
-    return planner_question(convert(random_request(seed), PlanRequest))
-
-
-KINDS = {"plain": random_question, "jointed": random_jointed_question, "request": requested}
-
-SEEDS = {
-    "infeasible": {
-        "plain": (3, 5, 12, 64, 77),
-        "jointed": (15, 24),
-        "request": (4, 10, 24, 54, 82, 90, 93),
-    },
-    "overloaded": {
-        "plain": (14, 16, 46),
-        "jointed": (0, 3, 7, 37),
-        "request": (6, 9, 28, 55, 75, 97),
-    },
-}
-"""Random questions that were answered so: with joints, caps, given wrenches, single hands."""
-
-FEW = {
-    "infeasible": {"plain": (5, 64), "jointed": (15, 24), "request": (4, 82, 90, 93)},
-    "overloaded": {"plain": (14, 46), "jointed": (0, 7, 37), "request": (6, 55)},
-}
-"""Of them some that stand for all, where all would take long."""
-
-few_and_all = pytest.mark.parametrize(
-    "seeds", [FEW, pytest.param(SEEDS, marks=pytest.mark.slow)], ids=["few", "all"]
-)
-
-
-@cache
-def _answered(kind: str, seed: int) -> tuple[str, Question, Plan]:
-    question = KINDS[kind](seed)
-    return f"{kind} {seed}", question, plan(question)
-
-
-def explained(
-    status: str, seeds: dict[str, dict[str, tuple[int, ...]]]
-) -> list[tuple[str, Question, Plan]]:
-    """Random questions that are answered with a status, and their answers."""
-    answers = [_answered(kind, seed) for kind, some in seeds[status].items() for seed in some]
-    found = [each for each in answers if each[2].status == status]
-    assert len(found) >= 0.8 * len(answers)
-    return found

@@ -11,6 +11,8 @@ import msgspec
 import numpy as np
 
 from hand_models.base import Pose
+from service.requests import PlanRequest
+from service.wire import decode_request
 from tests.suite.helpers.stances import PALM_TO_WALL, PLACES, wall
 
 JSON = "application/json"
@@ -25,6 +27,11 @@ def pose(where: Pose) -> dict[str, Any]:
         "position": np.asarray(where.position).tolist(),
         "orientation": where.quaternion().tolist(),
     }
+
+
+def pose_of(message: dict[str, Any]) -> Pose:
+    """What `pose` has written."""
+    return Pose.from_quaternion(message["position"], message["orientation"])
 
 
 def wall_request(mass: float | None = LIGHT, limbs: tuple[str, ...] = tuple(PLACES)) -> dict:
@@ -50,6 +57,18 @@ def wall_request(mass: float | None = LIGHT, limbs: tuple[str, ...] = tuple(PLAC
     if mass is not None:
         request["load"] = {"mass": mass, "com": [0.0, 0.0, 0.0]}
     return request
+
+
+def plan_request(request: dict | None = None) -> PlanRequest:
+    """A request, decoded; the wall's by default."""
+    return decode_request(msgspec.json.encode(request or wall_request()), PlanRequest)
+
+
+def stream_request(request: dict | None = None, **more: object) -> dict:
+    """A stream's declaration with a plan request's stance and load; the wall's by default."""
+    asked = wall_request() if request is None else request
+    kept = ("stance", "body_wrench", "load", "limits")
+    return {"v": 1} | {name: asked[name] for name in kept if name in asked} | more
 
 
 def flat_request() -> dict:
@@ -108,7 +127,7 @@ JOINTS = {
 """Angles that put the hands of the wall's stance where they are [rad]."""
 
 
-def jointed_request() -> dict:
+def request_with_joints() -> dict:
     """Every field that goes with joints, in one request."""
     request = wall_request(mass=None)
     stance = request["stance"]

@@ -50,7 +50,7 @@ def at_joints(
     return Stance(hands, body, np.array(gravity, dtype=float), robot, angles)
 
 
-def random_jointed_question(seed: int, **kwargs) -> Question:
+def random_question_with_joints(seed: int, **kwargs) -> Question:
     """RoboSimian with random angles, holds, gravity, acceleration, limits on torques and forces."""
     rng = np.random.default_rng(seed)
     robot = robosimian()

@@ -1,0 +1,153 @@
+"""What travels is read as it was meant; what is no message is the caller's error."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import random
+from collections.abc import Callable
+
+import msgspec
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from hand_models.base import InvalidInputError
+from service.answering import dispatch
+from service.replies import ErrorReply, PlanReply
+from service.requests import PlanRequest, WrenchSpaceRequest
+from service.wire import Format, MalformedError, decode_request
+from service.wire.codec import LARGEST_REQUEST
+from tests.suite.helpers.replies import PLAN, check_answer
+from tests.suite.helpers.requests import (
+    JSON,
+    MSGPACK,
+    flat_request,
+    full_request,
+    plan_request,
+    request_with_joints,
+    spoil,
+    wall_request,
+)
+
+
+@pytest.mark.parametrize("form", Format)
+@pytest.mark.parametrize("asked", [full_request, request_with_joints])
+def test_a_request_survives_the_journey(asked: Callable[[], dict], form: Format) -> None:
+    request = plan_request(asked())
+    assert decode_request(form.encode(request), PlanRequest, form) == request
+
+
+def test_defaults_do_not_travel() -> None:
+    sent = json.loads(msgspec.json.encode(plan_request(wall_request())))
+    assert set(sent) == {"v", "id", "stance", "load"}
+    assert set(sent["stance"]["hands"][0]) == {"limb", "pose", "hold", "surface", "grasp"}
+
+
+def test_null_means_left_out() -> None:
+    request = wall_request()
+    spelled = request | {"body_wrench": None, "confidence": None, "deadline": None}
+    assert plan_request(spelled) == plan_request(request)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "form"),
+    [
+        ("", Format.JSON),
+        ("zenoh/bytes", Format.JSON),
+        ("text/json", Format.JSON),
+        ("application/json;crux.PlanRequest@1", Format.JSON),
+        ("Application/MsgPack; crux.PlanReply@1", Format.MSGPACK),
+    ],
+)
+def test_names_of_encodings(encoding: str, form: Format) -> None:
+    assert Format.named(encoding) is form
+
+
+def test_replies_may_gain_fields() -> None:
+    answer = dispatch.handle(PLAN, msgspec.json.encode(wall_request()))
+    grown = json.loads(answer.payload) | {"news": {"of": ["a later version"]}}
+    Format.JSON.decode(json.dumps(grown).encode(), PlanReply)
+
+
+# No messages -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("token", ["NaN", "Infinity", "1e999", "-1e999"])
+def test_json_has_no_infinite_numbers_either(token: str) -> None:
+    text = json.dumps(wall_request(mass=12345.0)).replace("12345.0", token)
+    answer = dispatch.handle(PLAN, text.encode())
+    assert not answer.good
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding"),
+    [
+        (b"", JSON),
+        (b"{", JSON),
+        (b"\xff\xfe", JSON),
+        (b'{"v": 1, "id": "\xff"}', JSON),
+        (b'{"v": 1, "id": "\\ud800"}', JSON),
+        (b"\xc1", MSGPACK),
+        (b"\x81\xa1v", MSGPACK),
+        (b"{}", "image/png"),
+        (b"{}", "application/jsonp"),
+        (b" " * (LARGEST_REQUEST + 1), JSON),
+        (b'{"v":1,"confidence":' + b"[" * 400_000, JSON),
+        (b"\x82\xa1v\x01\xaaconfidence" + b"\x91" * 400_000, MSGPACK),
+    ],
+)
+def test_bytes_that_are_no_message(payload: bytes, encoding: str) -> None:
+    answer = dispatch.handle(PLAN, payload, encoding)
+    error = Format.named(answer.encoding).decode(answer.payload, ErrorReply).error
+    assert not answer.good
+    assert error.kind == "malformed"
+    assert len(answer.payload) < 1000
+
+
+def test_errors_do_not_grow_with_the_request() -> None:
+    for key, value in itertools.product(("x" * 500_000, "id"), ("y" * 500_000,)):
+        answer = dispatch.handle(PLAN, msgspec.json.encode({key: value}))
+        assert len(answer.payload) < 2000
+
+
+def test_malformed_errors_are_the_callers() -> None:
+    with pytest.raises(MalformedError, match="not json"):
+        decode_request(b"{", PlanRequest)
+    with pytest.raises(InvalidInputError, match=r"limb: missing"):
+        decode_request(
+            msgspec.json.encode({"v": 1, "stance": flat_request()["stance"]}), WrenchSpaceRequest
+        )
+
+
+# Fuzz ---------------------------------------------------------------------------------------------
+
+
+def check_spoilt(count: int) -> None:
+    chance = random.Random(20260)
+    seen: dict[str, int] = {}
+    for i in range(count):
+        request = (full_request, flat_request, request_with_joints, flat_request)[i % 4]()
+        payload, encoding = spoil(request, chance)
+        outcome = check_answer(dispatch.handle(PLAN, payload, encoding), (i, payload[:2000]))
+        seen[outcome] = seen.get(outcome, 0) + 1
+    assert seen["invalid"] > count / 4
+    assert seen["malformed"] > count / 40
+    assert seen["unsupported"] > count / 200
+    planned = sum(seen.get(status, 0) for status in ("optimal", "overloaded", "infeasible"))
+    assert planned > count / 20
+
+
+def test_spoilt_requests_get_a_plan_or_an_error() -> None:
+    check_spoilt(300)
+
+
+@pytest.mark.slow
+def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
+    check_spoilt(2000)
+
+
+@settings(max_examples=200, deadline=None)
+@given(payload=st.binary(max_size=300), form=st.sampled_from([JSON, MSGPACK]))
+def test_random_bytes_are_never_more_than_an_error(payload: bytes, form: str) -> None:
+    answer = dispatch.handle(PLAN, payload, form)
+    assert not answer.good

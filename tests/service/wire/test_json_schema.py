@@ -1,0 +1,68 @@
+"""The schema of all messages: what travels is of it, and what is refused departs from it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import msgspec
+import pytest
+from jsonschema import Draft202012Validator
+
+from service.answering import dispatch
+from service.wire import schema
+from service.wire.json_schema import MESSAGES
+from tests.suite.helpers.replies import PLAN, departures, refusal
+from tests.suite.helpers.requests import (
+    dotted,
+    flat_request,
+    full_request,
+    put,
+    request_with_joints,
+    wall_request,
+)
+
+
+def test_the_schema_names_every_message_and_every_part_of_it() -> None:
+    whole = schema()
+    text = json.dumps(whole)
+    defined = set(whole["$defs"])
+    assert {message.__name__ for message in MESSAGES} <= defined
+    wanted = {ref.split('"')[0] for ref in text.split("#/$defs/")[1:]}
+    assert wanted <= defined
+    request = whole["$defs"]["PlanRequest"]
+    assert request["additionalProperties"] is False
+    assert set(request["required"]) == {"v", "stance"}
+    assert request["properties"]["v"]["enum"] == [1]
+    assert "not supported" in request["properties"]["confidence"]["description"]
+
+
+@pytest.mark.parametrize("asked", [wall_request, flat_request, full_request, request_with_joints])
+def test_requests_and_replies_are_of_the_schema(asked: Callable[[], dict]) -> None:
+    Draft202012Validator.check_schema(schema())
+    assert departures("PlanRequest", asked()) == []
+    answer = dispatch.handle(PLAN, msgspec.json.encode(asked()))
+    assert answer.good
+    assert departures("PlanReply", json.loads(answer.payload)) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("stance", "joints"), "guess"),
+        (("stance", "joints", "front_left"), []),
+        (("stance", "hands", 1, "wrench"), [None] * 5),
+        (("load", "angular_acceleration"), [0.0, 0.0]),
+        (("limits", "per_hand", "front_left", "largest_force"), [1.0, -5.0, None]),
+        (("limits", "per_hand", "front_left", "frame"), "palm"),
+        (("limits", "joint_torque", "rear_left"), [0.0]),
+        (("present", "rear_left"), [-1.0, 0.0, 0.0, 0.0]),
+        (("objective",), "fun"),
+    ],
+)
+def test_what_is_refused_departs_from_the_schema(path: tuple, value: object) -> None:
+    request = put(request_with_joints(), path, value)
+    (where,) = departures("PlanRequest", request)
+    assert where[: len(path)] == path[: len(where)]
+    field = refusal(request)[1]
+    assert field.startswith(dotted(where))

@@ -1,0 +1,49 @@
+"""Real ``crux serve`` processes on TCP loopback."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+
+import zenoh
+
+from service.serving import zenoh_config
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Served:
+    """A ``crux serve`` process."""
+
+    def __init__(self, endpoint: str, *more: str) -> None:
+        self.endpoint = endpoint
+        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "service.commands.cli", "serve", *flags],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+        line = self.process.stdout.readline()
+        assert line, self.process.stderr.read().decode()
+        self.ready = json.loads(line)
+
+    def stop(self, number: int) -> tuple[str, str]:
+        """Send a signal; what the process had to say until its end."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=PATIENCE)
+        return out.decode(), err.decode()
+
+
+def client_config(endpoint: str) -> zenoh.Config:
+    return zenoh_config(mode="client", connect=[endpoint], multicast=False)
