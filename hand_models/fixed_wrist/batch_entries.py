@@ -37,14 +37,14 @@ from hand_models.fixed_wrist.row_layout import RowLayout
 from hand_models.hand import FINGERS, HandModel
 from hand_models.tile import Surface
 
-__all__ = ["ManyEntries", "many_entries"]
+__all__ = ["BatchEntries", "entries_of_batch"]
 
 KEPT: Final = 64
 """Choices of hands that are kept, those used last; each hand takes some 50 kB."""
 
 
 @dataclass(frozen=True, eq=False)
-class ManyEntries:
+class BatchEntries:
     """Which source each number of the sets of some hands is. Arrays are read-only.
 
     Attributes
@@ -77,11 +77,11 @@ class ManyEntries:
 
 
 @lru_cache(maxsize=KEPT)
-def many_entries(
+def entries_of_batch(
     layouts: tuple[RowLayout, ...],
     models: tuple[HandModel, ...],
     surfaces: tuple[Surface, ...],
-) -> ManyEntries:
+) -> BatchEntries:
     """Return where the numbers of hands come from, with these row layouts, on these surfaces."""
     entries = [entries_of(layout) for layout in layouts]
     given = [surface_sources(surface) for surface in surfaces]
@@ -93,7 +93,7 @@ def many_entries(
     planes = _starts([len(e.shares) * len(s.planar) for e, s in zip(entries, given, strict=True)])
     places = _places(entries, [len(each) for each in constants], tiles, planes)
     lengths = [len(each.index) for each in entries]
-    made = ManyEntries(
+    made = BatchEntries(
         constants=np.concatenate(constants),
         index=np.concatenate(
             [place[each.index] for place, each in zip(places, entries, strict=True)]

@@ -10,7 +10,7 @@ together: sums over the tiles of each finger, of their places p and forces F,
 
     Σ (1, p) ⊗ F,    F at zero tension, per newton of tension and per newton of lateral reaction,
 
-hold the wrenches of all columns; what then goes where is in `many_entries`.
+hold the wrenches of all columns; what then goes where is in `entries_of_batch`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, skew
-from hand_models.fixed_wrist.batch_entries import ManyEntries, many_entries
+from hand_models.fixed_wrist.batch_entries import BatchEntries, entries_of_batch
 from hand_models.fixed_wrist.row_layout import RowLayout, layout_of
 from hand_models.hand import FINGERS, HELD, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
@@ -119,7 +119,7 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
     """Return the sets of hands for each hand's largest tension [N]."""
     hands = list(limits)
     layouts = [layout_of(hand, sticking=hand.hand.finger.friction > 0.0) for hand in hands]
-    entries = many_entries(
+    entries = entries_of_batch(
         tuple(layouts),
         tuple([hand.hand for hand in hands]),
         tuple([hand.surface for hand in hands]),
@@ -153,7 +153,7 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
 
 
 def _sums(
-    settled: Sequence[SettledHand], loads: Array, entries: ManyEntries
+    settled: Sequence[SettledHand], loads: Array, entries: BatchEntries
 ) -> tuple[Array, Array]:
     """Return sums over the tiles of each finger, of hands one after another.
 

@@ -14,7 +14,7 @@ from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
-from hand_models.sections import FingerPlane, Section, Swept, entries
+from hand_models.sections import FingerPlane, Section, Swept, entry_distances
 from hand_models.tile import Surface
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
@@ -138,7 +138,7 @@ class PlacedHands:
         Infinite where there is none.
         """
         return [
-            self._gaps_on(i) if shape is None else entries(shape, seen[TILES], seen[INTO])
+            self._gaps_on(i) if shape is None else entry_distances(shape, seen[TILES], seen[INTO])
             for i, (shape, seen) in enumerate(zip(self.shapes, self._seen, strict=True))
         ]
 

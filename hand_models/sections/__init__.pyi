@@ -11,5 +11,5 @@ from .section import (
     Vector2 as Vector2,
 )
 from .smooth_cuts import Face as Face, SmoothCut as SmoothCut
-from .swept_ball import PARALLEL as PARALLEL, Swept as Swept, entries as entries
+from .swept_ball import PARALLEL as PARALLEL, Swept as Swept, entry_distances as entry_distances
 from .swept_cuts import FingerPlane as FingerPlane, cut_of as cut_of

@@ -28,7 +28,7 @@ from hand_models.sections.smooth_cuts import (
     to_face,
 )
 
-__all__ = ["Oval"]
+__all__ = ["Ellipse"]
 
 LAST_STEP: Final = 1e-8
 """Change of a direction after which the next one would be lost in rounding."""
@@ -64,7 +64,7 @@ class _Nearest(NamedTuple):
     radius: float
 
 
-class Oval(SmoothCut):
+class Ellipse(SmoothCut):
     """An ellipse of rock that is no circle.
 
     Parameters

@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-__all__ = ["PARALLEL", "Swept", "Vector3", "entries"]
+__all__ = ["PARALLEL", "Swept", "Vector3", "entry_distances"]
 
 PARALLEL: Final = 1e-3
 """Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
@@ -54,7 +54,7 @@ class Swept(NamedTuple):
     grazing: float = 0.0
 
 
-def entries(shape: Swept, points: Sequence[Vector3], direction: Vector3) -> list[float]:
+def entry_distances(shape: Swept, points: Sequence[Vector3], direction: Vector3) -> list[float]:
     """Return how far from points, along a unit direction, the rock of a hold begins.
 
     Parameters

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from hand_models.sections.ellipses import Oval
+from hand_models.sections.ellipses import Ellipse
 from hand_models.sections.smooth_cuts import Disc, Face, SmoothCut, Tangent, Wall
 from hand_models.sections.swept_ball import PARALLEL, Swept
 
@@ -42,13 +42,13 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothCut | None:
     if square <= 0.0:
         return None
     mean, uneven = 0.5 * (g11 + g22), complex(0.5 * (g11 - g22), -g12)
-    core: Disc | Oval
+    core: Disc | Ellipse
     if abs(uneven) <= ROUND * mean:
         core = Disc(centre, math.sqrt(square / mean))
     else:
         # distances to an ellipsoid's section are told in metres by its mean radius
         size = determinant**-0.25 if shape.scale_y else 1.0
-        core = Oval(centre, mean, uneven, determinant, square, size)
+        core = Ellipse(centre, mean, uneven, determinant, square, size)
     if not shape.sine:
         return core
     return _Edge(core, _line(shape, plane, 1.0), _line(shape, plane, -1.0))
@@ -118,7 +118,7 @@ class _Edge(SmoothCut):
 
     faced = True
 
-    def __init__(self, core: Disc | Oval, first: _Line, second: _Line) -> None:
+    def __init__(self, core: Disc | Ellipse, first: _Line, second: _Line) -> None:
         self._core, self._first, self._second = core, first, second
 
     def _bounded(self, normal: complex) -> bool:

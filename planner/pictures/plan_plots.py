@@ -22,7 +22,7 @@ from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array
-from planner.pictures.plan_scene import Scene, Sights, scene_of, sights
+from planner.pictures.plan_scene import Scene, ViewDirections, scene_of, view_directions
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
 from planner.question import Question
@@ -87,7 +87,7 @@ def plot_plan(plan: Plan, question: Question, path: Path) -> None:
 
 def draw_plan(plan: Plan, question: Question) -> Figure:
     """Draw a plan; arguments as of `plot_plan`."""
-    scene, seen = scene_of(plan, question), sights(question.stance)
+    scene, seen = scene_of(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
     joints = [limb for limb in scene.limbs if limb.utilisations is not None]
     needed = ROW * (rows + len(joints)) / (TOP - BOTTOM)
@@ -136,7 +136,7 @@ def _write_title(figure: Figure, plan: Plan) -> None:
 # Views ------------------------------------------------------------------------------------------
 
 
-def _draw_space(figure: Figure, place: Any, scene: Scene, seen: Sights) -> None:
+def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) -> None:
     """Draw the scene in the axes of W, from behind the robot."""
     axes: Any = figure.add_subplot(place, projection="3d", computed_zorder=False)
     axes.set_proj_type("ortho")
@@ -169,7 +169,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: Sights) -> None:
     axes.set(xlabel="x of W [m]", ylabel="y of W [m]", zlabel="z of W [m]")
 
 
-def _draw_sides(facing: Any, side: Any, scene: Scene, seen: Sights) -> None:
+def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> None:
     """Draw the scene facing the rock, and from the side."""
     ahead = "toward the rock" if seen.toward else "ahead"
     if seen.steep:

@@ -16,7 +16,15 @@ from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
 from planner.result import HandPlan, Plan
 
-__all__ = ["DrawnHand", "DrawnLimb", "DrawnLoad", "Scene", "Sights", "scene_of", "sights"]
+__all__ = [
+    "DrawnHand",
+    "DrawnLimb",
+    "DrawnLoad",
+    "Scene",
+    "ViewDirections",
+    "scene_of",
+    "view_directions",
+]
 
 ARROW: Final = 0.5
 """Length of the longest force arrow in a picture [m]."""
@@ -133,7 +141,7 @@ class Scene:
         return ARROW / max(1.0, *(float(np.linalg.norm(force)) for force in forces))
 
 
-class Sights(NamedTuple):
+class ViewDirections(NamedTuple):
     """Unit directions in W that are seen from the robot: up, ahead, and into the rock.
 
     Attributes
@@ -156,7 +164,7 @@ class Sights(NamedTuple):
     steep: bool
 
 
-def sights(stance: Stance) -> Sights:
+def view_directions(stance: Stance) -> ViewDirections:
     """Return how a stance is looked at."""
     up = np.array([0.0, 0.0, 1.0])
     into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
@@ -168,7 +176,7 @@ def sights(stance: Stance) -> Sights:
     ahead = level[chosen] / np.linalg.norm(level[chosen])
     length = float(np.linalg.norm(into))
     into = into / length if length >= LEANING else ahead
-    return Sights(up, ahead, into, chosen == 0, bool(abs(into @ up) >= STEEP))
+    return ViewDirections(up, ahead, into, chosen == 0, bool(abs(into @ up) >= STEEP))
 
 
 def scene_of(plan: Plan, question: Question) -> Scene:

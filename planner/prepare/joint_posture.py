@@ -69,7 +69,7 @@ def posture(question: Question) -> Posture | None:
     if stance.joints is None:
         return None
     poses = hands_in_body(stance)
-    gravity, acceleration = felt(question)
+    gravity, acceleration = gravity_and_acceleration(question)
     angles: Mapping[str, Array]
     if isinstance(stance.joints, str):
         angles = _solved(question, poses, gravity - acceleration[:3])
@@ -82,7 +82,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
     """Return what the joints bear at these angles; limbs left out are at zero."""
     robot = question.stance.robot
     model = robot.model
-    gravity, acceleration = felt(question)
+    gravity, acceleration = gravity_and_acceleration(question)
     whole = {
         limb: np.asarray(angles.get(limb, np.zeros(len(model.joint_names[limb]))), dtype=float)
         for limb in robot.limbs
@@ -112,7 +112,7 @@ def hands_in_body(stance: Stance) -> dict[str, Pose]:
     return {hand.limb: body @ hand.pose for hand in stance.hands}
 
 
-def felt(question: Question) -> tuple[Array, Array]:
+def gravity_and_acceleration(question: Question) -> tuple[Array, Array]:
     """Return gravity (3,) and the body's acceleration (6,), linear and angular, in B.
 
     A body wrench that is given leaves the acceleration open: it counts as none.

@@ -10,5 +10,5 @@ from .stance import (
     SOLVE as SOLVE,
     HandOnHold as HandOnHold,
     Stance as Stance,
-    moderate as moderate,
+    checked_body_wrench as checked_body_wrench,
 )

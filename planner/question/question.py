@@ -12,7 +12,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from planner import deadline
-from planner.question.stance import Stance, known_limbs, moderate
+from planner.question.stance import Stance, checked_body_wrench, known_limbs
 
 __all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
 
@@ -70,7 +70,7 @@ class Load:
         x, y, z = com.tolist()
         fx, fy, fz = force.tolist()
         moment = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
-        return moderate(np.array([fx, fy, fz, *moment]), None)
+        return checked_body_wrench(np.array([fx, fy, fz, *moment]), None)
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class Question:
     def __post_init__(self) -> None:
         if self.body_wrench is not None:
             wrench = finite_vector(self.body_wrench, 6, "body_wrench")
-            moderate(wrench, "body_wrench")
+            checked_body_wrench(wrench, "body_wrench")
             object.__setattr__(self, "body_wrench", wrench)
         if self.objective not in OBJECTIVES:
             raise InvalidInputError(
@@ -293,5 +293,5 @@ class Question:
         if self.body_wrench is not None:
             return self.body_wrench
         if own is not None and self.load.own:
-            return moderate(own, None)
+            return checked_body_wrench(own, None)
         return self.load.body_wrench(self.stance)

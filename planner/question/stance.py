@@ -15,7 +15,15 @@ from hand_models.rock import Hold
 from hand_models.tile import Surface
 from planner.robots import Robot, robosimian
 
-__all__ = ["EARTH", "SOLVE", "HandOnHold", "Stance", "WristMode", "known_limbs", "moderate"]
+__all__ = [
+    "EARTH",
+    "SOLVE",
+    "HandOnHold",
+    "Stance",
+    "WristMode",
+    "checked_body_wrench",
+    "known_limbs",
+]
 
 WristMode = Literal["fixed", "floating"]
 
@@ -50,7 +58,7 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
             )
 
 
-def moderate(wrench: Array, field: str | None) -> Array:
+def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     if not np.abs(wrench).max() <= HEAVIEST:
         raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
@@ -149,7 +157,7 @@ class HandOnHold:
                     f"6 components are needed, got {len(self.wrench)}", field="wrench"
                 )
             given = [0.0 if value is None else value for value in self.wrench]
-            moderate(finite_vector(given, 6, "wrench"), "wrench")
+            checked_body_wrench(finite_vector(given, 6, "wrench"), "wrench")
         if self.hold_pose is not None and self.hold_in_hand is not None:
             raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
         _possible(self.pose, "pose")

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 
 from hand_models.base import Array, finite_vector
-from planner.question import Question, moderate
+from planner.question import Question, checked_body_wrench
 from planner.result import Plan
 from planner.solving.prepared_checks import prepare_checks
 from planner.solving.prepared_stance import checked_question, prepare_stance
@@ -57,7 +57,7 @@ class KnownStance:
             If it is not six finite numbers, or absurdly large.
         """
         start = time.perf_counter()
-        wrench = moderate(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
+        wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         prepared = self.prepared
         question = replace(prepared.question, body_wrench=wrench)
         hands = prepared.hands.turned(wrench)

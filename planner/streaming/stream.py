@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from planner.programs import SLACK
-from planner.question import Question, moderate
+from planner.question import Question, checked_body_wrench
 from planner.result import SetPoints, SetPointSource, no_set_points
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
@@ -154,7 +154,9 @@ class WrenchStream:
             If it is not six finite numbers, or absurdly large, or if the stream is closed.
         """
         # a copy: callers may well fill their own array again
-        wrench = moderate(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench").copy()
+        wrench = checked_body_wrench(
+            finite_vector(body_wrench, 6, "body_wrench"), "body_wrench"
+        ).copy()
         key = wrench.tobytes()
         with self._lock:
             if self._closed:

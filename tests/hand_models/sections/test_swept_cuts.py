@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.rock import Hold
 from hand_models.sections import Face, SmoothCut, cut_of
-from hand_models.sections.ellipses import Oval
+from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import distance, random_axes, random_ellipsoid, random_hold
 
 seeds = st.integers(0, 2**32 - 1)
@@ -140,7 +140,7 @@ def test_the_kinds_of_cuts():
         ("Plane", True): "Wall",
         ("Plane", False): "Wall",
         ("Cylinder", True): "Disc",
-        ("Cylinder", False): "Oval",
+        ("Cylinder", False): "Ellipse",
         ("Sphere", True): "Disc",
         ("Sphere", False): "Disc",
         ("Edge", True): "_Edge",
@@ -164,7 +164,7 @@ def test_a_plane_beside_the_rock_or_along_its_axis_has_no_cut(hold, origin, alon
 
 def test_an_ellipse_in_hand_worked_places():
     """Half axes 2 along x and 1 along z about 3i: G = x²/4 + z²."""
-    oval = Oval(3j, 0.625, complex(-0.375, 0.0), 0.25, 1.0, 1.0)
+    oval = Ellipse(3j, 0.625, complex(-0.375, 0.0), 0.25, 1.0, 1.0)
     assert oval.distance(3j) == pytest.approx(-1.0)
     assert oval.distance(0j) == pytest.approx(2.0)
     # the lowest place is straight ahead of a face that is one above its phalanx

@@ -35,6 +35,7 @@ from planner.solving import (
     solve,
     unique_plan,
 )
+from service import answering
 from service.answering import dispatch, questions
 from service.commands.cli import run
 from service.commands.stances import read_request
@@ -508,13 +509,13 @@ def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path,
 
 
 def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, capfd, monkeypatch):
-    original = dispatch.plan
+    original = answering.plan
 
     def plan_late(request, robots):
         with deadline.within(1e-9):
             return original(request, robots)
 
-    monkeypatch.setattr(dispatch, "plan", plan_late)
+    monkeypatch.setattr(answering, "plan", plan_late)
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": LONG}))
     assert run(["plan", str(path), "--json"]) == 0

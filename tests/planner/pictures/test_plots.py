@@ -23,9 +23,10 @@ from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.base import Pose
 from hand_models.rock import Mesh, Profile
 from hand_models.rock.profile import STRIPS
+from planner import solving
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
-from planner.pictures.plan_scene import scene_of, sights
+from planner.pictures.plan_scene import scene_of, view_directions
 from planner.pictures.plan_views import COLOURS, LIMB
 from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
 from planner.pictures.route_plots import draw_route
@@ -160,7 +161,9 @@ def test_a_picture_is_written_in_the_form_of_its_name(ending, begin, tmp_path):
 
 def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd):
     solved = []
-    monkeypatch.setattr(solve, "plan", lambda question: solved.append(question) or found(question))
+    monkeypatch.setattr(
+        solving, "plan", lambda question: solved.append(question) or found(question)
+    )
     picture = tmp_path / "plan.png"
     assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
     assert picture.exists()
@@ -434,7 +437,7 @@ def test_many_hands_make_the_picture_taller():
 
 @pytest.mark.parametrize("overhang", [-0.8, 0.0, 0.8])
 def test_walls_are_seen_horizontally_toward_the_rock(overhang):
-    seen = sights(on_wall(overhang=overhang))
+    seen = view_directions(on_wall(overhang=overhang))
     np.testing.assert_allclose(seen.ahead, [1.0, 0.0, 0.0], atol=1e-12)
     assert seen.toward
     assert not seen.steep
@@ -443,7 +446,7 @@ def test_walls_are_seen_horizontally_toward_the_rock(overhang):
 def test_ceilings_and_floors_are_seen_from_below_and_above():
     for overhang, height, title in ((math.pi / 2, 1.0, "below"), (-math.pi / 2, -1.0, "above")):
         stance = on_wall(overhang=overhang)
-        seen = sights(stance)
+        seen = view_directions(stance)
         np.testing.assert_allclose(seen.into, [0.0, 0.0, height], atol=1e-12)
         assert seen.steep
         assert not seen.toward
@@ -464,7 +467,7 @@ def test_between_two_walls_ahead_is_where_the_belly_looks():
         replace(hand, pose=Pose(hand.pose.position, turn if i % 2 else turn * [1.0, -1.0, -1.0]))
         for i, hand in enumerate(stance.hands)
     )
-    seen = sights(replace(stance, hands=hands))
+    seen = view_directions(replace(stance, hands=hands))
     np.testing.assert_allclose(seen.ahead, -stance.body.rotation[:, 2], atol=1e-12)
     assert not seen.toward
     assert not seen.steep

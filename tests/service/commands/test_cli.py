@@ -14,6 +14,7 @@ import pytest
 import trimesh
 from rich.console import Console
 
+from service import answering
 from service.answering import dispatch
 from service.commands.cli import crux, run
 from service.commands.stances import bundled
@@ -77,8 +78,8 @@ def test_a_failed_plan_is_a_failure(
         answer.reply.status = "failed"
         return answer
 
-    good = dispatch.planned
-    monkeypatch.setattr(dispatch, "planned", fail)
+    good = answering.planned
+    monkeypatch.setattr(answering, "planned", fail)
     assert run(["plan", stance_file(wall_request()), "--json"]) == FAILED
     assert result(capfd)["status"] == "failed"
 
