@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -98,7 +98,9 @@ def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, 
 
     screen = console(stderr=True)
     lines = [line] if line is not None and not screen.is_terminal else []
-    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+    bar = Progress(console=screen, transient=True, disable=not screen.is_terminal)
+    # before rich 14.3 a bar that is not shown leaves an empty line behind
+    with bar if screen.is_terminal else nullcontext():
         task = bar.add_task(title, total=None)
 
         def tell(done: int, total: int) -> None:

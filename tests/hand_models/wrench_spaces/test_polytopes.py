@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings, strategies as st
+from hypothesis import example, given, reject, settings, strategies as st
 from scipy.linalg import block_diag
 from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
 from hand_models.base import SolverError, UnsupportedError
@@ -337,8 +337,12 @@ def test_cuts_leave_what_qhull_says_of_all_half_spaces_together(seed, r):
     gaps = np.abs(found[:, None] - corners).max(axis=2)
     assert gaps.min(axis=0).max() < 1e-6
     assert gaps.min(axis=1).max() < 1e-6
-    assert ConvexHull(found).volume == pytest.approx(ConvexHull(corners).volume, rel=1e-9)
+    try:
+        hull, said = ConvexHull(found), ConvexHull(corners)
+    except QhullError:  # faces too close to one plane for it to merge: it says nothing
+        reject()
+    assert hull.volume == pytest.approx(said.volume, rel=1e-9)
     assert (found @ left.normals.T <= left.offsets + 1e-8).all()
-    bounding = {tuple(row) for row in np.round(ConvexHull(corners).equations, 6) + 0.0}
+    bounding = {tuple(row) for row in np.round(said.equations, 6) + 0.0}
     ours = np.round(np.column_stack([left.normals, -left.offsets]), 6) + 0.0
     assert {tuple(row) for row in ours} == bounding
