@@ -59,7 +59,7 @@ class HandModel:
         self.drive = TendonDrive.from_table(table)
         self.structure = Structure.from_table(table)
         self.nail = Fingernail.from_table(table)
-        self.layer = SequentialClosure(self.finger)
+        self.sequential_closure = SequentialClosure(self.finger)
         self.tendon_loads = TendonLoads(self.finger)
         # a tile on a finger's base only shifts the others on a tendon that rubs
         self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]

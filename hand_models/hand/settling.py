@@ -173,7 +173,9 @@ def _laid(placed: PlacedHands, known: Known) -> list[list[list[ClosedPhalanx]]]:
             phalanges = lain.get(plane)
             if phalanges is None:
                 cut = cut_of(shape, plane)
-                phalanges = lain[plane] = [] if cut is None else placed.hand.layer.lay(cut)
+                phalanges = lain[plane] = (
+                    [] if cut is None else placed.hand.sequential_closure.lay(cut)
+                )
             fingers.append(phalanges)
         laid.append(fingers)
     return laid
