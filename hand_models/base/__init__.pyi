@@ -1,3 +1,4 @@
+from .bounded_store import BoundedStore as BoundedStore
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
@@ -16,4 +17,3 @@ from .frames import (
     wrench_transports as wrench_transports,
 )
 from .progress import Progress as Progress
-from .recent import Recent as Recent

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from typing import Final
 
-from hand_models.base import InvalidInputError, Pose, Recent
+from hand_models.base import BoundedStore, InvalidInputError, Pose
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.placement import Placement, PlacementKey
@@ -41,15 +41,15 @@ class SpinyHand(HandModel):
 
     Attributes
     ----------
-    settled, settled_scans : Recent
+    settled, settled_scans : BoundedStore
         Hands that were settled last on holds given by numbers, and on meshes and profiles;
         `settle_each` looks there first.
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         super().__init__(table)
-        self.settled: Recent[Hashable, SettledHand] = Recent(KEPT)
-        self.settled_scans: Recent[Hashable, SettledHand] = Recent(SCANS)
+        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore(KEPT)
+        self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(SCANS)
 
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
         return spiny_hand, (self.table,)
@@ -120,7 +120,7 @@ class SpinyHand(HandModel):
         return [next(rough if scan else smooth) for scan in scanned]
 
     def _known_or_settled(
-        self, store: Recent[Hashable, SettledHand], placements: Sequence[Placement]
+        self, store: BoundedStore[Hashable, SettledHand], placements: Sequence[Placement]
     ) -> list[SettledHand | InvalidInputError]:
         keys = [PlacementKey(each) for each in placements]
         known: list[SettledHand | InvalidInputError | None] = [*store.find(keys)]

@@ -25,7 +25,7 @@ import clarabel
 import cvxpy as cp
 import numpy as np
 
-from hand_models.base import Array, Recent
+from hand_models.base import Array, BoundedStore
 from planner import deadline
 from planner.programs.conic_extent import Extent, Layout, PaddedProgram
 from planner.programs.cvxpy_internals import STATUS, WRITTEN_FOR, ChangedError, ConeMap, cone_map
@@ -117,7 +117,7 @@ class Compiled:
         self._variables, self._constraints = variables, constraints
         self._lock = threading.Lock()
         self.idle: list[Solver] = []
-        self._layouts: Recent[Extent, Layout] = Recent(LAYOUTS)
+        self._layouts: BoundedStore[Extent, Layout] = BoundedStore(LAYOUTS)
         self.map: ConeMap | None = None
         try:
             self.map = cone_map(problem, parameters, variables, constraints)

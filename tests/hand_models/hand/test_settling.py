@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
-from hand_models.base import Recent
+from hand_models.base import BoundedStore
 from hand_models.finger import settle_finger
 from hand_models.finger.contact_states import close
 from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
@@ -360,7 +360,7 @@ def test_a_hand_travels_between_processes_without_what_it_keeps():
     # the one that this process has now: others may have come between
     hand = spiny_hand()
     assert pickle.loads(pickle.dumps(hand)) is hand
-    recent = Recent(3)
+    recent = BoundedStore(3)
     recent.keep([("a", 1)])
     copy = pickle.loads(pickle.dumps(recent))
     assert (copy.most, copy.info()) == (3, (0, 0, 0))
@@ -369,7 +369,7 @@ def test_a_hand_travels_between_processes_without_what_it_keeps():
 @settings(max_examples=200, deadline=None)
 @given(st.integers(1, 5), st.lists(st.tuples(st.booleans(), st.integers(0, 7)), max_size=40))
 def test_recent_answers_are_those_asked_for_last(most, steps):
-    recent, model, order = Recent(most), {}, []
+    recent, model, order = BoundedStore(most), {}, []
     for asking, question in steps:
         known = question in model
         if asking:

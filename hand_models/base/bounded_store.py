@@ -7,13 +7,13 @@ from collections.abc import Hashable, Iterable, Sequence
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
 
-__all__ = ["Recent", "RecentInfo"]
+__all__ = ["BoundedStore", "StoreInfo"]
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-class RecentInfo(NamedTuple):
+class StoreInfo(NamedTuple):
     """How a store has served: answers found and missed since it was cleared, and kept now."""
 
     hits: int
@@ -21,7 +21,7 @@ class RecentInfo(NamedTuple):
     kept: int
 
 
-class Recent(Generic[K, V]):
+class BoundedStore(Generic[K, V]):
     """The answers to the questions that were asked last.
 
     Its answers are not part of what it is: a copy, and what another process gets, begins empty.
@@ -37,7 +37,7 @@ class Recent(Generic[K, V]):
         self._lock = Lock()
         self.clear()
 
-    def __reduce__(self) -> tuple[type[Recent[K, V]], tuple[int]]:
+    def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[int]]:
         return type(self), (self.most,)
 
     def clear(self) -> None:
@@ -46,10 +46,10 @@ class Recent(Generic[K, V]):
             self._answers: OrderedDict[K, V] = OrderedDict()
             self._hits = self._misses = 0
 
-    def info(self) -> RecentInfo:
+    def info(self) -> StoreInfo:
         """Return how the store has served."""
         with self._lock:
-            return RecentInfo(self._hits, self._misses, len(self._answers))
+            return StoreInfo(self._hits, self._misses, len(self._answers))
 
     def find(self, questions: Sequence[K]) -> list[V | None]:
         """Return the answer to each question, None where it is not known."""
