@@ -82,6 +82,29 @@ def test_importing_a_name_does_not_load_the_house(statement, absent):
     assert done.stdout.strip() == "[]"
 
 
+def test_threads_may_be_the_first_to_import():
+    code = """
+import sys, threading
+sys.setswitchinterval(1e-5)
+names = {"planner": ["plan", "Plan", "Load", "hand_space", "WrenchStream", "HandOnHold"],
+         "hand_models": ["Pose", "Mesh", "FloatingWrist", "SpinyHand", "WrenchSpace", "Surface"]}
+failed = []
+def load(package, name):
+    try:
+        getattr(__import__(package), name, None)
+    except BaseException as error:
+        failed.append(repr(error))
+threads = [threading.Thread(target=load, args=(p, n)) for p in names for n in 2 * names[p]]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+print(failed)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
 @pytest.mark.parametrize(
     ("old", "room", "names"),
     [
