@@ -69,7 +69,7 @@ def _command(problem: dict[str, Any]) -> dict[str, Any]:
             arguments += ["-o", folder]
         with CliRunner().isolation(given) as (out, *_):
             status = run([*arguments, "--json"])
-            lines = [json.loads(line) for line in out.getvalue().splitlines()]
+            told = out.getvalue().decode("utf-8").splitlines()
         tables = {
             file.name: [
                 {name: _cell(text) for name, text in row.items()}
@@ -77,7 +77,9 @@ def _command(problem: dict[str, Any]) -> dict[str, Any]:
             ]
             for file in sorted(Path(folder).glob("*.csv"))
         }
-    return {"exit": status, "said": lines, **tables}
+    # before click 8.2, what goes to standard error is among it
+    said = [json.loads(line) for line in told if line.startswith("{")]
+    return {"exit": status, "said": said, **tables}
 
 
 def _cell(text: str) -> str | float:

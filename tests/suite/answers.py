@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["read_answers", "told", "write_answers"]
+__all__ = ["libraries", "read_answers", "recorded_here", "told", "write_answers"]
 
 ANSWERS = Path(__file__).parent / "answers"
+
+LIBRARIES = ANSWERS / "libraries.json"
+"""With which versions they were recorded."""
 
 DIGITS = 13
 """Of the numbers that are kept."""
@@ -95,6 +99,16 @@ def _flat(equations: dict[str, Any]) -> dict[str, Any] | None:
     return {"projector": (back @ normals).tolist(), "nearest": (nearest / scale).tolist()}
 
 
+def libraries() -> dict[str, str]:
+    """Return the versions that are installed of what decides the last digits."""
+    return {name: version(name) for name in ("clarabel", "cvxpy", "numpy", "scipy")}
+
+
+def recorded_here() -> bool:
+    """Whether the answers were recorded with the libraries that are installed."""
+    return bool(json.loads(LIBRARIES.read_text(encoding="utf-8")) == libraries())
+
+
 def read_answers(kind: str) -> dict[str, dict[str, Any]]:
     """Return the recorded answers to problems of a kind, by name."""
     file = ANSWERS / f"{kind}.jsonl"
@@ -112,3 +126,4 @@ def write_answers(kind: str, answers: dict[str, dict[str, Any]]) -> None:
     )
     text = "".join(f"{line}\n" for line in lines)
     (ANSWERS / f"{kind}.jsonl").write_text(text, encoding="utf-8")
+    LIBRARIES.write_text(json.dumps(libraries(), indent=1) + "\n", encoding="utf-8")

@@ -54,10 +54,13 @@ class Problem:
         """Kind and name."""
         return f"{self.kind}/{self.name}"
 
-    def changes(self, expected: Any, got: Any) -> list[Difference]:
-        """Return the differences between two answers that are more than rounding, largest first."""
+    def changes(self, expected: Any, got: Any, least: float = 0.0) -> list[Difference]:
+        """Return the differences between two answers that are more than rounding, largest first.
+
+        ``least``: the least tolerance of any number.
+        """
         found = sorted(differences(expected, got), key=lambda each: -each.size)
-        return [each for each in found if not each.size <= self._allowed(each)]
+        return [each for each in found if not each.size <= max(least, self._allowed(each))]
 
     def _allowed(self, difference: Difference) -> float:
         sizes = [self.loose[name][0] for name in ("*", *difference.names) if name in self.loose]

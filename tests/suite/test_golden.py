@@ -6,11 +6,15 @@ from typing import Any
 
 import pytest
 
-from tests.suite.answers import read_answers
+from tests.suite.answers import read_answers, recorded_here
 from tests.suite.problems import Problem, problems
 from tests.suite.table import answer
 
 SLOW = (pytest.mark.slow, pytest.mark.timeout(1800))
+
+LEAST = 0.0 if recorded_here() else 1e-2
+"""Other versions of solver and linear algebra end in other last digits, and weigh ties otherwise:
+with them a status or a limit that changes is found, and a number that jumps."""
 
 ANSWERS: dict[str, dict[str, Any]] = {}
 
@@ -27,7 +31,8 @@ def known(problem: Problem) -> dict[str, Any]:
     [pytest.param(each, id=each.label, marks=SLOW if each.slow else ()) for each in problems()],
 )
 def test_the_answer_is_as_recorded(problem: Problem) -> None:
-    assert [str(each) for each in problem.changes(known(problem), answer(problem))[:10]] == []
+    changes = problem.changes(known(problem), answer(problem), LEAST)
+    assert [str(each) for each in changes[:10]] == []
 
 
 def test_every_problem_has_an_answer_and_every_answer_a_problem() -> None:
