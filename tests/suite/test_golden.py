@@ -16,6 +16,9 @@ LEAST = 0.0 if recorded_here() else 1e-2
 """Other versions of solver and linear algebra end in other last digits, and weigh ties otherwise:
 with them a status or a limit that changes is found, and a number that jumps."""
 
+FREE = set() if recorded_here() else {"blocking", "irreducible", "sufficient"}
+"""An irreducible infeasible set is one of many, and so is what else would do."""
+
 ANSWERS: dict[str, dict[str, Any]] = {}
 
 
@@ -32,7 +35,7 @@ def known(problem: Problem) -> dict[str, Any]:
 )
 def test_the_answer_is_as_recorded(problem: Problem) -> None:
     changes = problem.changes(known(problem), answer(problem), LEAST)
-    assert [str(each) for each in changes[:10]] == []
+    assert [str(each) for each in changes if not FREE.intersection(each.names)][:10] == []
 
 
 def test_every_problem_has_an_answer_and_every_answer_a_problem() -> None:
