@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cache
 
 import pytest
 
@@ -19,14 +19,8 @@ with them a status or a limit that changes is found, and a number that jumps."""
 FREE = set() if recorded_here() else {"blocking", "irreducible", "sufficient"}
 """An irreducible infeasible set is one of many, and so is what else would do."""
 
-ANSWERS: dict[str, dict[str, Any]] = {}
-
-
-def known(problem: Problem) -> dict[str, Any]:
-    """What is recorded of a problem; each file is read once."""
-    if problem.kind not in ANSWERS:
-        ANSWERS[problem.kind] = read_answers(problem.kind)
-    return ANSWERS[problem.kind][problem.name]
+recorded = cache(read_answers)
+"""Each file is read once."""
 
 
 @pytest.mark.parametrize(
@@ -34,7 +28,7 @@ def known(problem: Problem) -> dict[str, Any]:
     [pytest.param(each, id=each.label, marks=SLOW if each.slow else ()) for each in problems()],
 )
 def test_the_answer_is_as_recorded(problem: Problem) -> None:
-    changes = problem.changes(known(problem), answer(problem), LEAST)
+    changes = problem.changes(recorded(problem.kind)[problem.name], answer(problem), LEAST)
     assert [str(each) for each in changes if not FREE.intersection(each.names)][:10] == []
 
 
