@@ -30,14 +30,24 @@ def feasible(space):
     return result.status == 0
 
 
+@pytest.fixture(
+    params=[SEEDS[::5], pytest.param(SEEDS, marks=pytest.mark.slow)], ids=["some", "all"]
+)
+def seeds(request):
+    """Random hands: a few, and where there is time for it all."""
+    return request.param
+
+
 @functools.cache
 def non_empty_seeds():
     return [seed for seed in SEEDS if space_of(seed) is not None and feasible(space_of(seed))]
 
 
-def each_set():
+def each_set(seeds=SEEDS):
     """Every random hand's set with something in it, its size in scaled wrenches [N], and an rng."""
     for seed in non_empty_seeds():
+        if seed not in seeds:
+            continue
         space = space_of(seed)
         size = 1.0 + float(np.abs(space.vertices() * SCALE).max())
         yield space, size, np.random.default_rng(seed)
@@ -93,8 +103,8 @@ def test_there_are_hands_of_every_sort_among_them():
     assert {space.dimension for space in cut} >= {4, 5, 6}
 
 
-def test_a_set_is_empty_exactly_where_its_linear_program_is_infeasible():
-    for seed in SEEDS:
+def test_a_set_is_empty_exactly_where_its_linear_program_is_infeasible(seeds):
+    for seed in seeds:
         space = space_of(seed)
         if space is None:
             continue
@@ -106,8 +116,8 @@ def test_a_set_is_empty_exactly_where_its_linear_program_is_infeasible():
                     view()
 
 
-def test_support_is_that_of_the_linear_program_and_of_the_vertices():
-    for space, size, rng in each_set():
+def test_support_is_that_of_the_linear_program_and_of_the_vertices(seeds):
+    for space, size, rng in each_set(seeds):
         vertices = space.vertices()
         for _ in range(3):
             direction = rng.normal(size=6) * SCALE
@@ -117,8 +127,8 @@ def test_support_is_that_of_the_linear_program_and_of_the_vertices():
             assert (vertices @ direction).max() == pytest.approx(expected, abs=1e-7 * size)
 
 
-def test_every_vertex_satisfies_every_face_and_every_face_is_met_by_its_share_of_vertices():
-    for space, size, _ in each_set():
+def test_every_vertex_satisfies_every_face_and_every_face_is_met_by_its_share_of_vertices(seeds):
+    for space, size, _ in each_set(seeds):
         vertices, faces, r = space.vertices(), space.half_spaces(), space.dimension
         assert faces.normals.shape[1] == faces.equation_normals.shape[1] == 6
         assert len(faces.equation_normals) == 6 - r
@@ -132,8 +142,8 @@ def test_every_vertex_satisfies_every_face_and_every_face_is_met_by_its_share_of
         assert ((slack < 1e-6 * size).sum(axis=0) >= r).all()
 
 
-def test_no_vertex_is_a_mixture_of_others():
-    for space, size, rng in each_set():
+def test_no_vertex_is_a_mixture_of_others(seeds):
+    for space, size, rng in each_set(seeds):
         vertices = space.vertices() * SCALE
         if not 2 <= len(vertices) <= 400:
             continue
@@ -149,8 +159,8 @@ def test_no_vertex_is_a_mixture_of_others():
             assert result.status == 2 or nearest < 1e-4 * size
 
 
-def test_containment_changes_where_the_linear_program_says_the_set_ends():
-    for space, size, rng in each_set():
+def test_containment_changes_where_the_linear_program_says_the_set_ends(seeds):
+    for space, size, rng in each_set(seeds):
         vertices = space.vertices()
         centre = mixture(rng, vertices)
         assert space.contains(centre)
@@ -172,6 +182,7 @@ def test_containment_changes_where_the_linear_program_says_the_set_ends():
             assert (room[ahead] / slope[ahead]).min() == pytest.approx(end, abs=2.0 * margin)
 
 
+@pytest.mark.slow
 def test_off_a_flat_set_nothing_is_contained():
     flat = 0
     for space, size, rng in each_set():
