@@ -342,15 +342,19 @@ class WrenchSpace:
         for sign in (1.0, -1.0):
             cost = np.zeros(m + 1)
             cost[-1] = sign
-            result = linprog(
-                cost,
-                A_ub=rows,
-                b_ub=self.b,
-                A_eq=equations,
-                b_eq=-self.origin * SCALE,
-                bounds=bounds,
-                method="highs",
-            )
+            # the simplex of an older HiGHS ends some of these without a word; its barrier does not
+            for method in ("highs", "highs-ipm"):
+                result = linprog(
+                    cost,
+                    A_ub=rows,
+                    b_ub=self.b,
+                    A_eq=equations,
+                    b_eq=-self.origin * SCALE,
+                    bounds=bounds,
+                    method=method,
+                )
+                if result.status in (0, 2):
+                    break
             if result.status == 2:
                 return None
             if result.status != 0 or result.x is None:

@@ -24,6 +24,9 @@ HUGE = 1e6
 
 TOLERANCES = {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9}
 
+DECIDED = 0, 2
+"""Statuses: an optimum, or none as nothing is feasible."""
+
 
 class Rows(NamedTuple):
     """``L y + l0 ≤ u s``, ``H y ≤ h`` and ``B y + b`` the body wrench, for all hands together."""
@@ -83,16 +86,21 @@ def rows(question: Question, sets: list[WrenchSpace] | None = None) -> Rows:
 
 def solve(cost, A, b, E=None, e=None, bounds=(None, None)) -> OptimizeResult:
     """min cost · x with A x ≤ b and E x = e."""
-    return linprog(
-        cost,
-        A_ub=A,
-        b_ub=b,
-        A_eq=E,
-        b_eq=e,
-        bounds=bounds,
-        method="highs",
-        options=TOLERANCES,
-    )
+    # the simplex of an older HiGHS ends some of these without a word; its barrier does not
+    for method in ("highs", "highs-ipm"):
+        found = linprog(
+            cost,
+            A_ub=A,
+            b_ub=b,
+            A_eq=E,
+            b_eq=e,
+            bounds=bounds,
+            method=method,
+            options=TOLERANCES,
+        )
+        if found.status in DECIDED:
+            break
+    return found
 
 
 def margin_program(question: Question, sets: list[WrenchSpace] | None = None) -> tuple:
