@@ -342,8 +342,8 @@ class WrenchSpace:
         for sign in (1.0, -1.0):
             cost = np.zeros(m + 1)
             cost[-1] = sign
-            # the simplex of an older HiGHS ends some of these without a word; its barrier does not
-            for method in ("highs", "highs-ipm"):
+            # the presolve of an older HiGHS leaves some of these undecided
+            for presolve in (True, False):
                 result = linprog(
                     cost,
                     A_ub=rows,
@@ -351,7 +351,8 @@ class WrenchSpace:
                     A_eq=equations,
                     b_eq=-self.origin * SCALE,
                     bounds=bounds,
-                    method=method,
+                    method="highs",
+                    options={"presolve": presolve},
                 )
                 if result.status in (0, 2):
                     break

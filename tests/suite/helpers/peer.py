@@ -86,8 +86,8 @@ def rows(question: Question, sets: list[WrenchSpace] | None = None) -> Rows:
 
 def solve(cost, A, b, E=None, e=None, bounds=(None, None)) -> OptimizeResult:
     """min cost · x with A x ≤ b and E x = e."""
-    # the simplex of an older HiGHS ends some of these without a word; its barrier does not
-    for method in ("highs", "highs-ipm"):
+    # the presolve of an older HiGHS leaves some of these undecided
+    for presolve in (True, False):
         found = linprog(
             cost,
             A_ub=A,
@@ -95,8 +95,8 @@ def solve(cost, A, b, E=None, e=None, bounds=(None, None)) -> OptimizeResult:
             A_eq=E,
             b_eq=e,
             bounds=bounds,
-            method=method,
-            options=TOLERANCES,
+            method="highs",
+            options={**TOLERANCES, "presolve": presolve},
         )
         if found.status in DECIDED:
             break
