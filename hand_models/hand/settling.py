@@ -7,13 +7,13 @@ their holds, the places and axes of their tiles. How each finger rests is found 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.finger import KINDS, ClosedPhalanx
+from hand_models.finger import FREE, KINDS, NONE, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import close_fingers
 from hand_models.hand.finger_frames import BASES
 from hand_models.hand.hooked_nails import hook_nails, no_nails
@@ -21,7 +21,8 @@ from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.seating import CENTRED, propose, seat, seating_given, touches_seat
-from hand_models.hand.settled_hand import SettledHand
+from hand_models.hand.settled_hand import HandPostures, SettledHand
+from hand_models.hand.tightening import resting_tensions
 from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_rock
 from hand_models.sections import FingerPlane, cut_of
 
@@ -81,6 +82,9 @@ def _settle(
         if depth < -hand.spine_travel
     }
     closed = close_fingers(placed, laid, tensions, errors)
+    postures = closed.of_hands()
+    for i, error in _too_slack(hand, postures, tensions):
+        errors.setdefault(i, error)
     tiles = tiles_on_rock(placed, closed, tensions)
     nails = [no_nails(hand.nail)] * len(placements)
     for i, each in enumerate(placements):
@@ -92,7 +96,7 @@ def _settle(
     palms = palms_on_rock(placed)
     outcomes: list[SettledHand | InvalidInputError] = []
     for i, (each, of_tiles, posture) in enumerate(
-        zip(placements, hand_tiles(tiles, nails), closed.of_hands(), strict=True)
+        zip(placements, hand_tiles(tiles, nails), postures, strict=True)
     ):
         if i in errors:
             outcomes.append(errors[i])
@@ -126,6 +130,30 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
         f"at most {1e3 * hand.spine_travel:g} mm (the spines' travel) is possible",
         field="hold",
     )
+
+
+def _too_slack(
+    hand: HandModel, postures: Sequence[HandPostures], tensions: Sequence[float]
+) -> Iterator[tuple[int, InvalidInputError]]:
+    """Yield hands whose tendons do not close all joints that are to rest on the rock, and why."""
+    angles = np.array([posture.angles for posture in postures])
+    closes = np.array([posture.stops for posture in postures]) == FREE
+    closes &= (np.array([posture.kinds for posture in postures]) != NONE).any(axis=2)[..., None]
+    losses = np.array([hand.finger.losses(name.startswith("outer")) for name in FINGERS])
+    turns = np.diff(angles, axis=2, prepend=0.0)
+    needed = np.where(closes, resting_tensions(hand.finger, turns, losses), 0.0)
+    short = needed.reshape(len(needed), -1).max(axis=1) > tensions
+    for i in short.nonzero()[0].tolist():
+        finger, joint = divmod(int(needed[i].argmax()), len(PHALANGES))
+        yield (
+            i,
+            InvalidInputError(
+                f"must be at least {needed[i, finger, joint]:.3g} N, at which the "
+                f"{PHALANGES[joint]} joint of {FINGERS[finger]} has closed on this hold, "
+                f"got {tensions[i]:g}",
+                field="grasp.closing_tension",
+            ),
+        )
 
 
 def _placed(

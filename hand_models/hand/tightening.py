@@ -18,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.finger import PHALANGES
+from hand_models.base import Array
+from hand_models.finger import PHALANGES, FingerModel
 from hand_models.hand.names import FINGERS, NAIL
 from hand_models.hand.settled_hand import SettledHand
 
-__all__ = ["TILES", "ClosingSequence", "ClosingStage", "closing_sequence"]
+__all__ = ["TILES", "ClosingSequence", "ClosingStage", "closing_sequence", "resting_tensions"]
 
 TILES = "tiles"
 """Name of the last stage."""
@@ -62,6 +63,21 @@ class ClosingSequence(NamedTuple):
     in_order: bool
 
 
+def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
+    """Return the tensions at which joints are at rest that have turned so far [N].
+
+    Parameters
+    ----------
+    model : FingerModel
+    turns : ndarray, shape (..., 3)
+        q of each joint [rad].
+    losses : ndarray, shape (..., 3)
+        Diagonals of M (Eq. 8).
+    """
+    springs = np.asarray(model.joint_preload) + np.asarray(model.joint_stiffness) * turns
+    return np.asarray(springs / (losses * np.asarray(model.pulley_radii)))
+
+
 def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
     """Return how each finger of a settled hand has closed, in the order of `FINGERS`.
 
@@ -83,18 +99,14 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
         stages = [
             ClosingStage(NAIL, nail.preload / nail.pulley_radius, turned / nail.pulley_radius)
         ]
-        pulls = finger.losses(name.startswith("outer")) * np.asarray(model.pulley_radii)
-        for phalanx, pull, stiffness, preload, angle in zip(
-            PHALANGES,
-            pulls.tolist(),
-            model.joint_stiffness,
-            model.joint_preload,
-            finger.joint_angles.tolist(),
-            strict=True,
-        ):
-            starts = max(0.0, preload / pull)
-            ends = max(starts, (preload + stiffness * angle) / pull)
-            stages.append(ClosingStage(phalanx, starts, ends))
+        losses = finger.losses(name.startswith("outer"))
+        starts, ends = (
+            resting_tensions(model, turns, losses).tolist()
+            for turns in (np.zeros(len(PHALANGES)), finger.joint_angles)
+        )
+        for phalanx, start, end in zip(PHALANGES, starts, ends, strict=True):
+            start = max(0.0, start)
+            stages.append(ClosingStage(phalanx, start, max(start, end)))
         stages.append(ClosingStage(TILES, 0.0, settled.closing_tension))
         ordered = all(
             later.starts >= earlier.ends for earlier, later in itertools.pairwise(stages[:-1])

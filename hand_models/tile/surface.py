@@ -23,6 +23,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,6 +93,19 @@ class Surface:
                 raise InvalidInputError(
                     f"must not be negative, got {getattr(self, name):g}", field=name
                 )
+        bounds = _bounds()
+        if self.lateral_limit > bounds.lateral_ratio * self.shear_limit:
+            raise InvalidInputError(
+                f"must be at most {bounds.lateral_ratio:g} times shear_limit = "
+                f"{self.shear_limit:g} N, got {self.lateral_limit:g}: spines hold less sideways",
+                field="lateral_limit",
+            )
+        if self.compression_gain > bounds.compression_gain:
+            raise InvalidInputError(
+                f"must be at most {bounds.compression_gain:g}, got {self.compression_gain:g}: "
+                "newtons of shear strength for each newton of pressing",
+                field="compression_gain",
+            )
         if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
             raise InvalidInputError(
                 f"must be in (0, 1], got {self.lateral_pull_off_ratio:g}",
@@ -109,6 +123,12 @@ class Surface:
     def _hash(self) -> int:
         # worked out once: surfaces are keys wherever hands are
         return hash(tuple([getattr(self, field.name) for field in fields(self)]))
+
+    @property
+    def strongest_tile(self) -> float | None:
+        """What all spines of a tile hold before they break [N], where the surface asks for more."""
+        most = _bounds().tile_strength
+        return most if self.shear_limit > most else None
 
     @classmethod
     def named(cls, name: str) -> Surface:
@@ -220,10 +240,23 @@ def _from_ratios(shear_limit: float, section: str) -> Surface:
     )
 
 
+class _Bounds(NamedTuple):
+    """Section ``bounds`` of ``surfaces.toml``."""
+
+    lateral_ratio: float
+    compression_gain: float
+    tile_strength: float
+
+
+@cache
+def _bounds() -> _Bounds:
+    return _Bounds(*[surface_table().scalar("bounds", name) for name in _Bounds._fields])
+
+
 @cache
 def surface_names() -> tuple[str, ...]:
     """Return the names of the surface presets."""
-    return tuple(name for name in surface_table().sections if name != "defaults")
+    return tuple(name for name in surface_table().sections if name not in ("bounds", "defaults"))
 
 
 @lru_cache(maxsize=64)

@@ -163,7 +163,7 @@ class BodyPrograms:
         most = max(worth, key=lambda name: round(worth[name], ALIKE), default=None)
         return most if most is not None and worth[most] > BINDING else None
 
-    def error(self, ends: Sequence[Sequence[Array]]) -> float:
+    def linearisation_error(self, ends: Sequence[Sequence[Array]]) -> float:
         """Return how far floating hands' sets are off at most with some loads [N].
 
         The largest disagreement of a hand's wrench with the exact model there: forces, and moments

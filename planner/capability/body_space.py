@@ -178,13 +178,13 @@ class BodySpace:
         scaled = None if polygon is None else polygon.scaled(1.0 / SCALE[plane])
         return BodySection((one, two), others, scaled)
 
-    def error(self, ends: Sequence[End]) -> float:
+    def linearisation_error(self, ends: Sequence[End]) -> float:
         """Return how far floating hands' sets are off at most at some ends [N].
 
         The largest disagreement of a hand's wrench with the exact model: forces, and moments over
         0.1 m. Zero where no wrist floats.
         """
-        return self._programs.error([end.loads for end in ends])
+        return self._programs.linearisation_error([end.loads for end in ends])
 
     @property
     def weight(self) -> Array | None:

@@ -303,6 +303,12 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
                 f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes; "
                 "positions in metres, quaternions as [x, y, z, w]?"
             )
+        most = hand.surface.strongest_tile
+        if most is not None:
+            found.append(
+                f"{place.limb}: a tile is taken to hold {hand.surface.shear_limit:g} N in shear; "
+                f"all its spines break at {most:g} N"
+            )
         by_finger = holding[count * h : count * (h + 1)]
         if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
             found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))

@@ -155,7 +155,8 @@ class TensionPath:
     Attributes
     ----------
     safe : bool
-        Whether every point of it balances the body within the cap on the utilisation.
+        Whether every point of it balances the body within the cap on the utilisation, hard rows
+        giving by 1 mN.
     safe_part : float
         How much of it does, from the plan backward; zero where the plan itself does not.
     utilisation_at_present : float or None

@@ -369,11 +369,7 @@ def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
     reaches = {}
     for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
         ends = space.capability(direction)
-        low, high = (math.inf, -math.inf) if ends is None else ends
-        reaches[f"+{axis}"] = _reach(high, space.support(direction))
-        reaches[f"-{axis}"] = _reach(-low, space.support(-direction))
+        low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))
+        for sign, pure, way in (("+", high, direction), ("-", low, -direction)):
+            reaches[f"{sign}{axis}"] = replies.AxisCapability(pure, float(space.support(way)))
     return reaches
-
-
-def _reach(end: float, extent: float) -> replies.AxisCapability:
-    return replies.AxisCapability(float(end) if end >= 0.0 else None, float(extent))

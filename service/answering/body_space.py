@@ -27,9 +27,6 @@ APPROXIMATE: Final = (
 NO_LOAD: Final = "no accelerations: a body wrench tells nothing of the mass; give a load instead"
 NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
 
-NONE: Final = 1e-6
-"""How far below zero a reach is still zero but for rounding [N, N·m]."""
-
 
 class Explored(NamedTuple):
     """A body space, the plane of it that was asked for, and the reply."""
@@ -64,7 +61,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     signs = {f"{sign}{axis}": 1.0 if sign == "+" else -1.0 for axis in COMPONENTS for sign in "+-"}
     ways = {name: sign * np.eye(6)[COMPONENTS.index(name[1:])] for name, sign in signs.items()}
     extents = {name: space.support(way) for name, way in ways.items()}
-    error = space.error([end for end in extents.values() if end is not None])
+    error = space.linearisation_error([end for end in extents.values() if end is not None])
     capability = {
         name: _capability(space.more(way), space.pure(way), extents[name])
         for name, way in ways.items()
@@ -81,6 +78,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         body_wrench=vector(space.needed),
         utilisation=space.plan.utilisation,
         exact=space.exact,
+        linearisation_error=error,
         error=error,
         capability=capability,
         section=_section(section),
@@ -124,7 +122,7 @@ def _capability(more: End | None, pure: End | None, extent: End | None) -> repli
     end = more or extent
     return replies.BodyCapability(
         more=None if more is None else max(more.reach, 0.0),
-        pure=None if pure is None or pure.reach < -NONE else max(pure.reach, 0.0),
+        pure=None if pure is None else pure.reach,
         extent=None if extent is None else extent.reach,
         limiting=None if end is None else _limit(end.limiting),
     )

@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 __all__ = ["demo", "query", "serve"]
 
+PATIENCE: Final = 120.0
+"""How long the demo waits for its own service, however busy the machine [s]."""
+
 DEMO_STANCE: Final = "wall-300-joints"
 
 
@@ -155,7 +158,7 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
     start_zenoh_log()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with open_session(config) as session, PlanService(session, robot) as service:
-        client = CruxClient(session, service.robot)
+        client = CruxClient(session, service.robot, timeout=PATIENCE)
         try:
             reply = client.plan(request)
         except ServiceError as error:

@@ -151,7 +151,8 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
     out.print("least, most: with whatever else the hand can carry")
     if with_pure:
         out.print("pure: with every other component zero; -: none")
-    if any(capability[f"{sign}{AXES[0]}"].pure is None for sign in "+-"):
+    ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
+    if any(end is None or end < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 

@@ -19,8 +19,8 @@ class BodyCapability(Struct, kw_only=True):
     """How far body wrenches that are held go along an axis of B; null where there are none.
 
     ``more``: beyond the body wrench asked for, which has to be held. ``pure``: with every other
-    component zero. ``extent``: with whatever else. ``limiting``: the limit that ends ``more``, or
-    else ``extent``.
+    component zero. ``extent``: with whatever else. Below zero, so much of the opposite is always
+    there. ``limiting``: the limit that ends ``more``, or else ``extent``.
     """
 
     more: float | None
@@ -61,8 +61,8 @@ class BodySpaceReply(Reply, kw_only=True):
     ``acceleration``: by axis of W; null where the body cannot be held at rest or its wrench was
     given instead of a load. ``angular_acceleration``: about B's origin, for the robot's own load at
     known joints. ``along``: in the directions asked for. ``exact``: false where a wrist floats; its
-    hand's set is then linearised, and at the extents it is off by up to ``error``, in newtons with
-    moments over 0.1 m.
+    hand's set is then linearised, and at the extents it is off by up to ``linearisation_error``, in
+    newtons with moments over 0.1 m. ``error``: its old name, for one more version.
     """
 
     id: str | None = None
@@ -72,6 +72,7 @@ class BodySpaceReply(Reply, kw_only=True):
     body_wrench: Vector
     utilisation: float | None
     exact: bool
+    linearisation_error: float
     error: float
     capability: dict[str, BodyCapability]
     section: BodySection

@@ -61,7 +61,7 @@ class TensionPath(Struct, kw_only=True):
     backward. ``utilisation_at_present``: the least at the present tensions, null if these balance
     the body at no utilisation. ``largest_change``: of a tension [N]. ``limiting``: the limits and
     hard rows that end the safe part, the weightiest first; of a plan beyond the cap those of which
-    it uses most.
+    it uses most. Hard rows give by 1 mN on the way: no present tension is known better.
     """
 
     safe: bool
@@ -74,7 +74,9 @@ class TensionPath(Struct, kw_only=True):
 class PlanReply(Reply, kw_only=True):
     """Who carries what, and what margin is left.
 
-    ``effort``: the sum of squared relative tendon tensions and joint torques. ``joints``: the
+    ``effort``: the sum of squared relative tendon tensions and joint torques; where it is the
+    objective, palms, lateral reactions and wrists count a little, too, so that there is one plan:
+    it may so be a few tenths of a percent above the least. ``joints``: the
     angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
     joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
     would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a

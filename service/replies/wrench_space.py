@@ -83,7 +83,7 @@ class AxisCapability(Struct):
     """How far a set reaches along an axis.
 
     ``pure``: the most of it with every other component zero, null where there is none. ``extent``:
-    the most of it with whatever else.
+    the most of it with whatever else. Below zero, so much of the opposite is always there.
     """
 
     pure: float | None

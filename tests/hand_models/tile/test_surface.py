@@ -370,3 +370,17 @@ def test_more_strength_under_pressing_never_costs_strength_under_pull_off():
     for gain in (0.5, 3.9, 4.1, 20.0):
         gained = replace(plain, compression_gain=gain)
         assert (reach(gained, DIRECTIONS) >= reach(plain, DIRECTIONS) * (1.0 - 1e-12)).all()
+
+
+def test_a_surface_that_no_spines_can_give_is_refused_and_one_that_breaks_them_warned_of():
+    refused = (
+        ({"shear_limit": 60.0, "lateral_limit": 6000.0}, "lateral_limit", "at most 2 times"),
+        ({"shear_limit": 60.0, "compression_gain": 1000.0}, "compression_gain", "at most 20"),
+    )
+    for values, field, words in refused:
+        with pytest.raises(InvalidInputError, match=words) as caught:
+            Surface.from_values(values)
+        assert caught.value.field == field
+    # 40 spines of 70 N
+    assert Surface.from_values({"shear_limit": 2800.0}).strongest_tile is None
+    assert Surface.from_values({"shear_limit": 1e5}).strongest_tile == 2800.0

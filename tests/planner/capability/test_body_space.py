@@ -397,8 +397,12 @@ def test_floating_hands_are_linearised_where_the_plan_puts_them():
     rest = [hand.wrist.twist for hand in space.plan.hands]
     end = ends[least]
     near = [y + 0.1 * (far - y) for y, far in zip(rest, end.loads, strict=True)]
-    assert 0.0 < space.error([end._replace(loads=tuple(near))]) < 0.05 * space.error([end])
-    assert wall_space().error([wall_space().support(np.eye(6)[0])]) == 0.0
+    assert (
+        0.0
+        < space.linearisation_error([end._replace(loads=tuple(near))])
+        < 0.05 * space.linearisation_error([end])
+    )
+    assert wall_space().linearisation_error([wall_space().support(np.eye(6)[0])]) == 0.0
 
 
 # What is refused ----------------------------------------------------------------------------------
@@ -445,7 +449,8 @@ def test_a_reply_says_what_the_planner_says():
         questions.question(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
     )
     assert (reply.id, reply.robot, reply.status) == ("wall", "robosimian", "optimal")
-    assert (reply.exact, reply.error, reply.warnings) == (True, 0.0, [])
+    assert (reply.exact, reply.linearisation_error, reply.warnings) == (True, 0.0, [])
+    assert reply.error == reply.linearisation_error
     np.testing.assert_allclose(reply.body_wrench, space.needed)
     assert set(reply.capability) == {sign + axis for axis in COMPONENTS for sign in "+-"}
     for name, end in reply.capability.items():

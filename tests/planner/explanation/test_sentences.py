@@ -9,6 +9,7 @@ import pytest
 
 from hand_models.base import Pose
 from hand_models.rock import Cylinder, Plane
+from hand_models.tile import Surface
 from planner.explanation import overload_sentence, shortfall_sentence
 from planner.prepare import settle_hand
 from planner.programs import WRENCH_UNIT
@@ -139,3 +140,10 @@ def test_no_tile_of_a_bundled_hand_is_inside_its_rock():
             for point in hand.positions:
                 depth = hand.hold.entry(into_rock.apply(point), into_rock.rotation[:, 2])
                 assert depth > -1e-4
+
+
+def test_tiles_stronger_than_their_spines_are_warned_of():
+    answer = plan(ask(on_wall(surface=Surface.from_values({"shear_limit": 1e5}))))
+    told = [words for words in answer.warnings if "break at 2800 N" in words]
+    assert len(told) == 4
+    assert all(": a tile is taken to hold 100000 N in shear; " in words for words in told)

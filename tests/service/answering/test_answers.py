@@ -8,6 +8,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from hand_models.base import InvalidInputError, SolverError, UnsupportedError, wrench_transport
 from planner import solving
@@ -215,9 +216,44 @@ def test_a_wrench_space_and_its_views_agree() -> None:
             reach = reply.capability[sign + axis]
             extent = (factor * vertices[:, i]).max()
             assert reach.extent == pytest.approx(extent, abs=1e-6)
-            assert reach.pure is None or -1e-6 <= reach.pure <= reach.extent + 1e-6
+            assert reach.pure is None or reach.pure <= reach.extent + 1e-6
     assert {row.kind for row in reply.rows} == {"limit", "hard"}
     assert all(row.constant == 0.0 for row in reply.rows if row.kind == "hard")
+
+
+def test_an_axis_that_meets_a_set_on_its_far_side_alone_is_told_below_zero() -> None:
+    below = 0
+    for shape, diameter, surface, rotation in (
+        ("cylinder", 0.3, "concrete-fine", 0.0),
+        ("sphere", 0.25, "rock", math.pi),
+    ):
+        stance = flat_request()["stance"]
+        stance["hands"][0] |= {
+            "hold": {"shape": shape, "diameter": diameter},
+            "surface": surface,
+            "grasp": {"outer_rotation": rotation, "lateral": False},
+        }
+        request = {"v": 1, "stance": stance, "limb": stance["hands"][0]["limb"]}
+        answer = dispatch.handle(WRENCH_SPACE, msgspec.json.encode(request))
+        assert answer.good, answer.payload
+        reply = msgspec.json.decode(answer.payload, type=WrenchSpaceReply)
+        vertices = np.array(reply.vertices)
+        for i, axis in enumerate(("fx", "fy", "fz", "mx", "my", "mz")):
+            for sign, factor in (("+", 1.0), ("-", -1.0)):
+                # the farthest mixture of vertices on the line through zero along the axis
+                others = np.delete(vertices, i, axis=1).T
+                found = linprog(
+                    -factor * vertices[:, i],
+                    A_eq=np.vstack([others, np.ones(len(vertices))]),
+                    b_eq=np.append(np.zeros(5), 1.0),
+                )
+                pure = reply.capability[sign + axis].pure
+                if pure is None:
+                    assert found.status == 2
+                    continue
+                assert pure == pytest.approx(-found.fun, abs=1e-5)
+                below += pure < -1e-3
+    assert below > 0
 
 
 def test_a_hand_that_is_not_there() -> None:
