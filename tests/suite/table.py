@@ -60,6 +60,8 @@ quick_option = click.option("--quick", is_flag=True, help="Without the slow ones
 def main(context: click.Context, pattern: str, quick: bool) -> None:
     """Ask every question, and compare with the answers that are recorded."""
     if context.invoked_subcommand is not None:
+        if pattern != "*" or quick:
+            raise click.UsageError(f"options of {context.invoked_subcommand} go after its name")
         return
     out, table = Console(), Table("problem", "status", "s", "off", "")
     failed, started = 0, time.perf_counter()
