@@ -222,7 +222,9 @@ def test_a_posture_is_as_its_pattern_says(seed):
 
 def test_a_tile_that_only_slips_keeps_its_contact():
     """Closed with more than sandpaper holds in shear: overloaded, but on the rock."""
-    weak = replace(Surface.named("sandpaper-36"), shear_limit=5.0, pull_off_limit=1.4)
+    weak = replace(
+        Surface.named("sandpaper-36"), shear_limit=5.0, pull_off_limit=1.4, lateral_limit=4.3
+    )
     settled = HAND.settle(Cylinder(0.3), weak, PINCH)
     assert kinds(settled) == [("face", None)] * 3
     finger = settled.fingers[1]
