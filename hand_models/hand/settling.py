@@ -7,6 +7,7 @@ their holds, the places and axes of their tiles. How each finger rests is found 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -145,11 +146,13 @@ def _too_slack(
     short = needed.reshape(len(needed), -1).max(axis=1) > tensions
     for i in short.nonzero()[0].tolist():
         finger, joint = divmod(int(needed[i].argmax()), len(PHALANGES))
+        # no less than is needed, in hundredths
+        least = math.ceil(100.0 * needed[i, finger, joint]) / 100.0
         yield (
             i,
             InvalidInputError(
-                f"must be at least {needed[i, finger, joint]:.3g} N, at which the "
-                f"{PHALANGES[joint]} joint of {FINGERS[finger]} has closed on this hold, "
+                f"must be at least {least:g} N, at which the {PHALANGES[joint]} joint of "
+                f"{FINGERS[finger]} has closed on this hold, "
                 f"got {tensions[i]:g}",
                 field="grasp.closing_tension",
             ),

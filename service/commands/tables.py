@@ -152,7 +152,7 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
     if with_pure:
         out.print("pure: with every other component zero; -: none")
     ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
-    if any(end is None or end < 0.0 for end in ends):
+    if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 
