@@ -63,6 +63,8 @@ class HandModel:
         self.tendon_loads = TendonLoads(self.finger)
         # a tile on a finger's base only shifts the others on a tendon that rubs
         self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]
+        # the diagonal of M (Eq. 8) of each finger, whose first tile an outer one's base has
+        self.losses = np.array([self.finger.losses(name.startswith("outer")) for name in FINGERS])
         self.mass = table.scalar("hand", "mass")
         self.maximum_tension = table.positive("tendon", "maximum_tension")
         self.closing_tension = table.positive("tendon", "closing_tension")

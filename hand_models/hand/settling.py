@@ -140,9 +140,8 @@ def _too_slack(
     angles = np.array([posture.angles for posture in postures])
     closes = np.array([posture.stops for posture in postures]) == FREE
     closes &= (np.array([posture.kinds for posture in postures]) != NONE).any(axis=2)[..., None]
-    losses = np.array([hand.finger.losses(name.startswith("outer")) for name in FINGERS])
     turns = np.diff(angles, axis=2, prepend=0.0)
-    needed = np.where(closes, resting_tensions(hand.finger, turns, losses), 0.0)
+    needed = np.where(closes, resting_tensions(hand.finger, turns, hand.losses), 0.0)
     short = needed.reshape(len(needed), -1).max(axis=1) > tensions
     for i in short.nonzero()[0].tolist():
         finger, joint = divmod(int(needed[i].argmax()), len(PHALANGES))

@@ -99,9 +99,8 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
         stages = [
             ClosingStage(NAIL, nail.preload / nail.pulley_radius, turned / nail.pulley_radius)
         ]
-        losses = finger.losses(name.startswith("outer"))
         starts, ends = (
-            resting_tensions(model, turns, losses).tolist()
+            resting_tensions(model, turns, hand.losses[i]).tolist()
             for turns in (np.zeros(len(PHALANGES)), finger.joint_angles)
         )
         for phalanx, start, end in zip(PHALANGES, starts, ends, strict=True):
