@@ -113,15 +113,15 @@ class CompliantHand:
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
         self.palm_shear_stiffness = self.palm_pressing_stiffness = 0.0
-        if settled.palm.engaged:
+        for share, tiles in settled.palm.layers:
             sharing = share_load(
-                tuple(hand.palm_contact[i] for i in settled.palm.engaged),
+                tuple(hand.palm_contact[i] for i in tiles),
                 hand.palm_spring,
                 hand.palm_friction,
                 hand.palm_own_friction,
             )
-            self.palm_shear_stiffness = float(sharing.tile_stiffness.sum())
-            self.palm_pressing_stiffness = hand.palm_pressing_stiffness * len(settled.palm.engaged)
+            self.palm_shear_stiffness += share * float(sharing.tile_stiffness.sum())
+            self.palm_pressing_stiffness += share * hand.palm_pressing_stiffness * len(tiles)
 
     def _finger(self, i: int, name: str, scheme: MotorScheme) -> CompliantFinger:
         settled, hand = self.settled, self.settled.hand

@@ -147,19 +147,11 @@ class HandModel:
             self._frames[outer_rotations] = found
         return found
 
-    def _palm_share(
-        self, engaged: tuple[int, ...], tile_limit: float
-    ) -> tuple[float, float, float]:
-        """Return x and y of the centre of palm tiles [m], and what shear they share [N].
-
-        Zeros for no tiles. ``tile_limit`` is what one holds [N].
-        """
-        if not engaged:
-            return 0.0, 0.0, 0.0
-        x, y, _ = self.palm_tiles[list(engaged)].mean(axis=0).tolist()
+    def _palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
+        """Return what shear palm tiles share of which one holds ``tile_limit`` [N]."""
         stiffness = tuple([self.palm_contact[i] for i in engaged])
         friction = self.palm_friction, tile_limit, self.palm_own_friction
-        return x, y, shear_capacity(stiffness, self.palm_spring, *friction)
+        return shear_capacity(stiffness, self.palm_spring, *friction)
 
     def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
         """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import STOPS, Contact, FingerModel, SettledFinger
@@ -19,7 +20,7 @@ from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
+__all__ = ["HandPostures", "Palm", "SettledHand", "Tile", "engagements"]
 
 
 class HandPostures(NamedTuple):
@@ -83,8 +84,11 @@ class Palm(NamedTuple):
         From each tile to the rock along z, infinite where there is none [m].
     engaged : tuple of int
         Tiles with rock within the spines' travel.
+    engagement : tuple of float
+        Share of the spines of each of these that reach the rock (`engagements`).
     centre : ndarray, shape (3,)
-        Of the engaged tiles, where shear and pressing act [m]; the origin if none are engaged.
+        Of the engaged tiles, each by its share, where shear and pressing act [m]; the origin if
+        none are engaged.
     shear_limit : float
         Along −x of H on the rock, by load sharing [N].
     pressing_limit : float
@@ -93,9 +97,35 @@ class Palm(NamedTuple):
 
     gaps: Array
     engaged: tuple[int, ...]
+    engagement: tuple[float, ...]
     centre: Array
     shear_limit: float
     pressing_limit: float
+
+    @property
+    def layers(self) -> list[tuple[float, tuple[int, ...]]]:
+        """Return the palm as sets of whole tiles, one in another, each with its weight.
+
+        What whole tiles share among them becomes that of tiles engaged in part as the mean over
+        these sets (the Choquet integral over the shares): the same where all shares are one, and
+        without a jump where one of them becomes zero.
+        """
+        order = sorted(zip(self.engagement, self.engaged, strict=True), key=lambda each: -each[0])
+        shares = [share for share, _ in order] + [0.0]
+        return [
+            (share - later, tuple(sorted(tile for _, tile in order[: i + 1])))
+            for i, (share, later) in enumerate(itertools.pairwise(shares))
+            if share > later
+        ]
+
+
+def engagements(gaps: ArrayLike, travel: float) -> Array:
+    """Return what share of a tile's spines reach rock across a gap, φ = 1 − gap / travel in [0, 1].
+
+    Spines slide out of their tile by up to their travel [m]; the farther they have to, the fewer
+    find an asperity that is near enough. All do where the tile itself is on the rock.
+    """
+    return np.clip(1.0 - np.asarray(gaps, dtype=float) / travel, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from hand_models.hand.finger_frames import (
 from hand_models.hand.hooked_nails import Nails
 from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import Palm, Tile
+from hand_models.hand.settled_hand import Palm, Tile, engagements
 
 __all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
 
@@ -152,21 +152,27 @@ def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
 
 def palms_on_rock(placed: PlacedHands) -> list[Palm]:
     """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
-    hand, travel = placed.hand, placed.hand.spine_travel
+    hand = placed.hand
     gaps = np.array(placed.gaps)[:, BASES:]
+    shares = engagements(gaps, hand.spine_travel)
     gaps.setflags(write=False)
-    engaged, centres, limits = [], [], []
-    for placement, depths in zip(placed.placements, placed.gaps, strict=True):
-        near = [i for i, depth in enumerate(depths[BASES:]) if depth <= travel]
-        tiles = tuple(near) if placement.grasp.palm else ()
-        x, y, shear = hand.palm_share(tiles, placement.surface.shear_limit)
-        depth = sum([depths[BASES + i] for i in tiles]) / max(len(tiles), 1)
-        engaged.append(tiles)
-        centres.append((x, y, depth))
-        limits.append((shear, hand.palm_pressing * len(tiles)))
-    places = np.array(centres)
-    places.setflags(write=False)
-    return [
-        Palm(own, tiles, centre, *most)
-        for own, tiles, centre, most in zip(gaps, engaged, places, limits, strict=True)
-    ]
+    places = np.zeros((len(gaps), 3))
+    palms = []
+    for placement, own, share, centre in zip(
+        placed.placements, gaps, shares.tolist(), places, strict=True
+    ):
+        engaged = tuple([i for i, part in enumerate(share) if part > 0.0])
+        if not placement.grasp.palm:
+            engaged = ()
+        parts = tuple([share[i] for i in engaged])
+        palm = Palm(own, engaged, parts, centre, 0.0, 0.0)
+        if engaged:
+            weights = np.array(parts) / sum(parts)
+            centre[:2] = weights @ hand.palm_tiles[list(engaged), :2]
+            centre[2] = weights @ own[list(engaged)]
+            most = placement.surface.shear_limit
+            shear = sum([part * hand.palm_share(tiles, most) for part, tiles in palm.layers])
+            palm = palm._replace(shear_limit=shear, pressing_limit=hand.palm_pressing * sum(parts))
+        centre.setflags(write=False)
+        palms.append(palm)
+    return palms

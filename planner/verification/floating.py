@@ -309,16 +309,19 @@ def check_palm(
     """Return what is wrong with the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return []
-    body, engaged = hand.hand, hand.palm.engaged
-    sharing = share_load(
-        tuple(body.palm_contact[i] for i in engaged),
-        body.palm_spring,
-        body.palm_friction,
-        body.palm_own_friction,
-    )
+    body, stiffness, whole = hand.hand, 0.0, 0.0
+    for share, engaged in hand.palm.layers:
+        sharing = share_load(
+            tuple(body.palm_contact[i] for i in engaged),
+            body.palm_spring,
+            body.palm_friction,
+            body.palm_own_friction,
+        )
+        stiffness += share * float(sharing.tile_stiffness.sum())
+        whole += share * len(engaged)
     step = moved(hand.palm.centre, wrist)
-    shear = max(-float(sharing.tile_stiffness.sum()) * step[0], 0.0)
-    pressing = max(body.palm_pressing_stiffness * len(engaged) * step[2], 0.0)
+    shear = max(-stiffness * step[0], 0.0)
+    pressing = max(body.palm_pressing_stiffness * whole * step[2], 0.0)
     off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
     if off <= allowed:
         return []

@@ -145,11 +145,15 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
     assert row == len(settled.tiles)
     gaps = [hold.entry(inverse.apply(tile), into) for tile in hand.palm_tiles]
     np.testing.assert_allclose(settled.palm.gaps, gaps, atol=1e-11)
-    engaged = [i for i, gap in enumerate(gaps) if gap <= hand.spine_travel and grasp.palm]
+    engaged = [i for i, gap in enumerate(gaps) if gap < hand.spine_travel and grasp.palm]
     assert settled.palm.engaged == tuple(engaged)
     if engaged:
         places = hand.palm_tiles[engaged] + np.array(gaps)[engaged, None] * UP
-        np.testing.assert_allclose(settled.palm.centre, places.mean(axis=0), atol=1e-11)
+        shares = [min(1.0 - gaps[i] / hand.spine_travel, 1.0) for i in engaged]
+        np.testing.assert_allclose(settled.palm.engagement, shares, atol=1e-8)
+        np.testing.assert_allclose(
+            settled.palm.centre, np.average(places, axis=0, weights=shares), atol=1e-9
+        )
 
 
 @settings(max_examples=35, deadline=None)

@@ -130,10 +130,28 @@ def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
     gaps = 2.3 + 150.0 - np.sqrt(150.0**2 - beside**2)
     np.testing.assert_allclose(1e3 * palm.gaps, np.repeat(gaps, 2), atol=0.1)
     assert palm.engaged == (4, 5, 6, 7)
-    np.testing.assert_allclose(palm.centre[:2], [(0.01365 + 0.04075) / 2, 0.0], atol=1e-12)
-    assert palm.centre[2] == pytest.approx(palm.gaps[4:].mean())
-    assert palm.pressing_limit == 4 * 250.0
-    assert palm.shear_limit == pytest.approx(4 * 63.0)  # alike tiles share alike
+    # of 5 mm of travel, what each tile's gap leaves
+    share = 1.0 - palm.gaps[4:] / 0.005
+    np.testing.assert_allclose(palm.engagement, share, rtol=1e-12)
+    np.testing.assert_allclose(share[::2], 1.0 - gaps[2:] / 5.0, atol=0.02)
+    x = share @ [0.01365, 0.01365, 0.04075, 0.04075] / share.sum()
+    np.testing.assert_allclose(palm.centre[:2], [x, 0.0], atol=1e-12)
+    assert palm.centre[2] == pytest.approx(share @ palm.gaps[4:] / share.sum())
+    assert palm.pressing_limit == pytest.approx(250.0 * share.sum())
+    assert palm.shear_limit == pytest.approx(63.0 * share.sum())  # alike tiles share alike
+
+
+def test_what_a_palm_carries_fades_with_its_distance_from_the_rock():
+    grasp, found = Grasp(outer_rotation=0.0), []
+    for gap in np.linspace(0.0, 5.01e-3, 502):
+        pose = Pose(np.array([0.0, 0.0, gap]), np.eye(3))
+        palm = HAND.settle(Plane(), ROCK, grasp, pose).palm
+        found.append((palm.shear_limit, palm.pressing_limit))
+    found = np.array(found)
+    np.testing.assert_allclose(found[0], [8 * 63.0, 8 * 250.0], rtol=0.03)
+    np.testing.assert_array_equal(found[-1], 0.0)
+    # by a hundredth of a millimetre at a time, no more than a five-hundredth of it all
+    assert (np.abs(np.diff(found, axis=0)) <= 0.0021 * found[0]).all()
 
 
 def test_a_grasp_without_palm_has_none():
