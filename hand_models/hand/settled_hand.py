@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import STOPS, Contact, FingerModel, SettledFinger
@@ -20,7 +20,7 @@ from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["HandPostures", "Palm", "SettledHand", "Tile", "engagements"]
+__all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
 
 
 class HandPostures(NamedTuple):
@@ -85,7 +85,7 @@ class Palm(NamedTuple):
     engaged : tuple of int
         Tiles with rock within the spines' travel.
     engagement : tuple of float
-        Share of the spines of each of these that reach the rock (`engagements`).
+        Share φ of the spines of each of these that are on the rock (`engaged_share`).
     centre : ndarray, shape (3,)
         Of the engaged tiles, each by its share, where shear and pressing act [m]; the origin if
         none are engaged.
@@ -117,15 +117,6 @@ class Palm(NamedTuple):
             for i, (share, later) in enumerate(itertools.pairwise(shares))
             if share > later
         ]
-
-
-def engagements(gaps: ArrayLike, travel: float) -> Array:
-    """Return what share of a tile's spines reach rock across a gap, φ = 1 − gap / travel in [0, 1].
-
-    Spines slide out of their tile by up to their travel [m]; the farther they have to, the fewer
-    find an asperity that is near enough. All do where the tile itself is on the rock.
-    """
-    return np.clip(1.0 - np.asarray(gaps, dtype=float) / travel, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,8 @@ from hand_models.hand.finger_frames import (
 from hand_models.hand.hooked_nails import Nails
 from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import Palm, Tile, engagements
+from hand_models.hand.settled_hand import Palm, Tile
+from hand_models.tile import engaged_share
 
 __all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
 
@@ -154,7 +155,7 @@ def palms_on_rock(placed: PlacedHands) -> list[Palm]:
     """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, BASES:]
-    shares = engagements(gaps, hand.spine_travel)
+    shares = engaged_share(gaps, hand.spine_travel)
     gaps.setflags(write=False)
     places = np.zeros((len(gaps), 3))
     palms = []

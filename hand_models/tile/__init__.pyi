@@ -1,3 +1,4 @@
+from .engagement import engaged_share as engaged_share
 from .half_planes import (
     HalfPlane as HalfPlane,
     bounds_gap as bounds_gap,
