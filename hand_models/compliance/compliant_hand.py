@@ -7,10 +7,10 @@ finger (Section 5.3: linear elasticity),
 
     Y = (F + diag(1 / k))⁻¹ y,    F_ij = ℓ_i² (3 ℓ_j − ℓ_i) / (6 EI) + h_i h_j ℓ_i / GJ,  ℓ_i ≤ ℓ_j,
 
-with y the displacement of each tile across the finger's plane, ℓ its distance along the finger from
-the joint and h its distance from the finger's axis. The engaged palm tiles drag the rock as their
-tendon shares the load when the palm moves toward −x, and press on it when it moves into it; they
-neither push nor pull.
+with y the displacement of each tile across the finger's plane, k the stiffness of its spines on the
+rock, ℓ its distance along the finger from the joint and h its distance from the finger's axis. The
+engaged palm tiles drag the rock as their tendon shares the load when the palm moves toward −x, and
+press on it when it moves into it; they neither push nor pull.
 
 Forces and places are in H *at rest*: the tiles are anchored in the rock, and it is the rock's side
 that stays.
@@ -130,13 +130,11 @@ class CompliantHand:
         tension = float(self.preload[i])
         tendon = FingerTendon.from_table(hand.table, base_tile)
         shears = settled.loads[own, 0] @ np.array([1.0, tension])
-        stiffness = np.where(settled.touching[own], np.array(tendon.contact_stiffness), 0.0)
         return CompliantFinger(
             settled.fingers[i],
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),
             replace(
-                tendon,
-                contact_stiffness=tuple(stiffness.tolist()),
+                tendon.engaged(settled.engagement[own]),
                 friction=max(tendon.friction, hand.tendon_friction),
             ),
             tendon.closed(tension, shears),
@@ -147,18 +145,16 @@ class CompliantHand:
         """Return the stiffness of a finger's tiles across its plane, shape (n_i, n_i) [N/m]."""
         settled, hand = self.settled, self.settled.hand
         own = self._own[i]
-        stiffness = np.zeros((len(own), len(own)))
-        those = np.flatnonzero(settled.touching[own])
-        if not (settled.grasp.lateral and len(those)):
-            return stiffness
-        arms = settled.positions[own[those]] - self.frames[i].joint
+        if not settled.grasp.lateral:
+            return np.zeros((len(own), len(own)))
+        arms = settled.positions[own] - self.frames[i].joint
         out = np.maximum(arms @ self.frames[i].along, 0.0)
         shorter, longer = np.minimum(out[:, None], out), np.maximum(out[:, None], out)
         flexibility = shorter**2 * (3.0 * longer - shorter) / (6.0 * hand.bending_stiffness)
         flexibility += np.outer(arms[:, 2], arms[:, 2]) * shorter / hand.torsional_stiffness
-        flexibility += np.eye(len(those)) / hand.lateral_stiffness
-        stiffness[np.ix_(those, those)] = np.linalg.inv(flexibility)
-        return stiffness
+        # as (F + 1/K)⁻¹, also where tiles have no spines on the rock
+        springs = np.diag(settled.engagement[own] * hand.lateral_stiffness)
+        return np.asarray(np.linalg.solve(np.eye(len(own)) + springs @ flexibility, springs))
 
     def loads(self, twists: Numbers) -> HandLoads:
         """Return every load at some twists of the wrist, shape (m, 6) [m, rad]."""

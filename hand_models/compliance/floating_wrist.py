@@ -76,8 +76,11 @@ class FloatingWrist:
 
     @cached_property
     def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
-        """Of `RowLayout.planes`."""
-        return self.layout.planes(inner_half_planes(self.hand.settled.surface))
+        """Of `RowLayout.planes`, capacities of each tile's spines on the rock."""
+        settled = self.hand.settled
+        tile, *slopes, capacity = self.layout.planes(inner_half_planes(settled.surface))
+        a_shear, a_normal, a_lateral = slopes
+        return tile, a_shear, a_normal, a_lateral, capacity * settled.engagement[tile]
 
     @property
     def limits(self) -> tuple[Row, ...]:

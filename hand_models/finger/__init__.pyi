@@ -15,6 +15,7 @@ from .model import (
 )
 from .postures import FREE as FREE, STOPS as STOPS
 from .sequential_closure import (
+    EDGE as EDGE,
     FACE as FACE,
     KINDS as KINDS,
     NONE as NONE,

@@ -4,11 +4,12 @@ What `hand_models.fixed_wrist.row_entries` says of one hand, put together for ha
 another: the sources of all of them are one array, block by block, and all numbers of all sets are
 one lookup. The blocks are, h hands having n tiles and f fingers and p planes together,
 
-- the constants: `hand_sources` and `surface_sources` of each hand;
+- the constants: `hand_sources` of each hand;
 - `GIVEN` numbers of each hand: its largest tension, its closing tension with the sign changed, the
   palm's limits, and −z, y, −x of its centre;
 - the tiles' loads, (n, 2, 2), and the same with their signs changed;
-- loads of the half-planes, (p, 2);
+- loads of the half-planes at zero tension and per newton, (p, 2);
+- what they take of lateral reactions, with either sign, and their capacities, (p, 3);
 - sums over the tiles of each finger: wrenches at zero tension, per newton of tension and of lateral
   reaction, (`WRENCH_PARTS`, 3, f), and shears, (f, 2);
 - whole hands' wrenches at zero tension, (`WRENCH_PARTS`, h);
@@ -31,7 +32,7 @@ from hand_models.fixed_wrist.row_entries import (
     RowEntries,
     entries_of,
     hand_sources,
-    surface_sources,
+    surface_planes,
 )
 from hand_models.fixed_wrist.row_layout import RowLayout
 from hand_models.hand import FINGERS, HandModel
@@ -58,12 +59,12 @@ class BatchEntries:
     starts : ndarray of int, shape (f,)
         First tile of each finger.
     ones : ndarray, shape (n, 1)
-    sideways : ndarray, shape (n, 3, 3)
-        Zeros, but last the part of its finger's lateral reaction that each tile carries.
     plane_tiles : ndarray of int, shape (p,)
         Whose planes the half-planes are.
     planes : ndarray, shape (p, 4)
         Their coefficients of shear and of normal load, each at zero tension and per newton.
+    limits : ndarray, shape (p, 3)
+        Their coefficients of lateral load with either sign, and capacities of whole tiles [N].
     """
 
     constants: Array
@@ -71,9 +72,9 @@ class BatchEntries:
     ends: tuple[tuple[int, ...], ...]
     starts: Indices
     ones: Array
-    sideways: Array
     plane_tiles: Indices
     planes: Array
+    limits: Array
 
 
 @lru_cache(maxsize=KEPT)
@@ -84,13 +85,15 @@ def entries_of_batch(
 ) -> BatchEntries:
     """Return where the numbers of hands come from, with these row layouts, on these surfaces."""
     entries = [entries_of(layout) for layout in layouts]
-    given = [surface_sources(surface) for surface in surfaces]
-    constants = [
-        np.concatenate([hand_sources(model), surface.sources])
-        for model, surface in zip(models, given, strict=True)
+    constants = [hand_sources(model) for model in models]
+    counts = [len(layout.finger_of) for layout in layouts]
+    # of each half-plane of each tile
+    given = [
+        surface_planes(surface).repeat(count, axis=0)
+        for surface, count in zip(surfaces, counts, strict=True)
     ]
-    tiles = _starts([len(each.shares) for each in entries])
-    planes = _starts([len(e.shares) * len(s.planar) for e, s in zip(entries, given, strict=True)])
+    coefficients = np.concatenate(given)
+    tiles, planes = _starts(counts), _starts([len(own) for own in given])
     places = _places(entries, [len(each) for each in constants], tiles, planes)
     lengths = [len(each.index) for each in entries]
     made = BatchEntries(
@@ -109,21 +112,14 @@ def entries_of_batch(
             ]
         ),
         ones=np.ones((tiles[-1], 1)),
-        sideways=np.concatenate(
-            [np.multiply.outer(each.shares, np.diag([0.0, 0.0, 1.0])) for each in entries]
-        ),
         plane_tiles=np.concatenate(
             [
-                np.tile(np.arange(start, end), len(surface.planar))
-                for (start, end), surface in zip(itertools.pairwise(tiles), given, strict=True)
+                np.tile(np.arange(start, end), len(own) // (end - start))
+                for (start, end), own in zip(itertools.pairwise(tiles), given, strict=True)
             ]
         ),
-        planes=np.concatenate(
-            [
-                surface.planar.repeat(len(each.shares), axis=0).repeat(2, axis=1)
-                for surface, each in zip(given, entries, strict=True)
-            ]
-        ),
+        planes=coefficients[:, :2].repeat(2, axis=1),
+        limits=coefficients[:, 2:].repeat((2, 1), axis=1) * (1.0, -1.0, 1.0),
     )
     for array in vars(made).values():
         if isinstance(array, np.ndarray):
@@ -151,14 +147,15 @@ def _places(
     """
     hands, fingers = len(entries), len(FINGERS)
     n_tiles, n_planes, n_sums = tiles[-1], planes[-1], hands * fingers
-    blocks = [sum(constants), GIVEN * hands, 4 * n_tiles, 4 * n_tiles, 2 * n_planes]
+    blocks = [sum(constants), GIVEN * hands, 4 * n_tiles, 4 * n_tiles]
+    blocks += [2 * n_planes, 3 * n_planes]
     blocks += [3 * WRENCH_PARTS * n_sums, 2 * n_sums, WRENCH_PARTS * hands]
     *begin, further = _starts(blocks)
     first = begin[0]
     part, own = np.arange(WRENCH_PARTS), np.arange(fingers)
     places = []
     for i, each in enumerate(entries):
-        n, finger = len(each.shares), fingers * i + own
+        n, finger = tiles[i + 1] - tiles[i], fingers * i + own
         plane = np.arange(planes[i], planes[i + 1]).reshape(-1, 1, n)
         kind = np.array([1, 2]).reshape(2, 1, 1)
         mine = [
@@ -166,10 +163,16 @@ def _places(
             begin[1] + GIVEN * i + np.arange(GIVEN),
             begin[2] + 4 * tiles[i] + np.arange(4 * n),
             begin[3] + 4 * tiles[i] + np.arange(4 * n),
-            begin[4] + 2 * plane + np.arange(2).reshape(1, 2, 1),
-            begin[5] + (3 * part[:, None] + kind) * n_sums + finger,
-            begin[6] + 2 * finger + np.arange(2)[:, None],
-            begin[7] + hands * part + i,
+            np.concatenate(
+                [
+                    begin[4 + k] + size * plane + np.arange(size).reshape(1, size, 1)
+                    for k, size in enumerate((2, 3))
+                ],
+                axis=1,
+            ),
+            begin[6] + (3 * part[:, None] + kind) * n_sums + finger,
+            begin[7] + 2 * finger + np.arange(2)[:, None],
+            begin[8] + hands * part + i,
         ]
         left = each.sources - sum(block.size for block in mine)
         mine.append(further + np.arange(left))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,10 +26,9 @@ __all__ = [
     "NAIL_ROWS",
     "WRENCH_PARTS",
     "RowEntries",
-    "SurfaceSources",
     "entries_of",
     "hand_sources",
-    "surface_sources",
+    "surface_planes",
 ]
 
 WRENCH_PARTS: Final = 6 + len(HELD)
@@ -41,39 +40,15 @@ GIVEN: Final = 7
 NAIL_ROWS: Final = 3 + len(PHALANGES)
 """Hard rows of a nail that hooks."""
 
-TILES: Final = max(4, len(PHALANGES) + 1)
-"""Most tiles of a finger."""
-
-
-class SurfaceSources(NamedTuple):
-    """What a surface gives the rows of the tiles on it.
-
-    Attributes
-    ----------
-    names : tuple of str, length p
-        Of its half-planes.
-    planar : ndarray, shape (p, 2)
-        Their coefficients of shear and normal load.
-    sources : ndarray, shape (p + 2 TILES p,)
-        Their capacities [N], and coefficients of a finger's lateral reaction: with either sign,
-        shared by 1 to `TILES` tiles, of each half-plane.
-    """
-
-    names: tuple[str, ...]
-    planar: Array
-    sources: Array
-
 
 @lru_cache(maxsize=256)
-def surface_sources(surface: Surface) -> SurfaceSources:
-    """Return what a surface gives the rows of the tiles on it."""
-    pieces = inner_half_planes(surface)
-    lateral = np.array([piece.a_lateral for piece in pieces])
-    shared = lateral / np.arange(1, TILES + 1)[:, None]
-    return SurfaceSources(
-        tuple(piece.limit for piece in pieces),
-        np.array([(piece.a_shear, piece.a_normal) for piece in pieces]),
-        np.concatenate([[piece.capacity for piece in pieces], shared.ravel(), -shared.ravel()]),
+def surface_planes(surface: Surface) -> Array:
+    """Return the half-planes of whole tiles on a surface, shape (p, 4).
+
+    Coefficients of shear, normal and lateral load, and capacity [N].
+    """
+    return np.array(
+        [(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in inner_half_planes(surface)]
     )
 
 
@@ -103,12 +78,13 @@ def _hand_sources(hand: HandModel) -> Array:
 class RowEntries:
     """Which source each number of a set is.
 
-    The sources are, in order, `hand_sources`; `surface_sources`; and of the hand on its hold
+    The sources are, in order, `hand_sources`, and of the hand on its hold
 
     - the largest tension, the closing tension with its sign changed, the palm's limits of shear and
       of pressing, and −z, y, −x of its centre;
     - the tiles' loads, (n, 2, 2), and the same with their signs changed;
-    - loads of the half-planes, (p, 2, n): at zero tension and per newton, of each tile;
+    - of the half-planes of each tile, (p, 5, n): their loads at zero tension, per newton of it, and
+      per newton of the finger's lateral reaction with either sign; their capacities;
     - sums over each finger's tiles, (2 `WRENCH_PARTS` + 2, fingers): the wrench per newton of
       tension and of lateral reaction, and the shear at zero tension and per newton of it;
     - the whole hand's wrench at zero tension, (`WRENCH_PARTS`,);
@@ -122,15 +98,12 @@ class RowEntries:
         Of the sources that are o (6,), V (6, m), L (nl, m), l0, s (nl,), H (nh, m) and h (nh,).
     ends : tuple of int
         Where each of these ends but the last.
-    shares : ndarray, shape (n,)
-        Part of its finger's lateral reaction that each tile carries.
     sources : int
         How many there are.
     """
 
     index: Indices
     ends: tuple[int, ...]
-    shares: Array
     sources: int
 
 
@@ -155,10 +128,9 @@ def entries_of(layout: RowLayout) -> RowEntries:
     zero, one, minus, torque, current, idle_current, most_torque, most_current = new(8)
     finger_shear, fingertip_force, hand_load = new(3)
     held_drag, held_press = new(2, len(HELD))
-    capacity, lateral = new(p), new(2, TILES, p)
     most, closing, palm_shear, palm_pressing, below, aside, behind = new(GIVEN)
     loads, opposite = new(n, 2, 2), new(n, 2, 2)
-    planes = new(p, 2, n)
+    planes = new(p, 5, n)
     per_newton, sideways = new(2, WRENCH_PARTS, len(FINGERS))
     shears = new(2, len(FINGERS))
     whole = new(WRENCH_PARTS)
@@ -187,12 +159,12 @@ def entries_of(layout: RowLayout) -> RowEntries:
     k = len(tile)
     row = np.arange(k)
     L[row, finger_of[tile]], l0[:k] = planes[piece, 1, tile], planes[piece, 0, tile]
-    s[:k] = capacity[piece]
+    s[:k] = planes[piece, 4, tile]
     if layout.lateral_columns:
         column_of = np.zeros(len(FINGERS), dtype=np.intp)
         column_of[reacting] = lateral_columns
         backwards = (layout.plane_signs < 0).astype(np.intp)
-        L[row, column_of[finger_of[tile]]] = lateral[backwards, layout.shared_by[tile] - 1, piece]
+        L[row, column_of[finger_of[tile]]] = planes[piece, 2 + backwards, tile]
     for slope, start, end in (
         (one, zero, most),
         (torque, zero, most_torque),
@@ -246,9 +218,7 @@ def entries_of(layout: RowLayout) -> RowEntries:
     entries = RowEntries(
         index=np.concatenate(parts),
         ends=tuple(np.cumsum([len(part) for part in parts[:-1]]).tolist()),
-        shares=np.where(layout.shared_by > 0, 1.0 / np.maximum(layout.shared_by, 1), 0.0),
         sources=numbering.count,
     )
-    for array in (entries.index, entries.shares):
-        array.setflags(write=False)
+    entries.index.setflags(write=False)
     return entries

@@ -54,8 +54,6 @@ class RowLayout:
         Both.
     finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
-    shared_by : ndarray of int, shape (n,)
-        How many tiles carry a finger's lateral reaction, each alike; 0 for one that does not.
     touching, frames, tips, nails : ndarray of int
         Tiles on rock; tiles whose phalanx rests beside them; distal tiles whose phalanx presses on
         rock; nails that hook.
@@ -82,7 +80,6 @@ class RowLayout:
     hard: tuple[Row, ...]
     rows: tuple[Row, ...]
     finger_of: Indices
-    shared_by: Indices
     touching: Indices
     frames: Indices
     tips: Indices
@@ -109,7 +106,7 @@ class RowLayout:
         a_shear, a_normal, a_lateral : ndarray
             Its coefficients, the last with its sign.
         capacity : ndarray
-            [N]
+            Of a whole tile [N].
         """
         table = np.array([(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in pieces])
         shear, normal, lateral, capacity = table[self.plane_pieces].T
@@ -224,9 +221,6 @@ def row_layout(
     limits += [
         Row(None, None, HAND_LOAD, "limit", f"{HAND_LOAD}/{k + 1}") for k in range(len(HELD))
     ]
-    shared_by = [
-        holding.count(finger) if i in touching else 0 for i, finger in enumerate(finger_of)
-    ]
     plane_tiles, plane_pieces, plane_signs = np.array(planes, dtype=np.intp).reshape(-1, 3).T
     return RowLayout(
         columns=tuple(columns),
@@ -234,7 +228,6 @@ def row_layout(
         hard=tuple(hard),
         rows=(*limits, *hard),
         finger_of=_kept(finger_of),
-        shared_by=_kept(shared_by),
         touching=_kept(touching),
         frames=_kept(frames),
         tips=_kept(tips),

@@ -125,7 +125,8 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
         tuple([hand.surface for hand in hands]),
     )
     loads = np.concatenate([hand.loads for hand in hands])
-    wrenches, shears = _sums(hands, loads, entries)
+    shares = np.concatenate([hand.lateral_shares for hand in hands])
+    wrenches, shears = _sums(hands, loads, shares, entries)
     at_zero = np.add.reduce(wrenches[:, 0].reshape(-1, len(FINGERS)), axis=1)
     given: list[float] = []
     further: list[Array] = []
@@ -138,9 +139,12 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
     own = loads.ravel()
     planes = entries.planes * loads.reshape(-1, 4).take(entries.plane_tiles, axis=0)
     planar = (planes[:, :2] + planes[:, 2:]).ravel()
+    engagement = np.concatenate([hand.engagement for hand in hands])
+    parts = np.stack([shares, shares, engagement], axis=1)
+    limits = (entries.limits * parts.take(entries.plane_tiles, axis=0)).ravel()
     sources = np.concatenate(
         [
-            *(entries.constants, given, own, -own, planar),
+            *(entries.constants, given, own, -own, planar, limits),
             *(wrenches.ravel(), shears.ravel(), at_zero, *further),
         ]
     )
@@ -153,7 +157,7 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> list[WrenchSpace]:
 
 
 def _sums(
-    settled: Sequence[SettledHand], loads: Array, entries: BatchEntries
+    settled: Sequence[SettledHand], loads: Array, shares: Array, entries: BatchEntries
 ) -> tuple[Array, Array]:
     """Return sums over the tiles of each finger, of hands one after another.
 
@@ -162,7 +166,9 @@ def _sums(
     settled : sequence of SettledHand
     loads : ndarray, shape (n, 2, 2)
         Of all their tiles.
-    entries : ManyEntries
+    shares : ndarray, shape (n,)
+        Of their fingers' lateral reactions.
+    entries : BatchEntries
 
     Returns
     -------
@@ -174,8 +180,9 @@ def _sums(
     axes = np.concatenate([hand.axes for hand in settled])
     places = np.concatenate([hand.positions for hand in settled])
     # F three times, first in the tile's axes, then in H
-    forces = entries.sideways.copy()
+    forces = np.zeros((len(loads), 3, 3))
     forces[:, :2, :2] = loads.transpose(0, 2, 1)
+    forces[:, 2, 2] = shares
     forces = (forces @ axes).reshape(-1, 1, 9)
     arms = np.concatenate([entries.ones, places], axis=1)
     of_tiles = (arms[:, :, None] * forces).reshape(-1, 36)

@@ -107,9 +107,10 @@ def parallelepiped(settled: SettledHand) -> WrenchSpace:
 
 def _tile_tension_limit(settled: SettledHand, t: int) -> float:
     """Return the tension at which one tile's load reaches its limit curve [N]."""
+    of_whole = settled.loads[t] / settled.engagement[t]
 
     def excess(f: Array) -> Array:
-        load = settled.loads[t, :, 0, None] + settled.loads[t, :, 1, None] * f
+        load = of_whole[:, 0, None] + of_whole[:, 1, None] * f
         angle = np.arctan2(-load[1], load[0])
         strength = settled.surface.strength(np.clip(angle, -np.pi / 2, np.pi / 2))
         return np.asarray(np.hypot(load[0], load[1]) - strength)
@@ -118,7 +119,7 @@ def _tile_tension_limit(settled: SettledHand, t: int) -> float:
     stop = max(10.0 * settled.hand.maximum_tension, 10.0 * start)
     # tensions at which the load crosses the kinks of the curve, φ = 0 and φ_max: between them what
     # holds is convex, so that a load that leaves between two samples is still out at the second
-    (t0, t1), (n0, n1) = settled.loads[t].tolist()
+    (t0, t1), (n0, n1) = of_whole.tolist()
     turns = (0.0, math.tan(settled.surface.pull_off_angle))
     kinks = [-(n0 + k * t0) / (n1 + k * t1) for k in turns if n1 + k * t1 != 0.0]
     tensions = np.geomspace(start, stop, 400)

@@ -16,6 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.finger import (
+    EDGE,
     FREE,
     KINDS,
     PHALANGES,
@@ -39,13 +40,15 @@ __all__ = ["ClosedFingers", "close_fingers"]
 FingerNumbers = list[float]
 """All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
 
-ANGLE, ALONG, JOINT, LOADS, CODES, PLACES = 0, 1, slice(2, 4), slice(4, 8), slice(8, 10), 10
+ANGLE, ALONG, JOINT, LOADS, ENGAGEMENT = 0, 1, slice(2, 4), slice(4, 8), 8
+CODES, PLACES = slice(9, 11), 11
 """Numbers of a phalanx: its angle [rad], contact and joint [m]; its shear and normal load, each at
-zero tension [N] and per newton; the codes of its contact and its joint's stop; and in the finger's
-plane, each in homogeneous coordinates, its contact and its axes of shear and of normal load."""
+zero tension [N] and per newton; the share of its tile's spines that are on the rock; the codes of
+its contact and its joint's stop; and in the finger's plane, each in homogeneous coordinates, its
+contact and its axes of shear and of normal load."""
 
 TILE: Final = slice(LOADS.start, CODES.stop - 1)
-"""Those that are its tile's as they are: the loads, and the code of the contact."""
+"""Those that are its tile's as they are: the loads, the share, and the code of the contact."""
 
 NUMBERS: Final = PLACES + 9
 
@@ -70,9 +73,9 @@ class ClosedFingers:
     places : ndarray, shape (n, 4, 9, 3)
         In each finger's plane, phalanx by phalanx, where its contact is [m] and its axes of shear
         and of normal load; (x, z, 1) for places, (x, z, 0) for directions.
-    tiles : ndarray, shape (n, 4, 3, 5)
-        Shear and normal load of each phalanx, each at zero tension [N] and per newton, and the code
-        of its contact.
+    tiles : ndarray, shape (n, 4, 3, 6)
+        Shear and normal load of each phalanx, each at zero tension [N] and per newton, the share of
+        its tile's spines that are on the rock, and the code of its contact.
     """
 
     def __init__(
@@ -227,7 +230,8 @@ def _row(
     for (angle, u, joint, along, kind), t, n, stop in zip(phalanges, *loads, stops, strict=True):
         place = joint + complex(along, height) * u
         row += (angle, along, joint.real, joint.imag)
-        row += (t.real, t.imag, n.real, n.imag, kind, stop)
+        # a phalanx either has its tile on the rock, with all spines, or not at all
+        row += (t.real, t.imag, n.real, n.imag, float(kind <= EDGE), kind, stop)
         row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 

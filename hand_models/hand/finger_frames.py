@@ -21,6 +21,7 @@ __all__ = [
     "AXES",
     "BASES",
     "COLUMNS",
+    "ENGAGEMENT",
     "INTO",
     "JOINTS",
     "KIND",
@@ -55,9 +56,11 @@ ALONG: Final = slice(JOINTS.stop, -1)
 INTO: Final = -1
 """The one that is the direction z of H, into the rock."""
 
-POSITION, AXES, SHEAR, NORMAL, KIND = slice(0, 3), slice(3, 12), slice(12, 14), slice(14, 16), 16
+POSITION, AXES, SHEAR, NORMAL = slice(0, 3), slice(3, 12), slice(12, 14), slice(14, 16)
+ENGAGEMENT, KIND = 16, 17
 """Numbers of a tile: where it is [m], its axes row by row, its loads at zero tension [N] and per
-newton, and the code of its contact; as of `SettledHand`."""
+newton, the share of its spines that are on the rock, and the code of its contact; as of
+`SettledHand`."""
 
 COLUMNS: Final = KIND + 1
 

@@ -146,6 +146,11 @@ class SettledHand:
     loads : ndarray, shape (n, 2, 2)
         Shear and normal load, each at zero tension [N] and per newton of tension. A nail's normal
         load is P across it; its shear A, along it, is passive.
+    engagement : ndarray, shape (n,)
+        Share φ of each tile's spines that are on the rock (`engaged_share`): above 0, at most 1,
+        where its contact is ``face`` or ``edge``, 0 of all others and of nails. A tile has φ times
+        the shear that its tendon would give the whole of it, holds φ times as much, and carries
+        its finger's lateral reaction in proportion to φ.
     nail_angles : ndarray, shape (4,)
         How far each finger's nail has turned; all the way where it does not hook [rad].
     nail_normals : ndarray, shape (4, 3)
@@ -171,6 +176,7 @@ class SettledHand:
     positions: Array
     axes: Array
     loads: Array
+    engagement: Array
     nail_angles: Array
     nail_normals: Array
     nail_rows: tuple[tuple[Array, Array], ...]
@@ -190,9 +196,10 @@ class SettledHand:
 
     @cached_property
     def lateral_shares(self) -> Array:
-        """Share of its finger's lateral reaction that each tile carries, shape (n,)."""
-        counts = np.bincount(self.finger_of, weights=self.touching, minlength=len(FINGERS))
-        return np.where(self.touching, 1.0 / np.maximum(counts, 1.0)[self.finger_of], 0.0)
+        """Share of its finger's lateral reaction that each tile carries, as its φ, shape (n,)."""
+        sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
+        sums[sums == 0.0] = 1.0
+        return np.asarray(self.engagement / sums[self.finger_of])
 
     @cached_property
     def nails(self) -> Array:

@@ -115,6 +115,7 @@ def _settle(
             positions=of_tiles.positions,
             axes=of_tiles.axes,
             loads=of_tiles.loads,
+            engagement=of_tiles.engagement,
             nail_angles=nails[i].angles,
             nail_normals=nails[i].normals,
             nail_rows=nails[i].rows,

@@ -18,6 +18,7 @@ from hand_models.hand.finger_frames import (
     AXES,
     BASES,
     COLUMNS,
+    ENGAGEMENT,
     KIND,
     NORMAL,
     OUTER,
@@ -71,6 +72,7 @@ class HandTiles(NamedTuple):
     positions: Array
     axes: Array
     loads: Array
+    engagement: Array
 
 
 def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
@@ -98,19 +100,20 @@ def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
 def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     """Return the base tiles, which carry shear where rock is within the spines' travel."""
     model, tiles = placed.hand.finger, placed.frames.base_tiles
-    engaged = [
-        (i, k, depth)
-        for i, (placement, depths) in enumerate(zip(placed.placements, placed.gaps, strict=True))
-        for k, depth in enumerate(depths[:BASES])
-        if abs(depth) <= placed.hand.spine_travel and not placement.grasp.fingernail
-    ]
-    if not engaged:
+    depths = np.array(placed.gaps)[:, :BASES]
+    shares = engaged_share(np.abs(depths), placed.hand.spine_travel)
+    shares[[placement.grasp.fingernail for placement in placed.placements]] = 0.0
+    engaged = shares.nonzero()
+    if not len(engaged[0]):
         return tiles
-    tiles, gain = tiles.copy(), model.shear_gain
-    for i, k, depth in engaged:
-        tiles[i, k, POSITION.stop - 1] += depth
-        tiles[i, k, SHEAR] = (model.base_engagement - gain) * tensions[i], gain
-        tiles[i, k, KIND] = FACE
+    own, gain = tiles[engaged], model.shear_gain
+    own[:, POSITION.stop - 1] += depths[engaged]
+    own[:, SHEAR.start] = (model.base_engagement - gain) * np.array(tensions)[engaged[0]]
+    own[:, SHEAR.stop - 1] = gain
+    own[:, SHEAR] *= shares[engaged][:, None]
+    own[:, ENGAGEMENT], own[:, KIND] = shares[engaged], FACE
+    tiles = tiles.copy()
+    tiles[engaged] = own
     return tiles
 
 
@@ -136,7 +139,9 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
     return [
         HandTiles(_named(codes[i : i + tiles], nails), FINGER_OF[nails], *of_hand)
         for i, *of_hand in zip(
-            range(0, count * tiles, tiles), numbers[..., POSITION], axes, loads, strict=True
+            range(0, count * tiles, tiles),
+            *(numbers[..., POSITION], axes, loads, numbers[..., ENGAGEMENT]),
+            strict=True,
         )
     ]
 

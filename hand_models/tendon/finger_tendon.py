@@ -28,7 +28,7 @@ finger.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -125,6 +125,22 @@ class FingerTendon:
             friction=table.scalar("tendon", "friction"),
             entry_friction=table.scalar("tendon", "entry_friction"),
         )
+
+    def engaged(self, shares: Sequence[float] | Array) -> FingerTendon:
+        """Return the tendon where only some spines of its tiles are on the rock.
+
+        A tile gives φ times the shear of a whole one, for tendon and slip alike: k_i becomes what
+        in series with K_p is φ times as stiff, φ k K_p / (K_p + (1 − φ) k).
+
+        Parameters
+        ----------
+        shares : sequence of float, length n
+            φ of each tile.
+        """
+        k, phi = np.array(self.contact_stiffness), self._of_phalanges("shares", shares)
+        springs = self.spring_stiffness + (1.0 - phi) * k
+        some = phi * k * self.spring_stiffness / np.where(phi < 1.0, springs, 1.0)
+        return replace(self, contact_stiffness=tuple(np.where(phi < 1.0, some, k).tolist()))
 
     def __post_init__(self) -> None:
         _check("pulley_ratio", self.pulley_ratio, 0.0 < self.pulley_ratio < np.inf, "above 0")

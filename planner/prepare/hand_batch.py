@@ -159,8 +159,6 @@ class ContactPattern(NamedTuple):
         Tiles that are not on rock.
     touching, idle : ndarray of int
         Tiles on rock; tiles that touch nothing.
-    shares : ndarray, shape (T,)
-        Share of its finger's lateral reaction that each tile carries.
     holding : tuple of int, length F
         How many tiles and nails of each finger are on rock that they hold.
     """
@@ -171,7 +169,6 @@ class ContactPattern(NamedTuple):
     away: NDArray[np.bool_]
     touching: Indices
     idle: Indices
-    shares: Array
     holding: tuple[int, ...]
 
 
@@ -183,7 +180,6 @@ def contact_pattern_of(key: IdentityKey) -> ContactPattern:
     contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
     away = contacts != TOUCHING
     touches = 1.0 - away
-    grips = np.add.reduceat(touches, places.first_of_finger)
     holds = touches + (contacts == CONTACTS[NAIL])
     touch = ContactPattern(
         contacts=contacts,
@@ -192,7 +188,6 @@ def contact_pattern_of(key: IdentityKey) -> ContactPattern:
         away=away,
         touching=np.flatnonzero(touches),
         idle=np.flatnonzero(contacts == NOTHING),
-        shares=touches / np.maximum(grips, 1.0)[places.finger],
         holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
     )
     for array in touch[:-1]:
@@ -212,6 +207,8 @@ class HandBatch:
     points : ndarray, shape (T + H, 3)
         Where all tiles are, then all palms.
     axes : ndarray, shape (T, 3, 3)
+    engagement, lateral_shares : ndarray, shape (T,)
+        As of `SettledHand`.
     angles : ndarray, shape (F, 3)
         Of each phalanx [rad].
     bends : ndarray, shape (F, 3)
@@ -225,6 +222,8 @@ class HandBatch:
     touch: ContactPattern
     points: Array
     axes: Array
+    engagement: Array
+    lateral_shares: Array
     angles: Array
     bends: Array
     palm_limits: Array
@@ -250,15 +249,19 @@ def batch_of(hands: tuple[SettledHand, ...]) -> HandBatch:
     ]
     points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
     axes = concatenated([hand.axes for hand in hands])
+    engagement = concatenated([hand.engagement for hand in hands])
     # plans show them
     points.setflags(write=False)
     axes.setflags(write=False)
+    engagement.setflags(write=False)
     return HandBatch(
         hands,
         tile_index_of(tuple(map(len, tiles))),
         contact_pattern_of(IdentityKey(*tiles)),
         points,
         axes,
+        engagement,
+        concatenated([hand.lateral_shares for hand in hands]),
         angles,
         bends,
         np.array(limits),

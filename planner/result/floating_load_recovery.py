@@ -39,6 +39,7 @@ def recover_floating_hand(
     capacities = np.array([p.capacity for p in pieces])
     magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
     used = (magnitudes @ planes.T / capacities).max(axis=1)
+    used /= np.where(settled.touching, settled.engagement, np.inf)
     known, drive = batch_of((settled,)), settled.hand.drive
     # the winch stands still from the preload on
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
@@ -64,7 +65,8 @@ def recover_floating_hand(
         forces=forces,
         positions=positions,
         axes=axes,
-        tile_utilisations=np.where(settled.touching, np.maximum(used, 0.0), 0.0),
+        engagement=settled.engagement,
+        tile_utilisations=np.maximum(used, 0.0),
         tiles=settled.tiles,
         half_planes=pieces,
         palm=palm,

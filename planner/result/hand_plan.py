@@ -7,7 +7,7 @@ are views of these, made when they are asked for.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from hand_models.base import Array
@@ -42,6 +42,7 @@ class TileLoad:
     load_per_newton : ndarray, shape (2,), or None
         The same per newton of tension.
     half_planes : tuple of HalfPlane
+        Of the spines that are on the rock; of a tile that is not on rock, those of a whole one.
     """
 
     phalanx: str
@@ -138,11 +139,13 @@ class HandPlan:
         [N], [m]
     axes : ndarray, shape (n, 3, 3)
         Rows: unit forces of shear, normal and lateral load.
+    engagement : ndarray, shape (n,)
+        Share of each tile's spines that are on the rock.
     tile_utilisations : ndarray, shape (n,)
     tiles : tuple of Tile
         Their names and contacts.
     half_planes : tuple of HalfPlane
-        Limits of each tile that is no nail.
+        Limits of each whole tile that is no nail.
     palm : PalmPlan
     utilisation : float
     seating : Seating
@@ -166,6 +169,7 @@ class HandPlan:
     forces: Array
     positions: Array
     axes: Array
+    engagement: Array
     tile_utilisations: Array
     tiles: tuple[Tile, ...]
     half_planes: tuple[HalfPlane, ...]
@@ -199,7 +203,7 @@ class HandPlan:
                     utilisation=used[t],
                     load_at_zero=None if law is None else law[:, 0],
                     load_per_newton=None if law is None else law[:, 1],
-                    half_planes=self.nail_planes.get(t, self.half_planes),
+                    half_planes=self.limits_of(t),
                 )
             )
         numbers = zip(FINGERS, self.tensions.tolist(), *self.drives.tolist(), strict=True)
@@ -207,6 +211,13 @@ class HandPlan:
             FingerPlan(name, tension, torque, current, angle, tuple(tiles[name]))
             for name, tension, torque, current, angle in numbers
         )
+
+    def limits_of(self, tile: int) -> tuple[HalfPlane, ...]:
+        """Return the half-planes of a tile's spines on the rock, or of its nail, by its index."""
+        nail, share = self.nail_planes.get(tile), float(self.engagement[tile])
+        if nail is not None or share in (0.0, 1.0):
+            return self.half_planes if nail is None else nail
+        return tuple(replace(p, capacity=share * p.capacity) for p in self.half_planes)
 
     def tile(self, finger: str | None, phalanx: str | None) -> int:
         """Return the index of a tile among the hand's."""

@@ -83,7 +83,7 @@ class LoadRecovery:
         laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
         self._at_zero[:, :2], self._slope[:, :2] = laws[..., 0], laws[..., 1]
-        self._slope[:, 2] = known.touch.shares
+        self._slope[:, 2] = known.lateral_shares
         if len(layout.hooked):
             self._slope[layout.hooked, 0] = 1.0
         # rows of all hands, each of as many, and as long, as the largest has: wrench, then limits
@@ -148,6 +148,7 @@ class LoadRecovery:
             known.points,
             known.axes,
             np.maximum(tile_used, 0.0),
+            known.engagement,
             np.zeros((len(palms), 3)),
             np.maximum(palm_used[:, 0], palm_used[:, 1]),
             wrenches,
@@ -176,6 +177,7 @@ class LoadRecovery:
                     forces=arrays.forces[own],
                     positions=arrays.points[own],
                     axes=arrays.axes[own],
+                    engagement=arrays.engagement[own],
                     tile_utilisations=arrays.tile_utilisations[own],
                     tiles=arrays.tiles[h],
                     half_planes=arrays.half_planes[h],

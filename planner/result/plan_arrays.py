@@ -30,14 +30,14 @@ class PlanArrays(NamedTuple):
     forces, points : ndarray, shape (T + H, 3)
         Of all tiles, then of all palms, and where they act.
     axes : ndarray, shape (T, 3, 3)
-    tile_utilisations : ndarray, shape (T,)
+    tile_utilisations, engagement : ndarray, shape (T,)
     palm_moments : ndarray, shape (H, 3)
     palm_utilisations : ndarray, shape (H,)
     wrenches : ndarray, shape (H, 6)
     utilisations : ndarray, shape (H,)
     tiles : tuple of tuple of Tile
     half_planes : tuple of tuple of HalfPlane
-        Of each hand's tiles but its nails.
+        Of each hand's whole tiles.
     engaged : tuple of tuple of int
         Tiles of each palm.
     wrists : tuple of WristPlan or None
@@ -50,6 +50,7 @@ class PlanArrays(NamedTuple):
     points: Array
     axes: Array
     tile_utilisations: Array
+    engagement: Array
     palm_moments: Array
     palm_utilisations: Array
     wrenches: Array
@@ -71,6 +72,7 @@ class PlanArrays(NamedTuple):
             points=np.vstack([*(hand.positions for hand in hands), *(p.position for p in palms)]),
             axes=concatenated([hand.axes for hand in hands]),
             tile_utilisations=concatenated([hand.tile_utilisations for hand in hands]),
+            engagement=concatenated([hand.engagement for hand in hands]),
             palm_moments=np.array([p.moment for p in palms]),
             palm_utilisations=np.array([p.utilisation for p in palms]),
             wrenches=np.array([hand.wrench for hand in hands]),

@@ -111,9 +111,19 @@ class TileLimits(NamedTuple):
 def limits_of(surfaces: IdentityKey, known: HandBatch) -> TileLimits:
     """Return the limits of tiles of hands on these surfaces."""
     limits = _limits_of(surfaces, known.places)
-    if len(known.touch.touching) == len(known.places.hand):
+    if (known.engagement == 1.0).all():
         return limits
-    return limits._replace(planes=limits.planes * known.touch.touches[:, None, None])
+    shares = np.where(known.touch.away, 1.0, known.engagement)
+    return limits._replace(
+        planes=limits.planes * _whole_per_part(known),
+        curves=LimitCurves(surfaces.each, known.places.hand, shares),  # type: ignore[arg-type]
+    )
+
+
+def _whole_per_part(known: HandBatch) -> Array:
+    """Return 1 / φ of each tile, zero for tiles that touch nothing, shape (T, 1, 1)."""
+    shares = np.where(known.touch.away, np.inf, known.engagement)
+    return np.asarray(1.0 / shares[:, None, None])
 
 
 @lru_cache(maxsize=KEPT)
@@ -125,12 +135,12 @@ def _limits_of(key: IdentityKey, places: TileIndex) -> TileLimits:
 
 
 def planes_of(pieces: Sequence[Sequence[HalfPlane]], known: HandBatch) -> Array:
-    """Return hands' half-planes over their capacities, of each tile, shape (T, 2 p, 3).
+    """Return hands' half-planes over their capacities, of each tile's spines on the rock.
 
-    For lateral loads of either sign. Zero for tiles that touch nothing, and where a hand has fewer
-    than others.
+    Shape (T, 2 p, 3), for lateral loads of either sign. Zero for tiles that touch nothing, and
+    where a hand has fewer than others. ``pieces``: of whole tiles.
     """
-    return np.asarray(_planes(pieces, known.places) * known.touch.touches[:, None, None])
+    return np.asarray(_planes(pieces, known.places) * _whole_per_part(known))
 
 
 def _planes(pieces: Sequence[Sequence[HalfPlane]], places: TileIndex) -> Array:

@@ -185,8 +185,10 @@ class Check:
         found.extend(again.use(i, float(used[i]), float(told[i])) for i in wrong)
         found.extend(map(again.stop, np.flatnonzero(~(again.stops >= -STOP)).tolist()))
         found.extend(again.idle())
+        spines = np.array_equal(arrays.engagement, self.known.engagement)
         for h, hand in enumerate(self.known.hands):
-            if arrays.tiles[h] is not hand.tiles or arrays.engaged[h] != hand.palm.engaged:
+            same = arrays.tiles[h] is hand.tiles and arrays.engaged[h] == hand.palm.engaged
+            if not (spines and same):
                 found.extend(again.contacts_told(h))
 
     def _stick(self, found: list[str], again: Recomputed) -> None:

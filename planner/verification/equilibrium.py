@@ -22,7 +22,6 @@ from planner.prepare import (
     KEPT,
     NONE,
     NOTHING,
-    TOUCHING,
     HandBatch,
     IdentityKey,
     TileIndex,
@@ -98,7 +97,7 @@ def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
     planar = rows[:, : 2 * count].reshape(2, 2, count)
     planar[:, :, places.phalanges] = loads
     shear, bases = planar[:, 0], places.bases
-    base = known.touch.touches[bases]
+    base = known.engagement[bases]
     shear[0, bases] = base * (tendons.engaged[bases] * closing[places.hand[bases]])
     shear[1, bases] = base * tendons.gain[bases]
     # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
@@ -219,8 +218,8 @@ def _solved(
     b[:, :, 0], b[:, :, 1] = closing * tendons.at_closing, tendons.per_newton
     b[:, 0::2, 0] += known.bends * tendons.stiffness + tendons.preload
     partly, left = len(known.touch.touching) < len(known.touch.contacts), b
+    b[:, 1::2] *= known.engagement[known.places.phalanges][:, :, None]
     if partly:
-        b[:, 1::2] *= (contacts == TOUCHING)[:, :, None]
         left = -b[:, 0::2]
         A[:, 0::2] *= (contacts != NOTHING)[:, None, :]
         turns = A[:, 0::2].copy().view(float).reshape(count, JOINTS, 2 * JOINTS)

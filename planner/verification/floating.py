@@ -227,14 +227,13 @@ def _tendon(
     own = np.flatnonzero(hand.finger_of == index)
     table = hand.hand.table
     known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
-    stiffness = [
-        k if hand.tiles[t].contact in ("face", "edge") else 0.0
-        for k, t in zip(known.contact_stiffness, own, strict=True)
-    ]
+    # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
+    gains = hand.engagement[own] * hand.hand.finger.shear_gain
+    stiffness = known.spring_stiffness * gains / (known.pulley_ratio - gains)
     friction = max(known.friction, hand.hand.tendon_friction)
     tendon = FingerTendon(
         known.pulley_ratio,
-        tuple(stiffness),
+        tuple(stiffness.tolist()),
         known.spring_stiffness,
         known.pulley_radii,
         friction,
@@ -285,15 +284,15 @@ def _normals(
 def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristPlan) -> Array:
     """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
     found = np.zeros(len(own))
-    those = [k for k, t in enumerate(own) if hand.tiles[t].contact in ("face", "edge")]
-    if not (hand.grasp.lateral and those):
+    those = np.flatnonzero(hand.engagement[own])
+    if not (hand.grasp.lateral and len(those)):
         return found
     body = hand.hand
     places = hand.positions[own[those]]
     away = [float(moved(place, wrist) @ frame.across) for place in places]
     out = [max(float((place - frame.joint) @ frame.along), 0.0) for place in places]
     high = [float(place[2] - frame.joint[2]) for place in places]
-    give = np.eye(len(those)) / body.lateral_stiffness
+    give = np.diag(1.0 / (hand.engagement[own[those]] * body.lateral_stiffness))
     for i, a in enumerate(out):
         for j, b in enumerate(out):
             near, far = min(a, b), max(a, b)

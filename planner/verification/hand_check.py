@@ -47,8 +47,10 @@ class HandCheck:
     ----------
     tiles : ndarray, shape (3, k, m + 1)
         Shear, normal and lateral load of each tile on rock [N].
+    engagement : ndarray, shape (k,)
+        Share of the spines of each of these that are on the rock.
     planes : tuple of slice
-        The rows of ``used`` that limit each of these tiles.
+        The rows of ``used`` that limit each of them.
     used : ndarray, shape (n, m + 1)
         Load over capacity of all limits.
     hard : ndarray, shape (h, m + 1)
@@ -64,6 +66,7 @@ class HandCheck:
     """
 
     tiles: Array
+    engagement: Array
     planes: tuple[slice, ...]
     used: Array
     hard: Array
@@ -108,6 +111,7 @@ def hand_check(
     _cap(rows, question, place)
     return HandCheck(
         tiles=np.array(rows.tiles).reshape(-1, 3, len(columns) + 1).transpose(1, 0, 2),
+        engagement=hand.engagement[hand.touching],
         planes=tuple(rows.planes),
         used=np.vstack(rows.used),
         hard=np.vstack(rows.hard),
@@ -185,13 +189,14 @@ def _finger(rows: _Rows, question: Question, hand: SettledHand, index: int) -> N
     rows.keep(affine(*solved.stops[:, solved.stop_fingers == index]), constant=STOP, growing=0.0)
     if model.friction > 0.0 and (any(on_rock) or hooked):
         rows.keep(tension - rows.constant(np.array([hand.closing_tension]))[0])
-    share = rows.load(f"{name}/lateral") / max(sum(on_rock), 1)
-    for t, touches, along, into in zip(own, on_rock, shear, normal, strict=True):
-        aside = share * touches
+    spines = hand.engagement[own].tolist()
+    lateral = rows.load(f"{name}/lateral") / (sum(spines) or 1.0)
+    for t, touches, share, along, into in zip(own, on_rock, spines, shear, normal, strict=True):
+        aside = lateral * share
         rows.push(hand.positions[t], hand.axes[t].T @ np.array([along, into, aside]))
         if touches:
             rows.tiles.append(np.array([along, into, aside]))
-            rows.planes.append(rows.limit(_planes(hand, along, into, aside)))
+            rows.planes.append(rows.limit(_planes(hand, along, into, aside) / share))
         else:
             rows.keep(into)
     for t in hooked:
@@ -210,7 +215,7 @@ def _drive(rows: _Rows, question: Question, hand: SettledHand, tension: Array) -
 
 
 def _planes(hand: SettledHand, along: Array, into: Array, aside: Array) -> Array:
-    """Return what a tile uses of its half-planes, with its lateral load of either sign."""
+    """Return what a whole tile uses of its half-planes, with its lateral load of either sign."""
     return np.array(
         [
             (piece.a_shear * along + piece.a_normal * into + sign * piece.a_lateral * aside)

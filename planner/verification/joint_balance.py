@@ -6,10 +6,11 @@ as what the tendon leaves of its spring,
 
     Σ_{j ≥ i} (p_j − p_i) × F_j = M_i r_i f − k_i q_i − τ_i,
 
-and a tile that holds rock carries the shear M_t (g f + (e_t − g) f_c), with the closing tension f_c
-at which its spines engaged. Moments are taken about the joints' axes in H, of the forces where the
-plan has them, each axis a row (a × p, −a) that is multiplied by a wrench (F, M) about the origin of
-H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for a joint at (x, z) of its plane.
+and a tile carries the shear φ_t M_t (g f + (e_t − g) f_c), with the closing tension f_c at which
+its spines engaged and the share φ_t of them that did. Moments are taken about the joints' axes in
+H, of the forces where the plan has them, each axis a row (a × p, −a) that is multiplied by a wrench
+(F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for a joint
+at (x, z) of its plane.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ class JointBalance:
         self._places, body = places, IdentityKey(hands[0].hand)
         self._tendons = tendons = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
-        self._shear = tendons.engaged * closing.take(places.hand) * touch.touches
-        self._gain = tendons.gain * touch.touches
+        self._shear = tendons.engaged * closing.take(places.hand) * known.engagement
+        self._gain = tendons.gain * known.engagement
         self._rest = known.bends * -tendons.stiffness - tendons.preload
         planes = _planes_of(body, tuple([hand.grasp.outer_rotation for hand in hands]))
         directions = np.empty((*known.angles.shape, 2))

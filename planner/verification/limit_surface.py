@@ -33,12 +33,21 @@ class LimitCurves:
         Some of them, in any order.
     of_tile : ndarray of int, shape (n,)
         Which of them each tile has.
+    shares : ndarray, shape (n,), optional
+        Part of each tile's spines that are on the rock: that of a whole tile's strength; by default
+        all.
     """
 
-    def __init__(self, surfaces: Sequence[Surface], of_tile: Indices) -> None:
-        self._numbers = _Numbers(
-            *[numbers.take(of_tile, -1) for numbers in _numbers(IdentityKey(*surfaces))]
+    def __init__(
+        self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array | None = None
+    ) -> None:
+        flat, loss, per_radian, gain = (
+            numbers.take(of_tile, -1) for numbers in _numbers(IdentityKey(*surfaces))
         )
+        if shares is not None:
+            flat[0] *= shares
+            loss[0] *= shares
+        self._numbers = _Numbers(flat, loss, per_radian, gain)
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
         """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].

@@ -93,8 +93,11 @@ class LoadsCheck:
         self._body = np.hstack(list(carries @ self._matrix[:, self._wrench]))
         self._from_rest = np.einsum("hij,hj->i", carries, self._constant[:, self._wrench])
         self._planes = [hand.planes for hand in hands]
-        of_tile = np.repeat(np.arange(len(hands)), max(len(hand.planes) for hand in hands))
-        self._curves = LimitCurves([hand.surface for hand in settled], of_tile)
+        shares = np.ones((len(hands), max(len(hand.planes) for hand in hands)))
+        for own, hand in zip(shares, hands, strict=True):
+            own[: len(hand.engagement)] = hand.engagement
+        of_tile = np.repeat(np.arange(len(hands)), shares.shape[1])
+        self._curves = LimitCurves([hand.surface for hand in settled], of_tile, shares.ravel())
 
     def _stack(self, hands: Sequence[HandCheck]) -> None:
         """Put each hand's rows into a matrix, filled up with rows that are never wrong."""

@@ -233,6 +233,7 @@ class Recomputing:
             )
             and (not len(again.stops) or least(again.stops) >= -STOP)
             and arrays.tiles == self._tiles
+            and np.array_equal(arrays.engagement, self.known.engagement)
             and arrays.engaged == self._engaged
         )
 

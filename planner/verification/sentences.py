@@ -198,6 +198,11 @@ class Recomputed(NamedTuple):
                 if said.contact == "none" and arrays.forces[first + t].any():
                     yield f"{name} carries a load but touches nothing"
                 yield f"{name} touches with {tile.contact}; the plan has {' '.join(said)}"
+        own = slice(first, first + len(hand.tiles))
+        shares = zip(hand.engagement.tolist(), arrays.engagement[own].tolist(), strict=True)
+        for t, (share, told_share) in enumerate(shares, first):
+            if share != told_share:
+                yield f"{self.tile(t)}: {share:.6g} of its spines hold, not {told_share:.6g}"
         true, told = list(hand.palm.engaged), list(arrays.engaged[h])
         if true != told:
             if not told and arrays.palms[h].any():

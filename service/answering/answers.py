@@ -296,15 +296,11 @@ def _fingers(part: HandPlan, model: bool) -> list[replies.Finger]:
 
 def _add_models(part: HandPlan, tiles: Sequence[replies.Tile]) -> None:
     """Give tiles, in their hand's order, their load laws and half-planes."""
-    own = [row for plane in part.half_planes for row in _both_signs(plane)]
     laws = None if part.laws is None else part.laws.transpose(0, 2, 1).tolist()
     for t, tile in enumerate(tiles):
         if laws is not None:
             tile.load_at_zero, tile.load_per_newton = laws[t]
-        nail = part.nail_planes.get(t)
-        tile.half_planes = (
-            own if nail is None else [row for plane in nail for row in _both_signs(plane)]
-        )
+        tile.half_planes = [row for plane in part.limits_of(t) for row in _both_signs(plane)]
 
 
 def _wrist(wrist: WristPlan | None) -> replies.Wrist:
