@@ -53,9 +53,10 @@ class ByHand:
         self.columns = {f"{finger}/tension": np.zeros(6) for finger in FINGERS}
         self.limits: dict[str, Row] = {}
         self.hard: dict[str, Row] = {}
-        self.shares = dict.fromkeys(FINGERS, 0)
-        for tile in settled.tiles:
-            self.shares[tile.finger] += tile.contact in ("face", "edge")
+        self.shares = dict.fromkeys(FINGERS, 0.0)
+        for tile, share in zip(settled.tiles, settled.engagement, strict=True):
+            self.shares[tile.finger] += share
+            assert (share > 0.0) == (tile.contact in ("face", "edge"))
         for t in range(len(settled.tiles)):
             self.add_tile(t)
         self.add_tendons(min(cap, settled.hand.maximum_tension))
@@ -81,7 +82,8 @@ class ByHand:
         if contact not in ("face", "edge"):
             return
         self.hard[f"{finger}/{phalanx}/dragged_backwards"] = {tension: -more_shear}, 0.0, shear
-        share = 1.0 / self.shares[finger]
+        engagement = settled.engagement[t]
+        share = engagement / self.shares[finger]
         if settled.grasp.lateral:
             self.columns.setdefault(lateral, np.zeros(6))
             self.columns[lateral] += wrench_of(place, share * axes[2])
@@ -94,7 +96,7 @@ class ByHand:
             signs = (("+", 1.0), ("-", -1.0)) if settled.grasp.lateral else (("", 0.0),)
             for sign, factor in signs:
                 sideways = {lateral: factor * piece.a_lateral * share} if sign else {}
-                self.limits[name + sign] = row | sideways, at_zero, piece.capacity
+                self.limits[name + sign] = row | sideways, at_zero, engagement * piece.capacity
 
     def add_tendons(self, most: float) -> None:
         drive = self.settled.hand.drive

@@ -126,6 +126,10 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
         (tile.finger, tile.phalanx): load
         for tile, load in zip(settled.tiles, settled.tile_loads(y[:4], lateral), strict=True)
     }
+    holds = {
+        (tile.finger, tile.phalanx): share
+        for tile, share in zip(settled.tiles, settled.engagement, strict=True)
+    }
     used = space.utilisations(y)
     worst: dict = {}
     for row, u in zip(space.rows, used, strict=False):
@@ -153,6 +157,7 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
                 for p in inner_half_planes(settled.surface)
                 if p.limit == limit
             )
+            expected /= holds[finger, phalanx]
         assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
     kept = dict(
         zip(

@@ -105,14 +105,16 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
             place = frame.joint + (hand.base_tile_reach - hand.outer_reach) * frame.along
             place[2] = hand.base_tile_surface
             gap = hold.entry(inverse.apply(place), into)
-            on = abs(gap) <= hand.spine_travel and not grasp.fingernail
+            share = 0.0 if grasp.fingernail else max(1.0 - abs(gap) / hand.spine_travel, 0.0)
+            on = share > 0.0
             assert settled.tiles[row] == (name, "base", "face" if on else "none")
             np.testing.assert_allclose(
                 settled.positions[row], place + (gap if on else 0.0) * UP, atol=1e-11
             )
+            np.testing.assert_allclose(settled.engagement[row], share, atol=1e-8)
             gain = hand.finger.shear_gain
-            drag = ((hand.finger.base_engagement - gain) * closing, gain) if on else (0.0, 0.0)
-            np.testing.assert_allclose(settled.loads[row], [drag, (0.0, 0.0)], atol=1e-12)
+            drag = share * np.array([(hand.finger.base_engagement - gain) * closing, gain])
+            np.testing.assert_allclose(settled.loads[row], [drag, (0.0, 0.0)], atol=1e-7)
             row += 1
         section = hand.section(name, hold, grasp, there)
         if grasp.fingernail:
@@ -139,6 +141,7 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
             np.testing.assert_allclose(settled.loads[row, 0], shears[i], atol=1e-9)
             np.testing.assert_allclose(settled.loads[row, 1], normals[i], atol=1e-8 * size)
             assert settled.tiles[row].contact == contact.kind
+            assert settled.engagement[row] == (contact.kind in ("face", "edge"))
             joint = joint + hand.finger.joint_spacing * u
             row += 1
         row += grasp.fingernail

@@ -51,13 +51,15 @@ def test_the_winch_angle_of_a_finger_is_that_worked_by_hand():
 
 
 def test_tightening_turns_the_winch_as_far_as_the_rock_gives():
-    """Each newton drags an engaged tile by g/k_c, g = 2·10/21.5, and two strands follow."""
+    """Each newton drags an engaged tile by g/k_c, g = 2·10/21.5, and two strands follow.
+
+    Of a tile with φ of its spines on the rock the spring takes what φ g leaves of two newtons.
+    """
     settled = pinch()
     give = 2.0 * 10.0 / 21.5 / 10000.0
     for i, finger in enumerate(FINGERS):
-        engaged = int(settled.touching[settled.finger_of == i].sum())
-        free = int((settled.finger_of == i).sum()) - engaged
-        rate = 2.0 * (engaged * give + free * 2.0 / 11500.0) / 0.0067
+        share = settled.engagement[settled.finger_of == i]
+        rate = 2.0 * (share * give + (1.0 - share) * 2.0 / 11500.0).sum() / 0.0067
         turned = winch_angle(settled, i, 87.0) - winch_angle(settled, i, 37.0)
         assert turned == pytest.approx(50.0 * rate, rel=1e-9), finger
 
