@@ -87,14 +87,17 @@ def test_every_number_is_that_of_its_definition(stance):
             torque = tension * 0.0067 / 236.0 / 0.7
             assert finger.motor_torque == pytest.approx(torque, rel=1e-12)
             assert finger.motor_current == pytest.approx(torque / 0.0234 + 0.0263, rel=1e-12)
-            holding = int(hand.touching[hand.finger_of == i].sum())
+            spines = float(hand.engagement[hand.finger_of == i].sum())
             drawn = hand.hand.nail.pulley_radius * hand.nail_angles[i]
             drawn += np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ hand.fingers[i].joint_angles
             for tile in finger.tiles:
                 t = next(tiles)
                 shear, normal = hand.loads[t] @ [1.0, tension]
-                lateral = load.get(f"{name}/lateral", 0.0) / holding if hand.touching[t] else 0.0
-                planes = inner_half_planes(place.surface)
+                lateral, planes = 0.0, inner_half_planes(place.surface)
+                if hand.touching[t]:
+                    engagement = float(hand.engagement[t])
+                    lateral = load.get(f"{name}/lateral", 0.0) * engagement / spines
+                    planes = tuple(replace(p, capacity=engagement * p.capacity) for p in planes)
                 if hand.nails[t]:
                     shear, planes = load[f"{name}/nail"], hand.nail_limits(t)
                 if tile.phalanx != "nail":

@@ -1,5 +1,7 @@
 """What a plan means: statuses, numbers that a caller can check, caps, load factors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from hand_models.hand import FINGERS, HELD
 from hand_models.rock import Cylinder, Plane
 from hand_models.tile import inner_half_planes
 from planner.deadline import DeadlineError
+from planner.prepare import settle_hand
 from planner.programs import SLACK
 from planner.question import Limits, Question
 from planner.result import Plan
@@ -127,6 +130,11 @@ def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
         for hand, place in zip(answer.hands, question.stance.hands, strict=True):
             mine = [hand.palm.utilisation]
             mine.append((HELD @ hand.wrench[:3]).max() / robot_hand.structure.hand_load)
+            settled = settle_hand(place, question.stance)
+            shares = {
+                name: settled.engagement[settled.finger_of == i].tolist()
+                for i, name in enumerate(FINGERS)
+            }
             for finger in hand.fingers:
                 mine.append(finger.tendon_tension / robot_hand.maximum_tension)
                 mine += _parts(finger).values()
@@ -189,12 +197,12 @@ def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
 
 def test_status_follows_the_utilisation_cap_and_the_plan_does_not():
     free = plan(ask(on_wall()))
-    loose = plan(ask(on_wall(), limits=Limits(utilisation=0.8)))
-    tight = plan(ask(on_wall(), limits=Limits(utilisation=0.5)))
-    assert 0.5 < free.utilisation < 0.8
+    loose = plan(ask(on_wall(), limits=Limits(utilisation=0.95)))
+    tight = plan(ask(on_wall(), limits=Limits(utilisation=0.8)))
+    assert 0.8 < free.utilisation < 0.95
     assert (loose.status, tight.status) == ("optimal", "overloaded")
     assert loose.utilisation == tight.utilisation == free.utilisation
-    assert "0.5" in tight.reason
+    assert "0.8" in tight.reason
 
 
 def test_a_utilisation_just_at_the_cap_is_optimal():

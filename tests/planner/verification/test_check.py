@@ -102,6 +102,7 @@ TAMPERED = {
     "contact": (("tiles", TILE), lambda t: t._replace(contact="none"), "touches nothing"),
     "name of a tile": (("tiles", TILE), lambda t: t._replace(phalanx="distal"), "middle tile"),
     "utilisation of a tile": (("tile_utilisations",), at(TILE, more(-1e-4)), "utilisation"),
+    "spines of a tile": (("engagement",), at(BASE, lambda share: 1.0), "of its spines hold, not 1"),
     "motor torque": (("drives",), at((TORQUE, FINGER), more(1e-6)), "motor torque"),
     "motor current": (("drives",), at((CURRENT, FINGER), more(1e-6)), "motor current"),
     "no motor current": (("drives",), at((CURRENT, FINGER), none), "motor current"),

@@ -142,12 +142,12 @@ def test_a_tendon_with_friction_must_not_be_slackened():
 
 
 def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes(monkeypatch):
-    def weak(surfaces, of_tile):
+    def weak(surfaces, *tiles):
         weaker = [
             replace(each, shear_limit=20.0, pull_off_limit=2.0, lateral_limit=40.0)
             for each in surfaces
         ]
-        return LimitCurves(weaker, of_tile)
+        return LimitCurves(weaker, *tiles)
 
     loads, _ = honest()
     monkeypatch.setattr(loads_check, "LimitCurves", weak)
