@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,12 +11,16 @@ from hand_models.base import Array
 
 __all__ = ["engaged_share"]
 
+LEAST: Final = 1e-6
+"""Share that counts as none: far less than one spine, and too little to divide loads by."""
+
 
 def engaged_share(gap: ArrayLike, travel: float) -> Array:
     """Return what share of a tile's spines are on the rock, φ = 1 − gap / travel in [0, 1].
 
     Spines slide out of their tile by up to their travel; the farther they have to, the fewer find
-    an asperity that is near enough. All are on the rock where the tile itself is.
+    an asperity that is near enough. All are on the rock where the tile itself is; a millionth of
+    them counts as none.
 
     Parameters
     ----------
@@ -30,4 +36,5 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     """
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(off > 0.0, np.clip(1.0 - off / travel, 0.0, 1.0), 1.0)
+        share = np.where(off > 0.0, np.minimum(1.0 - off / travel, 1.0), 1.0)
+    return np.where(share > LEAST, share, 0.0)

@@ -1,6 +1,7 @@
 """A hand whose wrist gives way: what it is at rest, and how stiff."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.tile import Surface
-from tests.suite.helpers.hands import HAND, changed_hand
+from tests.suite.helpers.hands import HAND, changed_hand, partly
 
 ROCK = Surface.named("rock")
 
@@ -131,6 +132,20 @@ def test_lateral_springs_are_the_beam_in_series_with_the_tiles():
     assert (loads[stiff.settled.touching[own]] <= 1e-4 * HAND.lateral_stiffness + 1e-12).all()
     assert loads.sum() > 0.5 * len(own) * 1e-4 * HAND.lateral_stiffness
     assert soft.lateral_loads(1, sideways)[0].sum() < loads.sum()
+
+
+def test_half_of_the_spines_are_half_as_stiff_sideways():
+    settled = replace(
+        HAND.settle(Cylinder(0.3), ROCK, Grasp(outer_rotation=0.0)),
+        hand=changed_hand("beam", "bending_stiffness", 1e12),
+    )
+    settled = replace(settled, positions=settled.positions * [1.0, 1.0, 0.0])
+    sideways = np.array([[0.0, 1e-4, 0.0, 0.0, 0.0, 0.0]])
+    for share in (1.0, 0.5, 1e-9):
+        found = CompliantHand(partly(settled, share)).lateral_loads(0, sideways)[0]
+        # 10 N/mm of each tile's spines
+        expected = share * settled.engagement[settled.finger_of == 0] * 1e4 * 1e-4
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("diameter", [0.2, 0.3, 0.7])

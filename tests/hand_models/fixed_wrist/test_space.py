@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, SpinyHand
+from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, Pose, SpinyHand
 from hand_models.fixed_wrist import wrench_space
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from hand_models.tile import inner_half_planes
@@ -17,6 +17,7 @@ from tests.suite.helpers.hands import (
     PINCH,
     ROCK,
     changed_hand,
+    partly,
     pinch,
     settled_at,
     without_hand_load,
@@ -199,6 +200,54 @@ def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_she
     for sign in (1.0, -1.0):
         y[column] = sign * reach
         assert space.utilisations(y).max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("hold", "rotation"), [(Plane(), 0.0), (Cylinder(0.3), 0.0), (Cylinder(0.3), math.pi)]
+)
+def test_what_a_hand_can_do_does_not_jump_where_its_base_tiles_lose_the_rock(hold, rotation):
+    """A nanometre to either side, along and about all axes."""
+    grasp = Grasp(outer_rotation=rotation, palm=False)
+    seated = HAND.settle(hold, ROCK, grasp).seating.pose
+
+    def away(off):
+        pose = Pose(seated.position + np.array([0.0, 0.0, off]), seated.rotation)
+        return HAND.settle(hold, ROCK, grasp, pose)
+
+    near, far = 0.0, 5e-3
+    assert away(near).engagement[0] > 0.1
+    assert away(far).engagement[0] == 0.0
+    while far - near > 1e-9:
+        middle = (near + far) / 2.0
+        near, far = (middle, far) if away(middle).engagement[0] > 0.0 else (near, middle)
+    reaches = np.array(
+        [
+            [wrench_space(away(off)).support(side * axis) for axis in np.eye(6) for side in (1, -1)]
+            for off in (near, far)
+        ]
+    )
+    np.testing.assert_allclose(reaches[0], reaches[1], rtol=1e-5, atol=1e-5)
+
+
+def test_a_tile_half_on_the_rock_has_half_the_load_and_half_the_strength():
+    """So that tension alone uses it as it does a whole tile; its share of lateral load is less."""
+    share = np.ones(14)
+    share[0] = 0.5
+    whole = HAND.settle(Cylinder(0.3), ROCK, Grasp(outer_rotation=0.0))
+    half = partly(whole, share)
+    used = []
+    for settled in (whole, half):
+        space = wrench_space(settled)
+        limits = enumerate(space.rows[: len(space.s)])
+        base = [i for i, row in limits if row.label.startswith("outer_left/base/")]
+        assert len(base) == 2 * len(inner_half_planes(ROCK))
+        column = space.columns.index("outer_left/lateral")
+        tension = space.L[base, 0] / space.s[base], space.l0[base] / space.s[base]
+        spines = settled.engagement[settled.finger_of == 0].sum()
+        used.append((tension, space.L[base, column] / space.s[base] * spines, space.s[base]))
+    np.testing.assert_allclose(used[1][0], used[0][0], rtol=1e-12)
+    np.testing.assert_allclose(used[1][1], used[0][1], rtol=1e-12)
+    np.testing.assert_allclose(used[1][2], 0.5 * used[0][2], rtol=1e-12)
 
 
 def test_lateral_switched_off_leaves_no_lateral_column():

@@ -243,3 +243,32 @@ def test_impossible_grasps_are_refused_by_field(values, field):
     with pytest.raises(InvalidInputError) as caught:
         Grasp(**values)
     assert caught.value.field == field
+
+
+def test_a_base_tile_fades_with_its_distance_from_the_rock():
+    """From rock that stands through its plane, within the spines' travel too, to beyond it."""
+    grasp, found = Grasp(outer_rotation=0.0), []
+    offs = np.linspace(-5e-4, 6e-3, 131)
+    for off in offs:
+        settled = HAND.settle(Plane(), ROCK, grasp, Pose(np.array([0.0, 0.0, off]), np.eye(3)))
+        assert settled.tiles[0].contact == ("face" if settled.engagement[0] > 0.0 else "none")
+        others = settled.touching[1:4].sum()
+        found.append(
+            (settled.engagement[0], *settled.loads[0, 0], settled.lateral_shares[0], others)
+        )
+    share, at_zero, gain, lateral, others = np.array(found).T
+    np.testing.assert_allclose(share, np.clip(1.0 - np.abs(offs) / 5e-3, 0.0, 1.0), atol=1e-9)
+    # of a whole tile 0.131 of 37 N, and 0.93 per newton
+    np.testing.assert_allclose(gain, share * 20.0 / 21.5, rtol=1e-12)
+    np.testing.assert_allclose(at_zero, share * (4.85 - 37.0 * 20.0 / 21.5), rtol=1e-9)
+    np.testing.assert_allclose(lateral, share / (share + others), rtol=1e-12)
+
+
+def test_lateral_reactions_are_shared_as_spines_are():
+    settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(outer_rotation=0.0))
+    for i, name in enumerate(FINGERS):
+        own = settled.finger_of == i
+        share = settled.engagement[own]
+        assert (share[-3:] == 1.0).all()
+        assert not name.startswith("outer") or 0.1 < share[0] < 0.9
+        np.testing.assert_allclose(settled.lateral_shares[own], share / share.sum(), rtol=1e-12)

@@ -355,3 +355,19 @@ def test_a_state_is_left_as_it_was():
     assert isinstance(state, TendonState)
     np.testing.assert_array_equal(state.shears, ENGAGED)
     assert state.motor_tension == CLOSING
+
+
+def test_tiles_partly_on_the_rock_give_that_part_of_a_whole_tiles_shear():
+    """For tendon and for slip alike; tension that does not follow the slip, as without friction."""
+    whole = FingerTendon.from_table(hand_table())
+    share = np.array([1.0, 0.5, 0.0])
+    some = whole.engaged(share)
+    assert some.contact_stiffness[0] == whole.contact_stiffness[0]
+    assert some.contact_stiffness[2] == 0.0
+    slips = np.array([1e-4, -2e-4, 3e-4])
+    for tension, shift in ((50.0, None), (37.0, slips), (60.0, slips)):
+        drags = [
+            tendon.at_tension(tendon.closed(CLOSING, part * ENGAGED), tension, shift).shears
+            for tendon, part in ((whole, 1.0), (some, share))
+        ]
+        np.testing.assert_allclose(drags[1], share * drags[0], rtol=1e-12, atol=1e-12)

@@ -22,6 +22,7 @@ from hand_models import (
     WrenchSpace,
     spiny_hand,
 )
+from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from tests.suite.helpers.rocks import random_axes
 
@@ -98,3 +99,19 @@ def settled_at(seed: int, lateral: bool | None = None) -> SettledHand | None:
         return random_hand(seed, lateral)
     except InvalidInputError:
         return None
+
+
+def partly(settled: SettledHand, shares: np.ndarray | float) -> SettledHand:
+    """A hand of which only so much of each tile's spines, (n,), holds; not one at a joint's stop.
+
+    Normal loads from the balance of each finger's own joints.
+    """
+    share = np.broadcast_to(shares, settled.engagement.shape)
+    loads = settled.loads.copy()
+    loads[:, 0] *= share[:, None]
+    for i, finger in enumerate(settled.fingers):
+        own = np.flatnonzero(settled.finger_of == i)
+        phalanges = own[-len(PHALANGES) :]
+        outer = len(own) > len(PHALANGES)
+        loads[phalanges, 1] = finger.normals(loads[phalanges, 0], outer)
+    return replace(settled, engagement=share * settled.engagement, loads=loads)
