@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose, wrench_transport
 from hand_models.rock import Plane
+from hand_models.tile import Surface
 from planner.prepare import posture
 from planner.prepare.stance_constraints import JointLoads
 from planner.question import EARTH, Limits, Load, Question
@@ -335,7 +336,8 @@ def test_torques_give_way_to_a_limit_that_other_loads_can_meet():
 def test_a_limb_without_a_hand_counts():
     """A free limb stretched out level bears its own weight, whatever the hands do."""
     robot = robosimian()
-    stance = on_wall(limbs=("rear_right", "rear_left", "front_left"))
+    rock = Surface.from_values({"shear_limit": 80.0})
+    stance = on_wall(surface=rock, limbs=("rear_right", "rear_left", "front_left"))
     angles = plan(Question(replace(stance, joints="solve"))).joints
     assert np.array_equal(angles["front_right"], np.zeros(7))
     held = replace(stance, joints=dict(angles))
