@@ -177,7 +177,7 @@ def held_wrench(given) -> Question:
 
 
 def test_a_hand_whose_wrench_is_given_leaves_a_point():
-    given = (5.0, 4.0, 30.0, 0.0, 0.0, 0.0)
+    given = (-20.0, 4.0, 30.0, 0.0, 0.0, 0.0)
     question = held_wrench(given)
     wanted = peer.reaction(question, 0, np.array(given))
     space = BodySpace(question)
@@ -192,12 +192,12 @@ def test_a_hand_whose_wrench_is_given_leaves_a_point():
 
 
 def test_a_hand_with_one_free_component_leaves_a_segment():
-    question = held_wrench((5.0, 4.0, None, 0.0, 0.0, 0.0))
+    question = held_wrench((-20.0, 4.0, None, 0.0, 0.0, 0.0))
     polygon = BodySpace(question).section(("fz", "mx"), "free").polygon
     assert len(polygon.inner) == 2
     # the hand pushes along z of H, which is −z of B, 0.4 m to the left
     forces = polygon.inner[:, 0]
-    assert np.ptp(forces) > 100.0
+    assert np.ptp(forces) > 60.0
     slope = np.diff(polygon.inner[:, 1]) / np.diff(forces)
     assert slope == pytest.approx(0.4, abs=1e-4)
 
@@ -246,7 +246,7 @@ def test_so_it_does_with_joints_and_turning(index):
 
 def test_torques_change_with_the_acceleration():
     # weak knees: the joints end the way, and would not if only gravity loaded them
-    question = replace(with_joints(), limits=Limits(joint_torque=60.0))
+    question = replace(with_joints(), limits=Limits(joint_torque=45.0))
     space = BodySpace(question)
     ends = {}
     for way in AXES:

@@ -31,7 +31,8 @@ def answer(degrees: float, gravity: float, joints: bool = False) -> Plan:
 
 
 def test_rock_that_leans_farther_over_asks_more_and_leaves_less():
-    found = [answer(degrees, GRAVITIES["Earth"]) for degrees in ALONG]
+    """Not so on slabs, where palms off the rock are used by pressing."""
+    found = [answer(degrees, GRAVITIES["Earth"]) for degrees in ALONG if degrees >= -30]
     used = [each.utilisation for each in found]
     factors = [each.load_factor for each in found]
     assert (np.diff(used) > 0.0).all()

@@ -73,7 +73,7 @@ def hanging(file: Path, joints: Any = ANGLES) -> dict:
                 "limb": limb,
                 "pose": pose(BODY @ hand),
                 "hold": {"shape": "cylinder", "diameter": 0.3},
-                "surface": "rock",
+                "surface": {"shear_limit": 80.0},
                 "grasp": {"outer_rotation": math.pi},
             }
             for limb, hand in hands.items()

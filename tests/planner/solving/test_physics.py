@@ -148,7 +148,8 @@ def test_a_plan_does_not_depend_on_where_in_the_world_it_is():
 
 @pytest.mark.parametrize("hold", [Cylinder(0.3), Cylinder(0.5), Edge(0.1, 1.8), Sphere(0.4)])
 def test_steeper_is_never_better(hold):
-    angles = (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6)
+    """Not so on slabs, where palms off the rock are used by pressing."""
+    angles = (-0.3, 0.0, 0.3, 0.6)
     assert_never_better([utilisation(ask(on_wall(hold, overhang=angle))) for angle in angles])
 
 
