@@ -83,16 +83,16 @@ class Palm(NamedTuple):
     gaps : ndarray, shape (8,)
         From each tile to the rock along z, infinite where there is none [m].
     engaged : tuple of int
-        Tiles with rock within the spines' travel.
+        Tiles with spines on the rock: it is within their travel.
     engagement : tuple of float
         Share φ of the spines of each of these that are on the rock (`engaged_share`).
     centre : ndarray, shape (3,)
         Of the engaged tiles, each by its share, where shear and pressing act [m]; the origin if
         none are engaged.
     shear_limit : float
-        Along −x of H on the rock, by load sharing [N].
+        Along −x of H on the rock, by load sharing of whole tiles, as the mean over `layers` [N].
     pressing_limit : float
-        Along +z [N].
+        Along +z, of each tile its share [N].
     """
 
     gaps: Array
