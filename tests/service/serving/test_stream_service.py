@@ -382,6 +382,7 @@ def test_a_line_is_answered_before_the_next_is_there() -> None:
     """As a control loop asks: through pipes, one at a time."""
     lines = iter([json.dumps(WRENCH).encode() + b"\n"])
     assert list(wrenches(lines)) == [(1, tuple(WRENCH))]
-    asked = process("stream", "wall", "--json", given=(json.dumps(WRENCH) + "\n").encode() * 3)
+    light = json.dumps([0.8 * part for part in WRENCH])
+    asked = process("stream", "wall", "--json", given=(light + "\n").encode() * 3)
     assert (asked.returncode, asked.stderr) == (0, b"")
     assert len(asked.stdout.splitlines()) == 3
