@@ -11,6 +11,7 @@ joint's pulley has the tension t_i of its own phalanx, so that joint i balances 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -46,7 +47,8 @@ class FingerLoads(NamedTuple):
     points : ndarray, shape (m, 3, 2)
         Contacts (x, z) in F, which stays where the base was at rest [m].
     directions : ndarray, shape (m, 3, 2)
-        Unit vectors along the phalanges in F.
+        Unit vectors in F along which tiles drag away from the base: along the phalanges, but for
+        contacts that press aside.
     reached : ndarray of bool, shape (m,)
         Whether every phalanx still finds its rock.
     """
@@ -93,6 +95,8 @@ class CompliantFinger:
         At rest: tensions and shears, the base tile's first.
     scheme : {'held', 'tension'}
         What the motor does.
+    depths : sequence of float, optional
+        How far the tiles of the three phalanges are pressed in; not at all by default [m].
     """
 
     def __init__(
@@ -102,6 +106,7 @@ class CompliantFinger:
         tendon: FingerTendon,
         state: TendonState,
         scheme: MotorScheme = "held",
+        depths: Sequence[float] = (0.0,) * len(PHALANGES),
     ) -> None:
         self.finger = finger
         self.base_tile = len(tendon.pulley_radii) > len(PHALANGES)
@@ -109,7 +114,7 @@ class CompliantFinger:
         stiffness[-3:] = np.where(finger.touching, stiffness[-3:], 0.0)
         tendon = replace(tendon, contact_stiffness=tuple(stiffness.tolist()))
         self.regimes = TendonRegimes(tendon, state, scheme)
-        self._resettling = RollingContact(finger, section)
+        self._resettling = RollingContact(finger, section, depths)
 
     @property
     def model(self) -> FingerModel:
@@ -136,7 +141,7 @@ class CompliantFinger:
             turns = np.concatenate([0.0 * turns[:, :1], turns], axis=1)
         with np.errstate(invalid="ignore"):
             response = self.regimes.respond(slips, turns)
-        angles = posture.angles
+        angles = posture.angles + np.array([contact.tilt for contact in self.finger.contacts])
         u = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         normals, torques = self._balance(
             response.shears[:, -3:],

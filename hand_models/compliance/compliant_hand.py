@@ -139,6 +139,8 @@ class CompliantHand:
             ),
             tendon.closed(tension, shears),
             scheme,
+            # as it has closed: where tiles bear does not change with tension (Eq. 14)
+            [each * settled.closing_tension for each in hand.depths[base_tile]],
         )
 
     def _lateral_stiffness(self, i: int) -> Array:

@@ -5,12 +5,16 @@ fits it there (a straight line where it is flat or hollow). A phalanx whose face
 that circle; one that touches with an edge of its tile, or lies flat, slides with that point. Both
 have a closed form, so that thousands of positions of the base are solved at once.
 
+A face touches the circle where it is tangent to it, at c⁰. Where its force acts is the middle of
+the pressures of the bed that the tile rests on (`hand_models.finger.phalanx_gaps`), which an end of
+the tile may cut short: as c⁰ rolls, that goes with it, but never beyond the tile.
+
 With the base displaced by (x, z) in the coordinates F of the settled finger and turned by ψ from x
 toward z, phalanx i slips along the rock by
 
-    δx_i = δc_i − δs_i,
+    δx_i = δc⁰_i − δs_i,
 
-positive toward the finger's base, with c its contact from the joint and s the arc length of the
+positive toward the finger's base, with c⁰ its contact from the joint and s the arc length of the
 contact on the rock; its tile, anchored in the rock, makes up for that (Section 5.3).
 
 Everything here also takes complex numbers, so that derivatives are found by complex steps.
@@ -18,6 +22,7 @@ Everything here also takes complex numbers, so that derivatives are found by com
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 from collections.abc import Sequence
@@ -27,7 +32,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.finger import Contact, SettledFinger
+from hand_models.finger import PHALANGES, Contact, SettledFinger
 from hand_models.sections import Section, Vector2
 
 __all__ = ["MovedPosture", "Numbers", "RollingContact", "bearing_angle"]
@@ -80,62 +85,70 @@ def bearing_angle(x: Numbers, z: Numbers) -> Numbers:
 class _Link:
     """Phalanges that turn as one about a free joint, and the rock under the one that bears.
 
+    Lengths "along" and "above" are in axes of the bearing phalanx that are turned by its contact's
+    tilt: the contact presses upward in them.
+
     Attributes
     ----------
-    phalanges : range
     bearing : int
-    along, rise : float
-        The bearing phalanx's joint from the link's first, along it and above it [m].
+    along, above : float
+        The bearing phalanx's joint from the link's first [m].
+    height : float
+        Of the contact above that joint [m].
+    rest : float
+        Angle of the axes at rest [rad].
     rolls : bool
-        Whether its face rolls on the circle; otherwise its point ``along`` slides.
+        Whether its face rolls on the circle; otherwise its point slides.
     start, end : float
         Where on the phalanx the contact may roll to [m].
     contact : float
-        c at rest [m].
-    height : float
-        Of the face above the joint's axis [m].
+        c⁰ at rest, or the place of the point that slides [m].
+    depth : float
+        How far the tile is pressed in [m].
     point, into : tuple of float
-        The contact at rest (x, z) [m], and the unit vector into the rock there.
+        A place (x, z) of the face, at c⁰ [m], and the unit vector into the rock there.
     radius : float
         Of the rock there; infinite where it is flat [m].
     offset : float
         Of the contact's path from the rock: what spines reach across [m].
     """
 
-    phalanges: range
     bearing: int
     along: float
-    rise: float
+    above: float
+    height: float
+    rest: float
     rolls: bool
     start: float
     end: float
     contact: float
-    height: float
+    depth: float
     point: Vector2
     into: Vector2
     radius: float
     offset: float
 
-    def turn(self, jx: Numbers, jz: Numbers, rest: float) -> tuple[Numbers, Numbers, Numbers]:
-        """Return angle, c and slip of the bearing phalanx for places of the link's joint.
+    def turn(self, jx: Numbers, jz: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+        """Return how far the bearing phalanx turns, the contact goes along it, and it slips.
 
-        NaN where it finds no rock. ``rest`` is its angle at rest.
+        NaN where it finds no rock. ``jx``, ``jz``: places of the link's joint.
         """
         c: Numbers = np.full(jx.shape, self.contact)
         if math.isinf(self.radius):
-            angle = self._touch_line(jx, jz, rest)
-            px, pz = self._place(jx, jz, angle, c)
+            turn = self._touch_line(jx, jz)
+            px, pz = self._place(jx, jz, turn, c)
             # along the line, from the tangent (into_z, −into_x) that points away from the base
             arc = (px - self.point[0]) * self.into[1] - (pz - self.point[1]) * self.into[0]
-            return angle, c, -arc
+            return turn, 0.0 * c, -arc
         reach = self.radius + self.offset
         ox = self.point[0] + reach * self.into[0]
         oz = self.point[1] + reach * self.into[1]
         dx, dz = ox - jx, oz - jz
         square = dx * dx + dz * dz
         distance, bearing = np.sqrt(square), bearing_angle(dx, dz)
+        above = self.above + self.height
         if self.rolls:
-            away = self.radius + self.rise + self.height
+            away = reach + above
             rolled = np.sqrt(square - away * away) - self.along
             angle = bearing - np.arcsin(away / distance)
             near = ~(rolled.real >= self.start)
@@ -145,34 +158,53 @@ class _Link:
         else:
             angle, beyond = bearing, np.ones(jx.shape, dtype=bool)
         if beyond.any():
-            ahead, above = self.along + c, self.rise + self.height
+            ahead = self.along + c
             arm = np.sqrt(ahead * ahead + above * above)
             cosine = (arm * arm + square - reach * reach) / (2.0 * arm * distance)
             touch = bearing - np.arccos(cosine) - bearing_angle(ahead, above + 0.0 * ahead)
             angle = np.where(beyond, touch, angle)
-        angle = angle - math.tau * np.round((angle.real - rest) / math.tau)
-        px, pz = self._place(jx, jz, angle, c)
+        turn = _within_half_a_turn(angle - self.rest)
+        px, pz = self._place(jx, jz, turn, c)
         # the contact seen from the circle's centre, turned from where it was at rest
         ax, az = -self.into[0], -self.into[1]
         cosine, sine = (px - ox) * ax + (pz - oz) * az, (pz - oz) * ax - (px - ox) * az
+        rolled = c - self.contact
         arc = self.radius * bearing_angle(cosine, sine)
-        return angle, c, (c - self.contact) - arc
+        aside = self._aside(c) - self._aside(np.array(self.contact))
+        return turn, rolled + aside, rolled - arc
 
-    def _touch_line(self, jx: Numbers, jz: Numbers, rest: float) -> Numbers:
-        ahead, above = self.along + self.contact, self.rise + self.height
+    def _aside(self, c: Numbers) -> Numbers:
+        """Return how far from c⁰ the middle of the pressures is: of a parabola cut short [m]."""
+        if not (self.rolls and self.depth > 0.0):
+            return 0.0 * c
+        widest = math.sqrt(2.0 * self.depth * self.radius)
+        load = moment = 0.0 * c
+        for side, room in ((-1.0, c - self.start), (1.0, self.end - c)):
+            reach = np.where(room.real < widest, room, widest)
+            square = reach * reach
+            load = load + reach * (self.depth - square / (6.0 * self.radius))
+            moment = moment + side * square * (self.depth / 2.0 - square / (8.0 * self.radius))
+        return np.asarray(moment / load)
+
+    def _touch_line(self, jx: Numbers, jz: Numbers) -> Numbers:
+        ahead, above = self.along + self.contact, self.above + self.height
         arm = math.hypot(ahead, above)
         gap = (self.point[0] - jx) * self.into[0] + (self.point[1] - jz) * self.into[1]
         toward = math.atan2(self.into[1], self.into[0])
         angle = toward - np.arccos(gap / arm) - math.atan2(above, ahead)
-        return np.asarray(angle - math.tau * np.round((angle.real - rest) / math.tau))
+        return _within_half_a_turn(angle - self.rest)
 
     def _place(
-        self, jx: Numbers, jz: Numbers, angle: Numbers, c: Numbers
+        self, jx: Numbers, jz: Numbers, turn: Numbers, c: Numbers
     ) -> tuple[Numbers, Numbers]:
         """Return (x, z) of the contact."""
-        cosine, sine = np.cos(angle), np.sin(angle)
-        ahead, above = self.along + c, self.rise + self.height
+        cosine, sine = np.cos(self.rest + turn), np.sin(self.rest + turn)
+        ahead, above = self.along + c, self.above + self.height
         return jx + ahead * cosine - above * sine, jz + ahead * sine + above * cosine
+
+
+def _within_half_a_turn(angle: Numbers) -> Numbers:
+    return np.asarray(angle - math.tau * np.round(angle.real / math.tau))
 
 
 class RollingContact:
@@ -184,9 +216,16 @@ class RollingContact:
         At rest, its proximal joint at the origin of F.
     section : Section or None
         The rock in its plane, in F; None if there is none.
+    depths : sequence of float, optional
+        How far its tiles are pressed in; not at all by default [m].
     """
 
-    def __init__(self, finger: SettledFinger, section: Section | None) -> None:
+    def __init__(
+        self,
+        finger: SettledFinger,
+        section: Section | None,
+        depths: Sequence[float] = (0.0,) * len(PHALANGES),
+    ) -> None:
         self.finger = finger
         self._angles = [contact.angle for contact in finger.contacts]
         self._links: dict[int, _Link] = {}
@@ -195,7 +234,7 @@ class RollingContact:
             phalanges = range(joint, end)
             bears = [i for i in phalanges if finger.contacts[i].kind != "none"]
             if bears and section is not None:
-                self._links[joint] = _link(finger, section, phalanges, bears[0])
+                self._links[joint] = _link(finger, section, joint, bears[0], depths[bears[0]])
 
     def move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
         """Return the finger after displacements of its base.
@@ -216,25 +255,25 @@ class RollingContact:
         jx, jz = x + nothing, z + nothing
         turned = turn + nothing
         angles: list[Numbers] = []
-        along = [contact.along + nothing for contact in contacts]
+        rolled: list[Numbers] = [nothing] * len(contacts)
         slips: list[Numbers] = [nothing] * len(contacts)
         joints: list[tuple[Numbers, Numbers]] = []
         for i, rest in enumerate(self._angles):
             if i in self._links:
                 link = self._links[i]
-                angle, along[link.bearing], slips[link.bearing] = link.turn(
-                    jx, jz, self._angles[link.bearing]
-                )
-                turned = angle - self._angles[link.bearing]
+                turned, rolled[link.bearing], slips[link.bearing] = link.turn(jx, jz)
             angle = rest + turned
             angles.append(angle)
             joints.append((jx, jz))
             jx, jz = jx + spacing * np.cos(angle), jz + spacing * np.sin(angle)
         theta = np.stack(angles, axis=-1)
-        c = np.stack(along, axis=-1)
+        on = np.stack(rolled, axis=-1)
         starts = np.stack([np.stack(pair, axis=-1) for pair in joints], axis=-2)
         cosine, sine = np.cos(theta), np.sin(theta)
-        height = self.finger.model.tile_height
+        tilts = np.array([each.tilt for each in contacts])
+        c = np.array([each.along for each in contacts]) + on * np.cos(tilts)
+        height = self.finger.model.tile_height + np.array([each.rise for each in contacts])
+        height = height + on * np.sin(tilts)
         points = starts + np.stack(
             [c * cosine - height * sine, c * sine + height * cosine], axis=-1
         )
@@ -250,38 +289,77 @@ class RollingContact:
         )
 
 
-def _link(finger: SettledFinger, section: Section, phalanges: range, bearing: int) -> _Link:
+def _link(finger: SettledFinger, section: Section, first: int, bearing: int, depth: float) -> _Link:
     model, contacts = finger.model, finger.contacts
-    contact, pivot = contacts[bearing], contacts[phalanges.start].joint
-    u, v = math.cos(contact.angle), math.sin(contact.angle)
-    ahead = (contact.joint[0] - pivot[0], contact.joint[1] - pivot[1])
-    near, far = model.tile_range
-    if contact.kind == "frame":
-        near, far = far, model.joint_spacing
+    contact, pivot = contacts[bearing], complex(*contacts[first].joint)
+    u = cmath.rect(1.0, contact.angle + contact.tilt)
     point = contact.point(model.tile_height)
-    gap = max(section.clearance(point), 0.0)
-    curvature = _curvature(section, contact, point, model.tile_length, gap)
-    flat = curvature * FLATTEST <= 1.0
-    rolls = not flat and contact.kind != "edge"
-    into = (-v, u)
+    joint = complex(*contact.joint)
+    ahead, arm = (joint - pivot) / u, (complex(*point) - joint) / u
+    into = (-u.imag, u.real)
     if contact.kind == "edge":
         out = section.normal(point)
         into = (-out[0], -out[1])
+        gap, away = max(section.clearance(point), 0.0), 0.0
+        curvature = _curvature(section, contact, point, model.tile_length, gap)
+    else:
+        curvature, away, gap = _under_face(section, point, u, model.tile_length)
+    near, far = model.tile_range
+    if contact.kind == "frame":
+        near, far, depth = far, model.joint_spacing, 0.0
+    start, end = (arm.real + (each - contact.along) for each in (near, far))
+    flat = curvature * FLATTEST <= 1.0
+    rolls = not flat and contact.kind != "edge" and start <= arm.real + away <= end
+    if rolls:
+        arm += away
+        point = (point[0] + away * u.real, point[1] + away * u.imag)
+        # of the face's line from the rock
+        gap = math.sqrt((1.0 / curvature + gap) ** 2 - away**2) - 1.0 / curvature
     return _Link(
-        phalanges=phalanges,
         bearing=bearing,
-        along=ahead[0] * u + ahead[1] * v,
-        rise=ahead[1] * u - ahead[0] * v,
+        along=ahead.real,
+        above=ahead.imag,
+        height=arm.imag,
+        rest=contact.angle + contact.tilt,
         rolls=rolls,
-        start=near,
-        end=far,
-        contact=contact.along,
-        height=model.tile_height,
+        start=start,
+        end=end,
+        contact=arm.real,
+        depth=depth,
         point=point,
         into=into,
         radius=math.inf if flat else 1.0 / curvature,
-        offset=0.0 if rolls else gap,
+        offset=gap if rolls else max(gap, 0.0),
     )
+
+
+def _under_face(
+    section: Section, point: Vector2, u: complex, length: float
+) -> tuple[float, float, float]:
+    """Return the rock's curvature under a face, and how far along it touches the circle there.
+
+    From the distances d of three places of the face, here and at e to both sides: of a circle whose
+    centre is at (a, b) from here, (R + d)² = (s − a)² + b² for s = −e, 0, e.
+
+    Returns
+    -------
+    curvature : float
+        1/R; zero where rock is flat or hollow [1/m].
+    away : float
+        a [m].
+    gap : float
+        The middle distance [m].
+    """
+    e = PROBE * 0.5 * length
+    before, here, after = (
+        section.clearance((point[0] + s * u.real, point[1] + s * u.imag)) for s in (-e, 0.0, e)
+    )
+    fall = before + after - 2.0 * here
+    square = 2.0 * e**2 - (before**2 + after**2 - 2.0 * here**2)
+    if not (fall > 0.0 and square > 0.0):
+        return 0.0, 0.0, here
+    radius = square / (2.0 * fall)
+    return 1.0 / radius, (before - after) * (2.0 * radius + before + after) / (4.0 * e), here
 
 
 def _curvature(

@@ -1,24 +1,16 @@
 """Where a finger is on rock that it is laid on from the base.
 
 A finger has three joints, so three conditions fix it. Bottom-up, each phalanx turns until its face
-meets the rock; with all three on the rock this is the paper's closing (Section 5.1). Other states,
-with fewer contacts, are among `hand_models.finger.postures`.
+meets the rock; with all three on the rock this is the paper's closing (Section 5.1). How a finger
+comes to other states `hand_models.finger.closing` finds.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Final
-
 from hand_models.finger.model import Contact, FingerModel, SettledFinger
 from hand_models.sections import Rest, Section, Vector2
 
-__all__ = ["CLEAR", "JOINTS", "intrusion", "settle_finger", "straight"]
-
-CLEAR: Final = 2e-5
-"""How far a face may seem to stand in the rock, by sampling and rounding [m]."""
-
-JOINTS: Final = 3
+__all__ = ["settle_finger"]
 
 
 def settle_finger(model: FingerModel, section: Section | None, joint: Vector2) -> SettledFinger:
@@ -75,26 +67,3 @@ def _bearing(model: FingerModel, section: Section, rest: Rest, joint: Vector2) -
     if section.clearance(edge.point(model.tile_height)) <= model.spine_travel:
         return edge
     return Contact(rest.angle, joint, rest.distance, "frame")
-
-
-def straight(model: FingerModel, section: Section | None) -> SettledFinger | None:
-    """Return the straight finger, its tiles off the rock; None where it stands in it."""
-    joints = [(i * model.joint_spacing, 0.0) for i in range(JOINTS)]
-    tile = (*model.tile_range, model.tile_height)
-    if section is not None and any(
-        section.face_clearance(joint, *tile, 0.0) < -CLEAR for joint in joints
-    ):
-        return None
-    contacts = (Contact(0.0, joint, model.tile_centre, "none", "balance") for joint in joints)
-    return SettledFinger(model, tuple(contacts))
-
-
-def intrusion(model: FingerModel, section: Section, *, straight: bool = False) -> float:
-    """Return about how deep the rock stands in the tiles of an open, or straight, finger [m]."""
-    joint, angle, deepest = (0.0, 0.0), 0.0, -math.inf
-    for lower in model.joint_lower:
-        angle += 0.0 if straight else lower
-        clearance = section.face_clearance(joint, *model.tile_range, model.tile_height, angle)
-        deepest = max(deepest, -clearance)
-        joint = Contact(angle, joint, 0.0, "none").end(model.joint_spacing)
-    return deepest

@@ -98,8 +98,8 @@ class TendonLoads:
             Whether a base tile comes first on the tendon.
         """
         first, second, third = self._drawn[base_tile]
-        (angle_0, _, q_0, c_0, kind_0), (angle_1, u_1, q_1, c_1, kind_1), last = laid
-        angle_2, u_2, q_2, c_2, kind_2 = last
+        (angle_0, _, q_0, c_0, kind_0, _), (angle_1, u_1, q_1, c_1, kind_1, _), last = laid
+        angle_2, u_2, q_2, c_2, kind_2, _ = last
         if not min(c_0, c_1, c_2) > 0.0:
             return None
         s_0 = first.shear(kind_0, closing)
@@ -123,7 +123,7 @@ class TendonLoads:
 def stays(
     laid: Sequence[ClosedPhalanx], loads: ClosureLoads, surface: Surface, tension: float
 ) -> bool:
-    """Whether no contact of a finger breaks at a tension; as `posture_loads.stay`."""
+    """Whether no contact of a finger breaks at a tension."""
     for phalanx, t, n in zip(laid, *loads, strict=True):
         normal = n.real + n.imag * tension
         if normal >= 0.0:

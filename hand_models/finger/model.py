@@ -17,19 +17,35 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable
 
-__all__ = ["PHALANGES", "Contact", "FingerModel", "SettledFinger", "Stop"]
+__all__ = [
+    "BALANCE",
+    "FREE",
+    "LOWER",
+    "PHALANGES",
+    "STOPS",
+    "UPPER",
+    "Contact",
+    "FingerModel",
+    "SettledFinger",
+    "Stop",
+]
 
 PHALANGES = ("proximal", "middle", "distal")
 
 Stop = Literal["upper", "lower", "balance"]
 """What holds a joint that no contact holds: its limit of closing or of opening, or nothing."""
+
+STOPS: Final[tuple[Stop | None, ...]] = (None, "upper", "lower", "balance")
+"""These by code; None where contacts hold it."""
+
+FREE, UPPER, LOWER, BALANCE = range(len(STOPS))
 
 
 @dataclass(frozen=True)
@@ -54,6 +70,10 @@ class FingerModel:
         g = c_p k_c / (k_c + K_p), shear per newton of further tension.
     spine_travel : float
         How far spines reach [m].
+    frame_radius : float
+        Of the bare phalanx about the line of its joints [m].
+    bed_stiffness : float
+        Of the bed of springs that a tile rests on, per tile [N/m].
     friction : float
         μ of M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
     """
@@ -71,6 +91,8 @@ class FingerModel:
     base_engagement: float
     shear_gain: float
     spine_travel: float
+    frame_radius: float
+    bed_stiffness: float
     friction: float
 
     @classmethod
@@ -98,6 +120,8 @@ class FingerModel:
             base_engagement=table.scalar("tile", "base_engagement"),
             shear_gain=table.scalar("tile", "pulley_ratio") * contact / (contact + spring),
             spine_travel=table.scalar("tile", "spine_travel"),
+            frame_radius=table.positive("finger", "frame_radius"),
+            bed_stiffness=table.positive("tile", "bed_stiffness"),
             friction=table.scalar("tendon", "friction"),
         )
         for name in (
@@ -147,6 +171,14 @@ class FingerModel:
         half = self.tile_length / 2.0
         return self.tile_centre - half, self.tile_centre + half
 
+    def depths(self, base_tile: bool) -> Array:
+        """Return how far tiles are pressed into their beds per newton of tension, (3,) [m/N].
+
+        By what the tendon presses with at the tiles' centres.
+        """
+        pull = self.losses(base_tile) * np.asarray(self.pulley_radii)
+        return np.asarray(pull / (self.tile_centre * self.bed_stiffness))
+
     def losses(self, base_tile: bool) -> Array:
         """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
 
@@ -169,11 +201,17 @@ class Contact:
     along : float
         c, of the contact from the joint along the phalanx [m].
     kind : {'face', 'edge', 'frame', 'none'}
-        Whether the tile's face touches, or one of its edges, or the bare frame beyond the tile, or
-        nothing.
+        Whether the tile touches with its face or with one of its edges (or its spines hold it to
+        the rock there), or the bare phalanx only presses, or nothing does.
     stop : {'upper', 'lower', 'balance'} or None
         The limit at which the joint stands, or ``balance`` where tendon and springs hold it without
         any contact; None where the contacts hold it.
+    rise : float
+        Of the contact above the tile's face; negative on the bare frame [m].
+    tilt : float
+        From the phalanx's normal to the direction in which it presses, as θ grows [rad].
+    engagement : float
+        Share of the tile's spines that are on the rock, if it touches.
     """
 
     angle: float
@@ -181,10 +219,14 @@ class Contact:
     along: float
     kind: str
     stop: Stop | None = None
+    rise: float = 0.0
+    tilt: float = 0.0
+    engagement: float = 1.0
 
     def point(self, height: float) -> tuple[float, float]:
-        """Return the place (x, z) on a face that is ``height`` above the joint's axis [m]."""
+        """Return the contact's place (x, z); ``height``: of the face above the joint's axis [m]."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        height += self.rise
         return (
             self.joint[0] + self.along * cosine - height * sine,
             self.joint[1] + self.along * sine + height * cosine,
@@ -218,8 +260,14 @@ class SettledFinger:
         return tuple(contact.kind in ("face", "edge") for contact in self.contacts)
 
     @cached_property
+    def engagement(self) -> Array:
+        """Share of each tile's spines that are on the rock, shape (3,)."""
+        shares = np.array([contact.engagement for contact in self.contacts])
+        return np.where(self.touching, shares, 0.0)
+
+    @cached_property
     def bearing(self) -> tuple[int, ...]:
-        """Phalanges that press on rock, with their tiles or their frames."""
+        """Phalanges that bear: that press on rock with their tiles or frames, or are held to it."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.kind != "none")
 
     @cached_property
@@ -239,8 +287,12 @@ class SettledFinger:
 
     @cached_property
     def directions(self) -> Array:
-        """Unit vectors u along the phalanges in (x, z) of F, shape (3, 2)."""
-        return np.array([(math.cos(c.angle), math.sin(c.angle)) for c in self.contacts])
+        """Unit vectors along which tiles drag away from the base, in (x, z) of F, shape (3, 2).
+
+        Along the phalanges, u, but for contacts that press aside of their normals.
+        """
+        angles = [contact.angle + contact.tilt for contact in self.contacts]
+        return np.column_stack([np.cos(angles), np.sin(angles)])
 
     @property
     def pin(self) -> tuple[float, float]:
@@ -265,7 +317,7 @@ class SettledFinger:
             Columns: at zero tension [N], per newton of tension. Zero where nothing is touched.
         """
         model = self.model
-        local = np.where(self.touching, self.losses(base_tile), 0.0)
+        local = self.engagement * self.losses(base_tile)
         at_zero = (np.asarray(model.engagement) - model.shear_gain) * closing_tension
         return np.column_stack([local * at_zero, local * model.shear_gain])
 

@@ -1,8 +1,9 @@
 """A finger laid on smooth rock, phalanx by phalanx from the base.
 
-This is `hand_models.finger.closure.settle_finger` for fingers of which every phalanx finds its
-rock, as those of a hand mostly do. What else may become of a finger is left to
-`hand_models.finger.contact_states`.
+This is `hand_models.finger.closure.settle_finger` for fingers whose phalanges all rest with the
+faces of their tiles, as those of a hand on smooth rock mostly do: there each has come to the rock
+and is held, and so they are at the ends of their paths (`hand_models.finger.closing`). What else
+may become of a finger is left to those.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import math
 from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.sections import LEVEL, Face, SmoothCut
+from hand_models.finger.phalanx_gaps import PhalanxShape
+from hand_models.sections import Face, SmoothCut
 
 __all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
 
@@ -37,6 +39,8 @@ class ClosedPhalanx(NamedTuple):
         c, of its contact from the joint [m].
     kind : int
         Code of `KINDS`.
+    bends : tuple of float
+        Curvature of the rock under the face, toward its beginning and its end [1/m].
     """
 
     angle: float
@@ -44,6 +48,26 @@ class ClosedPhalanx(NamedTuple):
     joint: complex
     along: float
     kind: int
+    bends: tuple[float, float] = (0.0, 0.0)
+
+    def pressed(self, face: Face, depth: float) -> ClosedPhalanx:
+        """Return it with the place where a bed of springs bears that is pressed in by a depth.
+
+        As of `hand_models.finger.phalanx_gaps`: the middle of the pressures where these are cut
+        short by an end of the tile. ``face``: of the tile.
+        """
+        near, far = (
+            min(end, math.sqrt(2.0 * depth / bend) if bend > 0.0 else math.inf)
+            for end, bend in zip(
+                (self.along - face.start, face.end - self.along), self.bends, strict=True
+            )
+        )
+        load = moment = 0.0
+        for side, reach, bend in zip((-1.0, 1.0), (near, far), self.bends, strict=True):
+            square = reach * reach
+            load += reach * (depth - bend * square / 6.0)
+            moment += side * square * (0.5 * depth - bend * square / 8.0)
+        return self._replace(along=self.along + moment / load)
 
 
 Rested = tuple[float, complex, float, bool]
@@ -61,7 +85,8 @@ class SequentialClosure:
     def __init__(self, model: FingerModel) -> None:
         near, self._far = model.tile_range
         self._spacing, self._centre = model.joint_spacing, model.tile_centre
-        self._travel = model.spine_travel
+        self.tile = Face(near, self._far, model.tile_height)
+        self._level = PhalanxShape.of(model).fine
         self._face = Face(near, model.joint_spacing, model.tile_height)
         ends = (complex(along, model.tile_height) for along in self._face[:2])
         self._ends = tuple((abs(end), end.conjugate() / abs(end), end) for end in ends)
@@ -76,7 +101,8 @@ class SequentialClosure:
         Returns
         -------
         list of ClosedPhalanx
-            Phalanges from the base on, as many as rest on rock one after the other.
+            Phalanges from the base on, as many as rest on rock with their tiles' faces one after
+            the other.
         """
         laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j
@@ -86,10 +112,13 @@ class SequentialClosure:
                 break
             turn, u, along, flat = rest
             angle += lower + turn
-            kind = FACE
-            if not flat and not self._face.start < along < self._far:
-                along, kind = self._beyond(cut, joint, u, along)
-            laid.append(ClosedPhalanx(angle, u, joint, along, kind))
+            bends = (0.0, 0.0)
+            if not flat:
+                if not self._face.start < along < self._far:
+                    # on an edge of the tile or beyond it
+                    break
+                bends = self._bends(cut, joint, u, along)
+            laid.append(ClosedPhalanx(angle, u, joint, along, FACE, bends))
             joint += self._spacing * u
         return laid
 
@@ -114,7 +143,7 @@ class SequentialClosure:
         turn, u = start if start[0] <= end[0] else end
         if turn > span:
             return None
-        level = abs(start[0] - end[0]) * (face.end - face.start) <= LEVEL
+        level = abs(start[0] - end[0]) * (face.end - face.start) <= self._level
         if level and all(cut.straight(joint + each * u) for _, _, each in self._ends):
             return turn, u, self._centre, True
         return turn, u, face.start if start[0] <= end[0] else face.end, False
@@ -140,12 +169,17 @@ class SequentialClosure:
                 first = turn, u
         return first
 
-    def _beyond(
+    def _bends(
         self, cut: SmoothCut, joint: complex, u: complex, along: float
-    ) -> tuple[float, int]:
-        """Return where a phalanx bears that rests on rock at an end of its tile or beyond."""
-        if along <= self._far:
-            return along, EDGE
-        if cut.distance(joint + complex(self._far, self._face.height) * u) <= self._travel:
-            return self._far, EDGE
-        return along, FRAME
+    ) -> tuple[float, float]:
+        """Return the rock's curvature from a contact toward both ends of the tile."""
+        ends = self.tile.start, self.tile.end
+        places = (joint + complex(end, self.tile.height) * u for end in ends)
+        # on a circle of radius R the distance is √(R² + e²) − R
+        near, far = (
+            2.0 * gap / (away * away - gap * gap) if away > gap > 0.0 else 0.0
+            for gap, away in zip(
+                map(cut.distance, places), (along - ends[0], ends[1] - along), strict=True
+            )
+        )
+        return near, far

@@ -2,13 +2,13 @@
 
 Fingers over smooth rock are laid on it (`hand_models.finger.sequential_closure`) and loaded by
 their tendons (`hand_models.finger.closure_loads`) one by one, of those that are alike one. Fingers
-that do not rest on all their phalanges, or whose contacts would break, are left to
-`hand_models.finger.contact_states`, as are fingers over other rock.
+that do not rest on all their phalanges, or whose contacts would break, are closed along their paths
+(`hand_models.finger.closing`), as are fingers over other rock.
 """
 
 from __future__ import annotations
 
-import cmath
+import math
 from collections.abc import Hashable, Sequence
 from typing import Final
 
@@ -25,9 +25,9 @@ from hand_models.finger import (
     ClosedPhalanx,
     ClosureLoads,
     OpenFinger,
+    Refused,
     cling,
     close_all,
-    intrusion,
     stays,
 )
 from hand_models.hand.model import HandModel
@@ -40,12 +40,13 @@ __all__ = ["ClosedFingers", "close_fingers"]
 FingerNumbers = list[float]
 """All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
 
-ANGLE, ALONG, JOINT, LOADS, ENGAGEMENT = 0, 1, slice(2, 4), slice(4, 8), 8
-CODES, PLACES = slice(9, 11), 11
-"""Numbers of a phalanx: its angle [rad], contact and joint [m]; its shear and normal load, each at
-zero tension [N] and per newton; the share of its tile's spines that are on the rock; the codes of
-its contact and its joint's stop; and in the finger's plane, each in homogeneous coordinates, its
-contact and its axes of shear and of normal load."""
+ANGLE, ALONG, RISE, TILT, JOINT = 0, 1, 2, 3, slice(4, 6)
+LOADS, ENGAGEMENT, CODES, PLACES = slice(6, 10), 10, slice(11, 13), 13
+"""Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
+its joint [m]; its shear and normal load, each at zero tension [N] and per newton; the share of its
+tile's spines that are on the rock; the codes of its contact and its joint's stop; and in the
+finger's plane, each in homogeneous coordinates, its contact and its axes of shear and of normal
+load."""
 
 TILE: Final = slice(LOADS.start, CODES.stop - 1)
 """Those that are its tile's as they are: the loads, the share, and the code of the contact."""
@@ -95,8 +96,10 @@ class ClosedFingers:
         codes = table[..., CODES].astype(np.int8)
         codes.setflags(write=False)
         joints = table[..., JOINT].view(complex)
-        numbers = (table[..., ANGLE], joints[..., 0], table[..., ALONG], codes[..., 0])
-        return [HandPostures(*hand) for hand in zip(*numbers, codes[..., 1], strict=True)]
+        angle, along, rise, tilt = (table[..., i] for i in (ANGLE, ALONG, RISE, TILT))
+        numbers = angle, joints[..., 0], along, rise, tilt, table[..., ENGAGEMENT]
+        kinds, stops = codes[..., 0], codes[..., 1]
+        return [HandPostures(*hand) for hand in zip(*numbers, kinds, stops, strict=True)]
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
         """Return finger, joint and torque of each joint of a hand that stands at a limit."""
@@ -155,11 +158,11 @@ def close_fingers(
     alone: dict[int, ClosedFinger] = {}
     for k, finger in zip(left, _alone(placed, left, tensions), strict=True):
         i = k // len(FINGERS)
-        if finger is not None:
+        if isinstance(finger, ClosedFinger):
             alone[k], row_of[k] = finger, len(rows)
             rows.append(_row_alone(finger))
         elif i not in errors:
-            errors[i] = _no_way(placed, i, k % len(FINGERS))
+            errors[i] = _no_way(placed, i, k % len(FINGERS), finger)
     return ClosedFingers(rows, row_of, alone)
 
 
@@ -173,6 +176,11 @@ def _row_laid(
     """Return the numbers of a finger that can be left as it is laid."""
     if len(laid) < len(PHALANGES) or placement.grasp.fingernail:
         return None
+    depths = hand.depths[base_tile]
+    laid = [
+        each.pressed(hand.sequential_closure.tile, depth * tension)
+        for each, depth in zip(laid, depths, strict=True)
+    ]
     loads = hand.tendon_loads.loads(laid, tension, base_tile)
     if loads is None or not stays(laid, loads, placement.surface, tension):
         return None
@@ -181,12 +189,12 @@ def _row_laid(
 
 def _alone(
     placed: PlacedHands, left: Sequence[int], tensions: Sequence[float]
-) -> list[ClosedFinger | None]:
+) -> list[ClosedFinger | Refused]:
     """Close fingers that could not be left as laid, those that are alike once."""
     hand = placed.hand
     keys: list[Hashable] = []
     closings: dict[Hashable, OpenFinger] = {}
-    closed: dict[Hashable, ClosedFinger | None] = {}
+    closed: dict[Hashable, ClosedFinger | Refused] = {}
     for k in left:
         i, finger = divmod(k, len(FINGERS))
         placement, cuts = placed.placements[i], placed.cuts(i)
@@ -205,48 +213,51 @@ def _alone(
     return [closed[key] for key in keys]
 
 
-def _no_way(placed: PlacedHands, index: int, finger: int) -> InvalidInputError:
+def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> InvalidInputError:
     """Return why a finger cannot close."""
-    straight = placed.placements[index].grasp.fingernail
-    section = placed.section(index, finger)
-    assert section is not None
-    depth = 1e3 * intrusion(placed.hand.finger, section, straight=straight)
-    how = "straight, to cling with its nail" if straight else "even with its joints fully open"
+    name = FINGERS[finger]
+    if not refused.depth > 0.0:
+        return InvalidInputError(
+            f"{name} comes to no rest on this rock: it is wedged between rock on both sides",
+            field="hold",
+        )
+    how = "even with its joints fully open"
+    if placed.placements[index].grasp.fingernail:
+        how = "straight, to cling with its nail"
+    lift = "move the hand away from the rock"
+    if math.isfinite(refused.lift):
+        lift = f"lifted by {1e3 * refused.lift:.1f} mm along -z of the hand it would be clear"
     return InvalidInputError(
-        f"the hold stands {depth:.1f} mm inside {FINGERS[finger]} {how}; "
-        "move the hand away from the rock",
-        field="hold",
+        f"the hold stands {1e3 * refused.depth:.1f} mm inside {name} {how}; {lift}", field="hold"
     )
 
 
-def _row(
-    phalanges: Sequence[ClosedPhalanx],
-    height: float,
-    loads: ClosureLoads,
-    stops: Sequence[int] = (FREE,) * len(PHALANGES),
-) -> FingerNumbers:
-    """Return the numbers of a finger; ``height`` of its tiles above the phalanges [m]."""
+def _row(phalanges: Sequence[ClosedPhalanx], height: float, loads: ClosureLoads) -> FingerNumbers:
+    """Return the numbers of a finger that is laid; ``height`` of its tiles [m]."""
     row: FingerNumbers = []
-    for (angle, u, joint, along, kind), t, n, stop in zip(phalanges, *loads, stops, strict=True):
+    for (angle, u, joint, along, kind, _), t, n in zip(phalanges, *loads, strict=True):
         place = joint + complex(along, height) * u
-        row += (angle, along, joint.real, joint.imag)
-        # a phalanx either has its tile on the rock, with all spines, or not at all
-        row += (t.real, t.imag, n.real, n.imag, float(kind <= EDGE), kind, stop)
+        # a phalanx that is laid either has its tile on the rock, with all spines, or not at all
+        row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
+        row += (t.real, t.imag, n.real, n.imag, float(kind <= EDGE), kind, FREE)
         row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 
 
 def _row_alone(closed: ClosedFinger) -> FingerNumbers:
     """Return the numbers of a finger that was closed on its own."""
-    contacts, model = closed.finger.contacts, closed.finger.model
-    phalanges = [
-        ClosedPhalanx(
-            c.angle, cmath.rect(1.0, c.angle), complex(*c.joint), c.along, KINDS.index(c.kind)
-        )
-        for c in contacts
-    ]
-    (t_0, t_1, t_2), (n_0, n_1, n_2) = (
-        [complex(*load) for load in loads.tolist()] for loads in (closed.shears, closed.normals)
-    )
-    stops = [STOPS.index(c.stop) for c in contacts]
-    return _row(phalanges, model.tile_height, ClosureLoads((t_0, t_1, t_2), (n_0, n_1, n_2)), stops)
+    finger = closed.finger
+    row: FingerNumbers = []
+    for contact, place, (x, z), shear, normal, share in zip(
+        finger.contacts,
+        finger.points.tolist(),
+        finger.directions.tolist(),
+        closed.shears.tolist(),
+        closed.normals.tolist(),
+        finger.engagement.tolist(),
+        strict=True,
+    ):
+        row += (contact.angle, contact.along, contact.rise, contact.tilt, *contact.joint)
+        row += (*shear, *normal, share, KINDS.index(contact.kind), STOPS.index(contact.stop))
+        row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0)
+    return row

@@ -61,6 +61,7 @@ class HandModel:
         self.nail = Fingernail.from_table(table)
         self.sequential_closure = SequentialClosure(self.finger)
         self.tendon_loads = TendonLoads(self.finger)
+        self.depths = [self.finger.depths(base_tile).tolist() for base_tile in (False, True)]
         # a tile on a finger's base only shifts the others on a tendon that rubs
         self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]
         # the diagonal of M (Eq. 8) of each finger, whose first tile an outer one's base has

@@ -32,15 +32,19 @@ class HandPostures(NamedTuple):
         θ of each phalanx [rad].
     joints : ndarray of complex
         x + i z of each joint in F [m].
-    alongs : ndarray
-        c, of each contact from its joint [m].
+    alongs, rises, tilts, engagement : ndarray
+        Of each contact: along its phalanx from the joint, above the tile's face [m], from the
+        phalanx's normal [rad], and the share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
-        Codes of `CONTACTS` and `hand_models.finger.postures.STOPS`.
+        Codes of `CONTACTS` and `hand_models.finger.STOPS`.
     """
 
     angles: Array
     joints: NDArray[np.complex128]
     alongs: Array
+    rises: Array
+    tilts: Array
+    engagement: Array
     kinds: NDArray[np.int8]
     stops: NDArray[np.int8]
 
@@ -50,8 +54,19 @@ class HandPostures(NamedTuple):
             SettledFinger(
                 model,
                 tuple(
-                    Contact(angle, (joint.real, joint.imag), along, CONTACTS[kind], STOPS[stop])
-                    for angle, joint, along, kind, stop in zip(*finger, strict=True)
+                    Contact(
+                        angle,
+                        (joint.real, joint.imag),
+                        along,
+                        CONTACTS[kind],
+                        STOPS[stop],
+                        rise,
+                        tilt,
+                        share,
+                    )
+                    for angle, joint, along, rise, tilt, share, kind, stop in zip(
+                        *finger, strict=True
+                    )
                 ),
             )
             for finger in zip(*(numbers.tolist() for numbers in self), strict=True)

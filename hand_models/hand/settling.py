@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.finger import FREE, KINDS, NONE, PHALANGES, ClosedPhalanx
-from hand_models.hand.closed_fingers import close_fingers
+from hand_models.finger import BALANCE, KINDS, NONE, PHALANGES, ClosedPhalanx
+from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import BASES
 from hand_models.hand.hooked_nails import hook_nails, no_nails
 from hand_models.hand.model import HandModel
@@ -84,7 +84,7 @@ def _settle(
     }
     closed = close_fingers(placed, laid, tensions, errors)
     postures = closed.of_hands()
-    for i, error in _too_slack(hand, postures, tensions):
+    for i, error in _too_slack(placed, closed, postures, tensions):
         errors.setdefault(i, error)
     tiles = tiles_on_rock(placed, closed, tensions)
     nails = [no_nails(hand.nail)] * len(placements)
@@ -135,14 +135,32 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
 
 
 def _too_slack(
-    hand: HandModel, postures: Sequence[HandPostures], tensions: Sequence[float]
+    placed: PlacedHands,
+    closed: ClosedFingers,
+    postures: Sequence[HandPostures],
+    tensions: Sequence[float],
 ) -> Iterator[tuple[int, InvalidInputError]]:
-    """Yield hands whose tendons do not close all joints that are to rest on the rock, and why."""
+    """Yield hands whose tendons do not close their fingers, and why."""
+    hand, placements = placed.hand, placed.placements
     angles = np.array([posture.angles for posture in postures])
-    closes = np.array([posture.stops for posture in postures]) == FREE
-    closes &= (np.array([posture.kinds for posture in postures]) != NONE).any(axis=2)[..., None]
+    stops, kinds = (
+        np.array([getattr(posture, name) for posture in postures]) for name in ("stops", "kinds")
+    )
+    idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
+    for i in idle.nonzero()[0].tolist():
+        if not placements[i].grasp.fingernail:
+            yield (
+                i,
+                InvalidInputError(
+                    f"must be larger: at {tensions[i]:g} N no finger comes to the rock",
+                    field="grasp.closing_tension",
+                ),
+            )
+    # fingers that are laid on the rock without asking for the path to it
+    closes = (kinds != NONE).all(axis=2)
+    closes.reshape(-1)[list(closed.alone)] = False
     turns = np.diff(angles, axis=2, prepend=0.0)
-    needed = np.where(closes, resting_tensions(hand.finger, turns, hand.losses), 0.0)
+    needed = np.where(closes[..., None], resting_tensions(hand.finger, turns, hand.losses), 0.0)
     short = needed.reshape(len(needed), -1).max(axis=1) > tensions
     for i in short.nonzero()[0].tolist():
         finger, joint = divmod(int(needed[i].argmax()), len(PHALANGES))

@@ -1,9 +1,10 @@
-from .mixed_rows import section_rows as section_rows
+from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .profile_section import ProfileSection as ProfileSection
-from .rows import Complexes as Complexes, Flags as Flags, SectionRows as SectionRows, Span as Span
+from .rows import Flags as Flags, SectionRows as SectionRows, Span as Span
 from .section import (
     LEVEL as LEVEL,
+    Complexes as Complexes,
     FlatSection as FlatSection,
     Rest as Rest,
     RoundSection as RoundSection,

@@ -16,7 +16,7 @@ from hand_models.base import Array
 from hand_models.sections.boundary import Boundary
 from hand_models.sections.first_contact import TurningFaces
 from hand_models.sections.rows import Span
-from hand_models.sections.section import Rest, Section, Vector2
+from hand_models.sections.section import Complexes, Rest, Section, Vector2
 
 __all__ = ["PolylineSection"]
 
@@ -67,12 +67,18 @@ class PolylineSection(Section):
     def _sweep(self, joint: Vector2, span: Span, low: float) -> TurningFaces:
         return TurningFaces(self.boundary, np.array([complex(*joint)]), span, np.array([low]))
 
+    def outline(self, reach: float, spacing: float) -> list[Complexes]:
+        return [piece[:, 0] + 1j * piece[:, 1] for piece in self.pieces]
+
     def clearance(self, point: Vector2) -> float:
         return float(self.boundary.clearances(np.array(complex(*point))))
 
+    def distances(self, places: Complexes) -> Array:
+        return self.boundary.clearances(places)
+
     def clearances(self, points: Array) -> Array:
         """Return the distances of points (n, 2) from the rock, negative inside [m]."""
-        return self.boundary.clearances(points[:, 0] + 1j * points[:, 1])
+        return self.distances(points[:, 0] + 1j * points[:, 1])
 
     def normal(self, point: Vector2) -> Vector2:
         out = self.boundary.normal(complex(*point))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from hand_models.sections.rows import Complexes, Span
 from hand_models.sections.section import Rest, Section, Vector2
 
 __all__ = ["ProfileSection"]
+
+ROUGH: Final = 256
+"""Parts of the disc of which those near a finger are looked at closely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,32 @@ class ProfileSection(Section):
         with np.errstate(invalid="ignore", divide="ignore"):
             angle = self._rows.touches(_place(joint), span, *_row(low, high))[0].item()
         return None if math.isnan(angle) else angle
+
+    def outline(self, reach: float, spacing: float) -> list[Complexes]:
+        half = -0.5 * math.pi if self.half_angle is None else self.half_angle
+        # how far the normal out of the disc turns from the crest to each side
+        most = 0.5 * math.pi - half
+        turns = np.linspace(-most, most, ROUGH + 1)
+        places = self._on_disc(turns)
+        steps = np.abs(np.diff(places))
+        near = (np.abs(places[:-1]) <= reach + steps).nonzero()[0]
+        chains = []
+        for i, count in zip(near, np.ceil(steps[near] / spacing).astype(int), strict=True):
+            between = np.linspace(turns[i], turns[i + 1], max(int(count), 1) + 1)
+            chains.append(self._on_disc(between))
+        if self.half_angle is not None:
+            for end, side in ((places[0], -1.0), (places[-1], 1.0)):
+                x, z = np.linalg.solve(self.M, [side * math.sin(half), math.cos(half)])
+                face = complex(x, z)
+                ray = end + np.array([0.0, (abs(end) + reach) / abs(face)]) * face
+                chains.append(ray if side > 0.0 else ray[::-1])
+        return chains if np.linalg.det(self.M) > 0.0 else [chain[::-1] for chain in chains]
+
+    def _on_disc(self, turns: Array) -> Complexes:
+        """Return places of the section on its disc, where the normal has turned from the crest."""
+        profile = self.radius * np.array([np.sin(turns), 1.0 - np.cos(turns)])
+        s, t = np.linalg.solve(self.M, profile - self.m[:, None])
+        return np.asarray(s + 1j * t)
 
     def clearance(self, point: Vector2) -> float:
         return float(self._rows.clearances(_place(point)).item())

@@ -8,28 +8,24 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices
-from hand_models.sections.section import LEVEL, FlatSection, RoundSection
+from hand_models.sections.section import LEVEL, Complexes
 
 __all__ = [
     "Complexes",
     "Flags",
-    "FlatRows",
     "Rests",
-    "RoundRows",
     "SectionRows",
     "SmoothRows",
     "Span",
     "angles_within",
 ]
 
-Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 
@@ -167,88 +163,6 @@ class SmoothRows(SectionRows, Generic[Numbers]):
         if flat.any():
             flat &= self._straight(joint, span, angle)
         return angle, distance, flat
-
-
-class _Flat(NamedTuple):
-    """Half-planes: angle and components of the direction into the rock, and its offset."""
-
-    bearing: Array
-    s: Array
-    t: Array
-    offset: Array
-
-
-class FlatRows(SmoothRows[_Flat]):
-    """Half-planes."""
-
-    @classmethod
-    def of(cls, sections: Sequence[FlatSection]) -> FlatRows:
-        """Gather sections, one a row."""
-        s, t, offset = np.array([(*each.direction, each.offset) for each in sections]).T
-        return cls(_Flat(np.arctan2(t, s), s, t, offset))
-
-    def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
-        # the cosine of how far both ends are from the direction into the rock, from outside
-        turn = np.arccos(self.clearances(joint) / span.arms)
-        return angles_within(self._numbers.bearing - turn - span.phases, low, high)
-
-    def clearances(self, points: Complexes) -> Array:
-        _, s, t, offset = self._numbers
-        return np.asarray(offset - s * points.real - t * points.imag)
-
-    def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
-        turn = angle - self._numbers.bearing
-        start, end = span.ends * np.cos(turn)
-        level = self.clearances(joint) + span.height * np.sin(turn)
-        return np.asarray(level - np.maximum(start, end))
-
-    def _straight(self, joint: Complexes, span: Span, angle: Array) -> bool:
-        return True
-
-
-class _Round(NamedTuple):
-    """Discs: centre, as s + i t, and radius."""
-
-    centre: Complexes
-    radius: Array
-
-
-class RoundRows(SmoothRows[_Round]):
-    """Discs."""
-
-    @classmethod
-    def of(cls, sections: Sequence[RoundSection]) -> RoundRows:
-        """Gather sections, one a row."""
-        s, t, radius = np.array([(*each.centre, each.radius) for each in sections]).T
-        return cls(_Round(s + 1j * t, radius))
-
-    def tangents(
-        self, joint: Complexes, span: Span, low: Array, high: Array
-    ) -> tuple[Array, Array]:
-        centre, radius = self._numbers
-        way, offset = centre - joint, radius + span.height
-        distance = np.abs(way)
-        angle = np.arctan2(way.imag, way.real) - np.arcsin(offset / distance)
-        return angles_within(angle, low, high), np.sqrt((distance - offset) * (distance + offset))
-
-    def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
-        centre, radius = self._numbers
-        way, arms = centre - joint, span.arms
-        distance = np.abs(way)
-        cosine = (arms * arms + distance * distance - radius * radius) / (2.0 * arms * distance)
-        angle = np.arctan2(way.imag, way.real) - np.arccos(cosine)
-        return angles_within(angle - span.phases, low, high)
-
-    def clearances(self, points: Complexes) -> Array:
-        centre, radius = self._numbers
-        return np.asarray(np.abs(points - centre) - radius)
-
-    def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
-        centre, radius = self._numbers
-        way = (centre - joint) * np.exp(-1j * angle)
-        start, end = span.ends
-        beside = way.real - np.minimum(np.maximum(way.real, start), end)
-        return np.asarray(np.hypot(beside, way.imag - span.height) - radius)
 
 
 def angles_within(angle: Array, low: Array, high: Array) -> Array:

@@ -17,12 +17,17 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array
 
 __all__ = [
+    "Complexes",
     "FlatSection",
     "Rest",
     "RoundSection",
@@ -31,6 +36,8 @@ __all__ = [
 ]
 
 Vector2 = tuple[float, float]
+
+Complexes = NDArray[np.complex128]
 
 LEVEL: Final = 1e-4
 """A face both of whose ends are this close to the rock when the first touches lies flat [m]."""
@@ -78,11 +85,28 @@ class Section(ABC):
         """Return the first angle at which the point (along, height) of a phalanx is on the rock."""
 
     @abstractmethod
+    def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
+        """Return the boundary of the rock as chains of points s + i t, rock on their left [m].
+
+        Parameters
+        ----------
+        reach : float
+            From the origin; what is farther off may be missing [m].
+        spacing : float
+            Of points along curved rock, about [m].
+        """
+
+    @abstractmethod
     def clearance(self, point: Vector2) -> float:
         """Return about how far a point is from the rock, negative inside [m].
 
         Exact on flat and round sections, and everywhere its sign is.
         """
+
+    def distances(self, places: Complexes) -> Array:
+        """Return about how far places (...) are from the rock, negative inside [m]."""
+        each = [self.clearance((place.real, place.imag)) for place in places.ravel().tolist()]
+        return np.array(each).reshape(places.shape)
 
     def rest(
         self, joint: Vector2, start: float, end: float, height: float, low: float, high: float
@@ -183,6 +207,12 @@ class FlatSection(Section):
     ) -> float:
         return min(self.clearance(_on_face(joint, a, height, angle)) for a in (start, end))
 
+    def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
+        into = complex(*self.direction)
+        if abs(self.offset) >= reach:
+            return []
+        return [into * (self.offset + 1j * reach * np.array([1.0, -1.0]))]
+
     def straight(self, point: Vector2) -> bool:
         return True
 
@@ -222,6 +252,21 @@ class RoundSection(Section):
         if abs(cosine) > 1.0:
             return None
         return _within(bearing - math.acos(cosine) - math.atan2(height, along), low, high)
+
+    def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
+        centre = complex(*self.centre)
+        away = abs(centre)
+        if not abs(away - self.radius) < reach:
+            return []
+        # as seen from the centre, the origin's side of the disc
+        half = math.pi
+        if away > 0.0 and self.radius + away > reach:
+            cosine = (away**2 + self.radius**2 - reach**2) / (2.0 * away * self.radius)
+            half = math.acos(min(max(cosine, -1.0), 1.0))
+        count = max(math.ceil(2.0 * half * self.radius / spacing), 16)
+        turns = np.linspace(-half, half, count + 1)
+        toward = -centre / away if away > 0.0 else 1.0
+        return [centre + self.radius * toward * np.exp(1j * turns)]
 
     def clearance(self, point: Vector2) -> float:
         distance = math.hypot(point[0] - self.centre[0], point[1] - self.centre[1])

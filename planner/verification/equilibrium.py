@@ -203,11 +203,16 @@ def _solved(
         out where a phalanx bears nothing.
     """
     model = known.hands[0].hand.finger
-    alongs = concatenated([hand.postures.alongs for hand in known.hands])
+    alongs, rises, tilts = (
+        concatenated([getattr(hand.postures, name) for hand in known.hands])
+        for name in ("alongs", "rises", "tilts")
+    )
     u = np.exp(1j * known.angles)
     steps = model.joint_spacing * u
     joints = steps.cumsum(axis=1) - steps
-    points = joints + (alongs + 1j * model.tile_height) * u
+    points = joints + (alongs + 1j * (model.tile_height + rises)) * u
+    # from here on along the tiles' drag, which is aside of phalanges that press aside
+    u = u * np.exp(1j * tilts)
     count = len(u)
     A = np.zeros((count, 2 * JOINTS, JOINTS), dtype=complex)
     # a force of the rock on phalanx j turns joint i ≤ j from x toward z (Jᵀ f_c)

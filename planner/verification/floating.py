@@ -3,13 +3,15 @@
 Nothing here is shared with the way the plan was found, which settles every finger in closed form
 and knows the tendon by its regimes. The postures that the plan tells are held against the chain of
 phalanges and the rock; slips are measured along the rock between a tile's contacts before and
-after; stick and slip of the tendon are solved as one complementarity problem
-(`FingerTendon.held`), and the normals from the balance of the free joints; what tiles do across the
-finger and the palm against the rock is put into their own laws (Section 5.3).
+after, and where its bed of springs bears between them is integrated; stick and slip of the tendon
+are solved as one complementarity problem (`FingerTendon.held`), and the normals from the balance of
+the free joints; what tiles do across the finger and the palm against the rock is put into their own
+laws (Section 5.3).
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 from typing import Final, NamedTuple
 
@@ -18,23 +20,17 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
-from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, TendonState, share_load
 from planner.result import WristPlan
+from planner.verification.rolling_contacts import Face, slip_of
 
 __all__ = ["ClaimedFinger", "FingerCheck", "check_finger", "check_palm", "moved"]
 
 PLACE: Final = 1e-9
-"""How far a contact may be from its phalanx, or from the rock [m]."""
+"""How far a contact may be above its phalanx, or below [m]."""
 
-BESIDE: Final = 4e-3
-"""How far beside a contact the rock is looked at, and twice that [m]."""
-
-STRAIGHT: Final = 1e-12
-"""Turn of the rock's normal below which it is flat [rad]."""
-
-ROUND: Final = 1e-11
-"""How far from a circle or a line rock may be that counts as one [m]."""
+BEARS: Final = 1e-7
+"""How far along it a contact may be from where its tile bears [m]."""
 
 
 class ClaimedFinger(NamedTuple):
@@ -125,26 +121,31 @@ def check_finger(
     wrong: list[str] = []
     angles, joints, points, slips = [], [], [], []
     exact = True
-    for phalanx, position, (drag, _, _), contact in zip(
-        PHALANGES, positions, axes, finger.contacts, strict=True
+    depths = model.depths(outer) * hand.closing_tension
+    for j, (position, (drag, _, _), contact) in enumerate(
+        zip(positions, axes, finger.contacts, strict=True)
     ):
-        u = np.array([-drag @ frame.along, -drag[2]])
+        way = np.array([-drag @ frame.along, -drag[2]])
         point = np.array([(position - frame.joint) @ frame.along, position[2]])
         point[1] -= frame.joint[2]
+        face = Face.of(contact, model, float(depths[j]))
         arm = point - joint
-        rise = u[0] * arm[1] - u[1] * arm[0]
-        if not abs(rise - model.tile_height) <= PLACE:
-            wrong.append(f"{phalanx} contact is {rise:.6g} m above its joint")
-        angles.append(math.atan2(u[1], u[0]))
+        rise = way[0] * arm[1] - way[1] * arm[0]
+        if not abs(rise - face.height) <= PLACE:
+            wrong.append(f"{PHALANGES[j]} contact is {rise:.6g} m above its joint")
+        dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
+        u = np.array([dragged.real, dragged.imag])
+        angles.append(cmath.phase(dragged))
         joints.append(joint)
         points.append(point)
         slip = 0.0
         if contact.kind in ("face", "edge") and section is not None:
             before = np.array(contact.point(model.tile_height))
-            lies = contact.angle if contact.kind == "face" else None
-            arc = _arc(section, before, point, u, lies)
-            exact &= arc is not None
-            slip = float(arm @ u) - contact.along - (arc or 0.0)
+            slipped, off = slip_of(section, face, (before, point), (float(arm @ way), way))
+            exact &= slipped is not None
+            slip = slipped or 0.0
+            if not abs(off) <= BEARS:
+                wrong.append(f"{PHALANGES[j]} contact is {off:.3g} m from where its tile bears")
         slips.append(slip)
         joint = joint + model.joint_spacing * u
     rest = np.array([contact.angle for contact in finger.contacts])
@@ -172,53 +173,6 @@ def check_finger(
     return FingerCheck(
         shear, normal, _laterals(hand, frame, own, wrist), stop, tension, tuple(wrong)
     )
-
-
-def _arc(
-    section: Section, before: Array, after: Array, u: Array, lies: float | None
-) -> float | None:
-    """Return how far the contact went along the rock, positive away from the base [m].
-
-    From the chord and the turn of the rock's normal, as on a circle; None where the rock is none
-    there: the model takes it as one, which only the model knows. ``lies``: the angle of a face that
-    touches at rest, which on a flat is the rock's own but for the search's tolerance [rad].
-    """
-    first, last = (np.array(section.normal((float(p[0]), float(p[1])))) for p in (before, after))
-    gap = _clearance(section, before)
-    if not _is_round(section, before - gap * first, first):
-        return None
-    turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
-    middle = first + last
-    tangent = np.array([-middle[1], middle[0]]) / float(np.linalg.norm(middle))
-    if lies is not None and abs(turn) < STRAIGHT:
-        tangent = np.array([math.cos(lies), math.sin(lies)])
-    sign = math.copysign(1.0, float(tangent @ u))
-    chord = float((after - before) @ tangent)
-    path = chord if abs(turn) < STRAIGHT else chord * (turn / 2.0) / math.sin(turn / 2.0)
-    return sign * (path - gap * turn)
-
-
-def _clearance(section: Section, point: Array) -> float:
-    return section.clearance((float(point[0]), float(point[1])))
-
-
-def _is_round(section: Section, foot: Array, out: Array) -> bool:
-    """Whether a section is a circle or a line about a place of it.
-
-    Beside a circle of radius R a point at e along its tangent is √(R² + e²) − R away from it.
-    """
-    aside = np.array([-out[1], out[0]])
-    near = [_clearance(section, foot + side * BESIDE * aside) for side in (1.0, -1.0)]
-    far = [_clearance(section, foot + 2.0 * side * BESIDE * aside) for side in (1.0, -1.0)]
-    away = 0.5 * sum(near)
-    if away < 0.0:
-        return False
-    expected = 0.0
-    if away > ROUND:
-        radius = (BESIDE**2 - away**2) / (2.0 * away)
-        expected = math.hypot(radius, 2.0 * BESIDE) - radius
-    spread = [*(x - away for x in near), *(x - expected for x in far)]
-    return max(map(abs, spread)) <= ROUND
 
 
 def _tendon(
@@ -266,7 +220,8 @@ def _normals(
         b[i] -= model.joint_stiffness[i] * bends[i]
         for j in range(i, count):
             arm = points[j] - joints[i]
-            u = np.array([math.cos(angles[j]), math.sin(angles[j])])
+            way = angles[j] + finger.contacts[j].tilt
+            u = np.array([math.cos(way), math.sin(way)])
             # the rock's forces on the phalanx: shear along u, the normal against (−u_z, u_x)
             b[i] += (arm[0] * u[1] - arm[1] * u[0]) * shear[j - count]
             A[i, j] = arm[0] * u[0] + arm[1] * u[1]

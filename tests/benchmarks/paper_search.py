@@ -54,15 +54,20 @@ def _finger(settled: SettledHand, name: str, finger: SettledFinger, step: float)
     while tension <= settled.hand.maximum_tension:
         forces = contact_forces(finger, tension, settled.closing_tension)
         if base:
-            touches = settled.tiles[mine[0]].contact == "face"
+            share = settled.engagement[mine[0]]
             gain = finger.model.shear_gain
             engagement = finger.model.base_engagement
             shear = engagement * settled.closing_tension + gain * (
                 tension - settled.closing_tension
             )
-            forces = np.vstack([[shear if touches else 0.0, 0.0], forces])
+            forces = np.vstack([[share * shear, 0.0], forces])
         if (forces[:, 0] >= 0.0).all():
-            if not all(_holds(settled, force) for force in forces):
+            shares = settled.engagement[mine]
+            if not all(
+                _holds(settled, force / share)
+                for force, share in zip(forces, shares, strict=True)
+                if share > 0.0
+            ):
                 break
             wrench = np.zeros(6)
             for tile, (shear, normal) in zip(mine, forces, strict=True):

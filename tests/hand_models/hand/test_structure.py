@@ -109,7 +109,7 @@ def test_wrench_rows_are_functions_of_the_wrench_alone(seed):
 
 OVERLOADS = {
     "finger_shear": ("structure", "finger_shear", 60.0, "tiles of", "in shear together", "N"),
-    "fingertip_force": ("structure", "fingertip_force", 1.0, "fingertip of", "in pressing", "N"),
+    "fingertip_force": ("structure", "fingertip_force", 0.3, "fingertip of", "in pressing", "N"),
     "hand_load": ("structure", "held_mass", 20.0, "the hand would hold", "N of", "N"),
     "motor_torque": ("motor", "maximum_torque", 1e-3, "would give", "mN·m of 1 mN·m", "N·m"),
     "motor_current": ("motor", "maximum_current", 0.06, "would draw", "A of 0.06 A", "A"),
@@ -119,8 +119,8 @@ OVERLOADS = {
 @pytest.mark.parametrize("limit", OVERLOADS)
 def test_a_plan_that_a_limit_overloads_names_it_and_prices_it(limit):
     section, name, value, *words, unit = OVERLOADS[limit]
-    # with the outer fingers half turned their tips press most
-    stance = on_wall(outer_rotation=1.0) if limit == "fingertip_force" else on_wall()
+    # with the outer fingers not turned their tips press before spines are pulled off
+    stance = on_wall(outer_rotation=0.0) if limit == "fingertip_force" else on_wall()
     weak = replace(stance.robot, hand=changed_hand(section, name, value))
     answer = plan(ask(replace(stance, robot=weak), "prices"))
     assert answer.status == "overloaded"

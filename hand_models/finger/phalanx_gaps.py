@@ -1,0 +1,196 @@
+"""How near the phalanges of fingers are to rock, and where they would press on it.
+
+A phalanx is a bar of circular section about its *axis*: straight under the tile, lifted by so much
+that the tile's face is flat at its height, and from the tile's far end on down to the next joint.
+So its tile is flat, its corners are round, and its end is a disc about the next joint, as the
+frame's radius makes them.
+
+Rock is points along its boundary, each with its length w. A point's depth g is its distance from
+the axis less the bar's radius. Phalanx and rock touch when g is zero somewhere; so that this does
+not jump from one bump to another as the phalanx turns, the *gap* is the level h to which a bed of
+springs between them would sink that takes a small, fixed energy,
+
+    Σ w max(0, h − g)² = tile length × fine²,
+
+less ``fine``: zero for a face that lies flat, and within a few ``fine`` of the least g elsewhere.
+
+**Where a contact's force acts.** A tile rests on what gives: on a bed of springs that is pressed in
+by ``depth`` beyond where it first touches. With p = w max(0, gap + depth − g) the force acts at
+the mean, weighted by p, of the places of the phalanx that points are nearest to, along the mean of
+their directions: in the middle of a face that lies flat, at the place of least distance on rock
+that bends away on both sides, at the face's end where the face stands on that. It goes from one to
+the other without a jump.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.finger.model import FingerModel
+from hand_models.sections import Complexes, Outlines
+
+__all__ = ["NEAREST", "Beside", "PhalanxShape", "fan_out", "nearest_points"]
+
+NEAREST: Final = 96
+"""How many points of rock are looked at for a phalanx: on flat rock, all along it and beyond."""
+
+POINTS: Final = 48
+"""Of rock, for the length of a tile."""
+
+FINENESS: Final = 4800.0
+"""Of the gap, in parts of the length of a tile."""
+
+MOST_STEPS: Final = 20
+LEVEL: Final = 1e-12
+"""Of the search for a level: how many steps, and how exactly, in parts of a tile's length."""
+
+TINY: Final = 1e-30
+
+
+class Beside(NamedTuple):
+    """Phalanges beside rock, shape (...); in a phalanx's axes, along + i above.
+
+    Attributes
+    ----------
+    gap : ndarray
+        From phalanx to rock, negative where it stands in it [m].
+    tile_gap : ndarray
+        From the tile's face alone [m].
+    place : ndarray of complex
+        Where the force of a contact acts [m].
+    push : ndarray of complex
+        Unit vector toward the rock along which it acts.
+    """
+
+    gap: Array
+    tile_gap: Array
+    place: Complexes
+    push: Complexes
+
+
+class PhalanxShape(NamedTuple):
+    """What of a phalanx meets rock, along it from its joint [m].
+
+    Attributes
+    ----------
+    near, far : float
+        Where the tile's face begins and ends.
+    end : float
+        Of the phalanx: the next joint.
+    lift : float
+        Of the axis under the tile, above the line of the joints.
+    radius : float
+        Of the bar.
+    travel : float
+        How far spines reach from the tile.
+    """
+
+    near: float
+    far: float
+    end: float
+    lift: float
+    radius: float
+    travel: float
+
+    @classmethod
+    def of(cls, model: FingerModel) -> PhalanxShape:
+        """Return the shape of a finger's phalanges."""
+        radius = min(model.frame_radius, model.tile_height)
+        lift = model.tile_height - radius
+        return cls(*model.tile_range, model.joint_spacing, lift, radius, model.spine_travel)
+
+    @property
+    def spacing(self) -> float:
+        """Of the points that rock is made of, at most [m]."""
+        return (self.far - self.near) / POINTS
+
+    @property
+    def fine(self) -> float:
+        """How far the gap may be from the least distance, about [m]."""
+        return (self.far - self.near) / FINENESS
+
+    def beside(
+        self, points: Complexes, lengths: Array, joint: Complexes, u: Complexes, depth: Array
+    ) -> Beside:
+        """Return how phalanges are beside rock.
+
+        Parameters
+        ----------
+        points : ndarray of complex, shape (..., p)
+            Of the rock; see `nearest_points` [m].
+        lengths : ndarray, shape (..., p)
+            [m]
+        joint, u : ndarray of complex, shape (...)
+            Of the phalanges: their joints [m] and their directions.
+        depth : ndarray, shape (...)
+            How far their tiles are pressed in [m].
+        """
+        seen = (points - joint[..., None]) * u.conj()[..., None]
+        away, from_tile = self._from_axis(seen)
+        size = np.abs(away)
+        depths = size - self.radius
+        gap = self._level(depths, lengths) - self.fine
+        pressed = np.maximum((gap + depth)[..., None] - depths, 0.0) * lengths
+        total = np.maximum(pressed.sum(axis=-1), TINY)
+        out = away / np.maximum(size, TINY)
+        place = (pressed * (seen - away + self.radius * out)).sum(axis=-1) / total
+        push = (pressed * out).sum(axis=-1) / total
+        return Beside(
+            gap,
+            from_tile.min(axis=-1) - self.radius,
+            place,
+            push / np.maximum(np.abs(push), TINY),
+        )
+
+    def _from_axis(self, seen: Complexes) -> tuple[Complexes, Array]:
+        """Return the way to points from the axis; and how far from under the tile they are [m]."""
+        from_tile = seen - (np.clip(seen.real, self.near, self.far) + 1j * self.lift)
+        corner, step = complex(self.far, self.lift), complex(self.end - self.far, -self.lift)
+        part = ((seen - corner) * step.conjugate()).real / abs(step) ** 2
+        beyond = seen - (corner + np.clip(part, 0.0, 1.0) * step)
+        distance = np.abs(from_tile)
+        return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
+
+    def _level(self, depths: Array, lengths: Array) -> Array:
+        """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
+        root = self.fine * np.sqrt(self.far - self.near)
+        least = depths.argmin(axis=-1)[..., None]
+        # no lower than with the nearest point alone
+        alone = np.take_along_axis(lengths, least, axis=-1)[..., 0]
+        level = np.take_along_axis(depths, least, axis=-1)[..., 0]
+        level = level + np.minimum(root / np.sqrt(alone), self.far)
+        for _ in range(MOST_STEPS):
+            sunk = np.maximum(level[..., None] - depths, 0.0)
+            load = lengths * sunk
+            norm = np.sqrt((load * sunk).sum(axis=-1))
+            step = (root - norm) * norm / np.maximum(load.sum(axis=-1), TINY)
+            # each as far as it needs, whatever others do
+            going = np.abs(step) > LEVEL * self.far
+            level = np.where(going, level + step, level)
+            if not going.any():
+                break
+        return np.asarray(level)
+
+
+def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
+    """Return joints [m] and directions of the phalanges of fingers turned by q, shape (..., 3)."""
+    u = np.exp(1j * np.cumsum(q, axis=-1))
+    joints = np.zeros(u.shape, dtype=complex)
+    joints[..., 1:] = spacing * np.cumsum(u[..., :-1], axis=-1)
+    return joints, u
+
+
+def nearest_points(rock: Outlines, shape: PhalanxShape, q: Array) -> tuple[Complexes, Array]:
+    """Return the points nearest each phalanx of fingers turned by q, (n, 3, `NEAREST`)."""
+    joints, u = fan_out(q, shape.end)
+    seen = (rock.points[:, None, :] - joints[..., None]) * u.conj()[..., None]
+    beyond = seen.real - np.clip(seen.real, shape.near, shape.end)
+    away = beyond * beyond + seen.imag**2
+    nearest = np.argpartition(away, NEAREST - 1, axis=-1)[..., :NEAREST]
+    # in their own order, so that sums do not depend on what other fingers are there
+    nearest.sort(axis=-1)
+    fingers = np.arange(len(q))[:, None, None]
+    return rock.points[fingers, nearest], rock.lengths[fingers, nearest]

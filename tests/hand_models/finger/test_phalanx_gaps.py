@@ -1,0 +1,179 @@
+"""How near a phalanx is to rock: the level of a bed of springs, and where its force acts."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out, nearest_points
+from hand_models.sections import FlatSection, Outlines, RoundSection
+from tests.suite.helpers.hands import HAND
+
+MODEL = HAND.finger
+SHAPE = PhalanxShape.of(MODEL)
+H = MODEL.tile_height
+DEPTH = 2e-4
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def beside(section, angle, joint=0.0, depth=DEPTH):
+    """A phalanx at an angle beside rock."""
+    rock = Outlines.of([section], 0.2, SHAPE.spacing, NEAREST)
+    u = np.exp(1j * np.asarray(angle, dtype=float))
+    shape = u.shape
+    points = np.broadcast_to(rock.points[0], (*shape, rock.points.shape[1]))
+    lengths = np.broadcast_to(rock.lengths[0], points.shape)
+    joints = np.broadcast_to(np.asarray(joint, dtype=complex), shape)
+    return SHAPE.beside(points, lengths, joints, u, np.broadcast_to(depth, shape))
+
+
+def flat(offset):
+    return FlatSection((0.0, 1.0), offset)
+
+
+def test_a_bar_is_as_high_as_its_tile_and_as_thick_as_the_frame():
+    assert SHAPE.lift + SHAPE.radius == pytest.approx(H)
+    assert SHAPE.radius == pytest.approx(MODEL.frame_radius)
+    assert (SHAPE.near, SHAPE.far) == MODEL.tile_range
+    assert SHAPE.end == MODEL.joint_spacing
+
+
+@pytest.mark.parametrize("off", [-1e-4, 0.0, 1e-4, 3e-3])
+def test_the_gap_of_a_face_that_lies_flat_is_its_distance(off):
+    found = beside(flat(H + off), 0.0)
+    assert found.gap == pytest.approx(off, abs=2e-7)
+    assert found.tile_gap == pytest.approx(off, abs=2e-6)
+    assert found.place.real == pytest.approx(MODEL.tile_centre, abs=5e-4)
+    assert found.place.imag == pytest.approx(H, abs=1e-5)
+    assert found.push == pytest.approx(1j, abs=0.03)
+
+
+def test_the_force_wanders_to_the_edge_of_a_face_that_tilts_without_a_jump():
+    """About the face's far end, which stays on the rock: from the middle to that."""
+    tilts = np.arange(0.0, 0.03, 1e-5)
+    corner = complex(SHAPE.far, SHAPE.lift)
+    joints = corner - corner * np.exp(1j * tilts)
+    found = beside(flat(H), tilts, joints)
+    np.testing.assert_allclose(found.gap, 0.0, atol=8.0 * SHAPE.fine)
+    place = found.place.real
+    assert place[0] == pytest.approx(MODEL.tile_centre, abs=5e-4)
+    assert place[-1] == pytest.approx(SHAPE.far, abs=2e-3)
+    assert np.abs(np.diff(place)).max() < 1e-4
+    assert np.diff(place).min() > -5e-5
+    assert np.abs(np.diff(np.angle(found.push))).max() < 1e-3
+    # it presses along the rock's normal, wherever on the bar it does
+    np.testing.assert_allclose(found.push * np.exp(1j * tilts), 1j, atol=0.03)
+
+
+def test_on_rock_that_bends_away_it_acts_where_the_distance_is_least():
+    for along in (0.012, 0.02, 0.028):
+        centre = along + 1j * (H + 0.05)
+        found = beside(RoundSection((centre.real, centre.imag), 0.05), 0.0)
+        assert found.place.real == pytest.approx(along, abs=3e-4)
+        assert found.push == pytest.approx(1j, abs=0.02)
+        assert -5.0 * SHAPE.fine < found.gap < 5.0 * SHAPE.fine
+
+
+def test_the_end_of_a_phalanx_presses_as_a_disc():
+    """On rock right ahead of it, and on rock behind its back."""
+    wall = FlatSection((1.0, 0.0), SHAPE.end + SHAPE.radius)
+    found = beside(wall, 0.0)
+    assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
+    assert found.place == pytest.approx(SHAPE.end + SHAPE.radius, abs=3e-4)
+    assert found.push == pytest.approx(1.0, abs=0.05)
+    behind = FlatSection((0.0, -1.0), SHAPE.radius)
+    found = beside(behind, 0.0)
+    assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
+    assert found.place == pytest.approx(complex(SHAPE.end, -SHAPE.radius), abs=5e-3)
+    assert found.push == pytest.approx(-1j, abs=0.1)
+
+
+def test_the_gap_of_the_tile_leaves_out_the_frame():
+    """A rung under the end of the phalanx: on the bar, but off the tile."""
+    centre = complex(SHAPE.end, SHAPE.radius + 0.003)
+    found = beside(RoundSection((centre.real, centre.imag), 0.003), 0.0)
+    corner = complex(SHAPE.far, SHAPE.lift)
+    assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
+    off = abs(centre - corner) - 0.003 - SHAPE.radius
+    assert found.tile_gap == pytest.approx(off, abs=1e-4)
+    assert off > 5e-3
+
+
+def bed(section, q, depth):
+    """Level of a bed of springs under each phalanx, from the bar's distances alone.
+
+    With the place and the direction of its force.
+    """
+    rock = Outlines.of([section], 0.2, SHAPE.spacing, NEAREST)
+    points, lengths = nearest_points(rock, SHAPE, q[None])
+    joints, u = fan_out(q, SHAPE.end)
+    return SHAPE.beside(points[0], lengths[0], joints, u, np.full(3, depth)), joints, u
+
+
+@settings(max_examples=150, deadline=None)
+@given(seeds)
+def test_the_gap_falls_by_the_arm_of_the_push(seed):
+    """Of a bed that is pressed in by no more than what makes its level: virtual work."""
+    rng = np.random.default_rng(seed)
+    if rng.random() < 0.5:
+        turn = rng.uniform(-0.5, 0.8)
+        section = FlatSection((-math.sin(turn), math.cos(turn)), float(rng.uniform(0.005, 0.03)))
+    else:
+        r = float(rng.uniform(0.01, 0.3))
+        section = RoundSection((float(rng.uniform(0.0, 0.1)), r + float(rng.uniform(0.0, 0.03))), r)
+    q = rng.uniform(-0.2, 0.6, 3)
+    # level = gap + fine
+    found, joints, u = bed(section, q, SHAPE.fine)
+    if (found.gap < -2e-3).any():
+        return
+    step = 1e-8
+    for j in range(3):
+        above, below = (bed(section, q + s * step * np.eye(3)[j], SHAPE.fine)[0] for s in (1, -1))
+        slope = (above.gap - below.gap) / (2.0 * step)
+        arms = (joints + found.place * u) - joints[j]
+        turned = (arms.conj() * found.push * u).imag
+        # the push is a mean of unit vectors made one long again
+        own = np.arange(3) >= j
+        np.testing.assert_allclose(slope[own], -turned[own], rtol=2e-2, atol=1e-4)
+        np.testing.assert_array_equal(slope[~own], 0.0)
+
+
+def test_gaps_are_within_a_few_of_the_least_distance():
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        r = float(rng.uniform(0.005, 0.3))
+        centre = complex(rng.uniform(0.01, 0.04), H + r + rng.uniform(0.0, 0.005))
+        found = beside(RoundSection((centre.real, centre.imag), r), 0.0)
+        part = np.linspace(0.0, 1.0, 4001)
+        corner = complex(SHAPE.far, SHAPE.lift)
+        axis = np.concatenate(
+            [
+                SHAPE.near + part * (SHAPE.far - SHAPE.near) + 1j * SHAPE.lift,
+                corner + part * (SHAPE.end - corner),
+            ]
+        )
+        least = np.abs(axis - centre).min() - r - SHAPE.radius
+        assert least - 2.0 * SHAPE.fine < found.gap < least + 8.0 * SHAPE.fine
+
+
+def test_phalanges_fan_out_from_the_first_joint():
+    q = np.array([0.3, -0.2, 0.5])
+    joints, u = fan_out(q, 0.04)
+    np.testing.assert_allclose(np.angle(u), [0.3, 0.1, 0.6])
+    np.testing.assert_allclose(joints, [0.0, 0.04 * u[0], 0.04 * (u[0] + u[1])])
+
+
+def test_the_points_looked_at_are_those_nearest_a_phalanx():
+    rock = Outlines.of([flat(H), flat(0.02)], 0.2, SHAPE.spacing, NEAREST)
+    q = np.array([[0.1, 0.0, 0.3], [0.0, 0.2, -0.1]])
+    points, lengths = nearest_points(rock, SHAPE, q)
+    assert points.shape == lengths.shape == (2, 3, NEAREST)
+    joints, u = fan_out(q, SHAPE.end)
+    for i in range(2):
+        for j in range(3):
+            along = joints[i, j] + np.linspace(SHAPE.near, SHAPE.end, 200) * u[i, j]
+            every = np.abs(rock.points[i][:, None] - along).min(axis=1)
+            mine = np.abs(points[i, j][:, None] - along).min(axis=1)
+            assert mine.max() <= np.sort(every)[NEAREST - 1] + 1e-5
