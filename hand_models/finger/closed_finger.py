@@ -75,7 +75,7 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
     if not len(going):
         return [each for each in found if each is not None]
-    drive = Drive.of(model, shape, [closings[i] for i in going.tolist()])
+    drive = Drive.of(model, [closings[i] for i in going.tolist()])
     start = np.where(blocked[:, None], lower, np.clip(0.0, lower, model.joint_upper))[going]
     with np.errstate(invalid="ignore", divide="ignore"):
         path = Path(take(rock, going), shape, drive, start)

@@ -35,6 +35,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger.path_state import (
+    CATCHING,
     CAUGHT,
     CLOSES,
     EYE,
@@ -71,9 +72,6 @@ SWITCHES: Final = 20
 
 INCREMENT: Final = 2.0 / 37.0
 """Most of the tension in an increment, in parts of the closing tension."""
-
-CATCHING: Final = 0.25
-"""How much of the path it is that spines across gaps are drawn in, in the same parts."""
 
 LEAST_INCREMENT: Final = 1e-4
 """By how much it grows where a contact changes, in the same parts."""
@@ -265,7 +263,7 @@ class Path:
         most = np.maximum(most, np.where(air, clear, 0.0))
         rate = times(around.d_gap, grow)
         until = np.where(~active & (rate < 0.0), (gap + 2.0 * CLOSES) / -rate, np.inf).min(axis=1)
-        end = (1.0 + CATCHING) * drive.closing
+        end = drive.end
         target = np.where(state.s < drive.closing, drive.closing, end)
         more = np.minimum(target - state.s, INCREMENT * drive.closing)
         more = np.minimum(more, (most - size).clip(0.0) / np.abs(grow).max(axis=1).clip(ROUNDING))
@@ -284,9 +282,7 @@ class Path:
         floor = LEAST_DAMPING * drive.torque
         shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
         damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
-        tougher = np.clip(
-            TOUGH * state.damping, DAMPING * drive.torque, MOST_DAMPING * drive.torque
-        )
+        tougher = _grows(state.damping, DAMPING, drive)
         rests = (state.s >= end) & ~waits & settled
         rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
         rests &= state.damping * size < balanced * drive.torque
@@ -378,7 +374,7 @@ class Path:
         stride = np.minimum(np.where(exact, 2.0, 1.3) * after.stride, MOST_STRIDE)
         # a damped increment that was as foreseen may be damped less
         falls = (wrong <= 0.05 * damped + ROUNDING * drive.torque) & (moved > 0.0)
-        falls &= (after.s >= (1.0 + CATCHING) * drive.closing) & (after.damping <= state.damping)
+        falls &= (after.s >= drive.end) & (after.damping <= state.damping)
         floor = LEAST_DAMPING * drive.torque
         good = after._replace(
             stride=stride,
@@ -386,11 +382,14 @@ class Path:
         )
         back = state._replace(
             stride=np.maximum(0.3 * moved, LEAST_STRIDE),
-            damping=np.clip(
-                TOUGH * after.damping, 0.5 * DAMPING * drive.torque, MOST_DAMPING * drive.torque
-            ),
+            damping=_grows(after.damping, 0.5 * DAMPING, drive),
         )
         return choose(too_far, back, good), choose(too_far, around, there)
+
+
+def _grows(damping: Array, least: float, drive: Drive) -> Array:
+    """Return more damping; from a least on, in parts of the proximal joint's torque."""
+    return np.clip(TOUGH * damping, least * drive.torque, MOST_DAMPING * drive.torque)
 
 
 def _falls(damping: Array, floor: Array) -> Array:

@@ -16,6 +16,7 @@ from hand_models.sections import Complexes, Flags, Outlines
 from hand_models.tile import engaged_share
 
 __all__ = [
+    "CATCHING",
     "CAUGHT",
     "CLOSES",
     "EYE",
@@ -58,6 +59,10 @@ off with their phalanx."""
 
 FIRST_STRIDE, MOST_STRIDE, LEAST_STRIDE = 0.06, 0.3, 1e-4
 """How far joints turn in an increment [rad]: through the air, at most, and after it was too far."""
+
+CATCHING: Final = 0.25
+"""How much of the path it is that spines across gaps are drawn in, in parts of the closing tension.
+"""
 
 TINY: Final = 1e-7
 """By which joints are turned for derivatives [rad]."""
@@ -102,7 +107,8 @@ class Drive(NamedTuple):
     upper: Array
 
     @classmethod
-    def of(cls, model: FingerModel, shape: PhalanxShape, closings: Sequence[OpenFinger]) -> Drive:
+    def of(cls, model: FingerModel, closings: Sequence[OpenFinger]) -> Drive:
+        """Gather what moves fingers of one model."""
         losses = np.array([model.losses(closing.base_tile) for closing in closings])
         closing = np.array([closing.tension for closing in closings])
         pull = losses * np.array(model.pulley_radii)
@@ -122,6 +128,11 @@ class Drive(NamedTuple):
             lower=lower,
             upper=upper,
         )
+
+    @property
+    def end(self) -> Array:
+        """How far along fingers are at the ends of their paths; see `State` [N]."""
+        return (1.0 + CATCHING) * self.closing
 
 
 class Around(NamedTuple):

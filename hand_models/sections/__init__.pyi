@@ -1,7 +1,7 @@
 from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .profile_section import ProfileSection as ProfileSection
-from .rows import Flags as Flags, SectionRows as SectionRows, Span as Span
+from .rows import Flags as Flags, Span as Span
 from .section import (
     LEVEL as LEVEL,
     Complexes as Complexes,

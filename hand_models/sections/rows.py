@@ -20,7 +20,6 @@ __all__ = [
     "Complexes",
     "Flags",
     "Rests",
-    "SectionRows",
     "SmoothRows",
     "Span",
     "angles_within",
@@ -77,30 +76,10 @@ class Rests(NamedTuple):
     blocked: Flags
 
 
-class SectionRows(ABC):
-    """Sections of one kind."""
-
-    @abstractmethod
-    def take(self, rows: Indices) -> SectionRows:
-        """Return some of the rows, or the same ones more than once."""
-
-    @abstractmethod
-    def clearances(self, points: Complexes) -> Array:
-        """Return about how far points (..., n) are from the rock, negative inside [m]."""
-
-    @abstractmethod
-    def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
-        """Return about how far faces at an angle are from the rock, negative if they cut it [m]."""
-
-    @abstractmethod
-    def rests(self, joint: Complexes, span: Span, low: Array, high: Array) -> Rests:
-        """Return where faces first meet the rock as their phalanges turn from low to high."""
-
-
 Numbers = TypeVar("Numbers", bound=tuple[Array | Complexes, ...])
 
 
-class SmoothRows(SectionRows, Generic[Numbers]):
+class SmoothRows(ABC, Generic[Numbers]):
     """Sections that a face touches with its line, or else with one of its ends.
 
     Parameters
@@ -112,7 +91,16 @@ class SmoothRows(SectionRows, Generic[Numbers]):
     def __init__(self, numbers: Numbers) -> None:
         self._numbers = numbers
 
+    @abstractmethod
+    def clearances(self, points: Complexes) -> Array:
+        """Return about how far points (..., n) are from the rock, negative inside [m]."""
+
+    @abstractmethod
+    def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
+        """Return about how far faces at an angle are from the rock, negative if they cut it [m]."""
+
     def take(self, rows: Indices) -> Self:
+        """Return some of the rows, or the same ones more than once."""
         if self._numbers[0].shape[-1] == 1:
             return self
         taken = object.__new__(type(self))
@@ -137,6 +125,7 @@ class SmoothRows(SectionRows, Generic[Numbers]):
         return False
 
     def rests(self, joint: Complexes, span: Span, low: Array, high: Array) -> Rests:
+        """Return where faces first meet the rock as their phalanges turn from low to high."""
         blocked = self.face_clearances(joint, span, low) <= 0.0
         tangents = self.tangents(joint, span, low, high)
         if tangents is None:
