@@ -20,7 +20,16 @@ from hand_models.finger.model import (
     SettledFinger,
 )
 from hand_models.finger.open_finger import ClosedFinger, OpenFinger, Refused
-from hand_models.finger.path_state import CAUGHT, CLOSES, JOINTS, OFF, Codes, Drive, take
+from hand_models.finger.path_state import (
+    CAUGHT,
+    CLOSES,
+    JOINTS,
+    OFF,
+    Around,
+    Codes,
+    Drive,
+    take,
+)
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
 from hand_models.sections import Flags, Outlines, Section
 
@@ -66,26 +75,44 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     shape = PhalanxShape.of(model)
     sections = [closing.section for closing in closings]
     rock = Outlines.of(sections, model.reach + model.tile_length, shape.spacing, NEAREST)
-    lower = np.tile(model.joint_lower, (len(closings), 1))
-    blocked = np.array([_depth(shape, section, np.zeros(JOINTS)) > CLOSES for section in sections])
+    drive = Drive.of(model, closings)
+    lower, straight = drive.lower, np.clip(0.0, drive.lower, drive.upper)
+    blocked = _in_rock(rock, shape, drive, sections, straight)
+    shut = blocked & _in_rock(rock, shape, drive, sections, lower)
     found = [
         _refused(shape, section, q) if starts else None
-        for section, q, starts in zip(sections, lower, blocked.tolist(), strict=True)
+        for section, q, starts in zip(sections, lower, shut.tolist(), strict=True)
     ]
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
     if not len(going):
         return [each for each in found if each is not None]
-    drive = Drive.of(model, [closings[i] for i in going.tolist()])
-    start = np.where(blocked[:, None], lower, np.clip(0.0, lower, model.joint_upper))[going]
+    start = np.where(blocked[:, None], lower, straight)[going]
+    rock, drive = take(rock, going), take(drive, going)
     with np.errstate(invalid="ignore", divide="ignore"):
-        path = Path(take(rock, going), shape, drive, start)
+        path = Path(rock, shape, drive, start)
         path.follow()
     closed = _closed(path, model, closings, going)
     return [next(closed) if each is None else each for each in found]
 
 
+def _in_rock(
+    rock: Outlines,
+    shape: PhalanxShape,
+    drive: Drive,
+    sections: Sequence[Section | None],
+    q: Array,
+) -> Flags:
+    """Return which fingers turned by q have rock in them, at their sides or all over."""
+    near = Around.of(rock, shape, drive, q).gap.min(axis=1) < -CLOSES
+    inside = [_depth(shape, *each) > shape.radius for each in zip(sections, q, strict=True)]
+    return np.asarray(near | np.array(inside))
+
+
 def _depth(shape: PhalanxShape, section: Section | None, q: Array, lift: float = 0.0) -> float:
-    """Return how deep rock is in a finger turned by q and lifted, below zero if clear [m]."""
+    """Return about how deep rock is in a finger turned by q and lifted, below zero if clear [m].
+
+    Where it is deeper than the bar's radius, the axis is in the rock.
+    """
     if section is None:
         return -np.inf
     joints, u = fan_out(q, shape.end)

@@ -64,7 +64,7 @@ from hand_models.tile import pull_strength
 
 __all__ = ["Path"]
 
-MOST_STEPS: Final = 600
+MOST_STEPS: Final = 2400
 """On a path."""
 
 SWITCHES: Final = 20
@@ -82,6 +82,9 @@ RESTS, RESTS_DAMPED = 1e-10, 1e-7
 DAMPING, LEAST_DAMPING, TOUGH = 0.1, 0.025, 4.0
 """D at first and at last where it is needed, in parts of the torque of the proximal joint at the
 closing tension over a turn of one radian; and by how much it grows."""
+
+GIVES: Final = 1.0 / 4800.0
+"""By how much gaps may grow before their spines hold, in parts of a tile's length."""
 
 SLOWER: Final = 4.0
 """How much damping takes off the forces of contacts that come back to the rock."""
@@ -147,7 +150,7 @@ class Path:
         going = np.arange(len(self.rests))
         rock, drive, state, around = self._rock, self._drive, self.end, self.around
         for step in range(MOST_STEPS):
-            balanced = BALANCED[step > MOST_STEPS // 4]
+            balanced = BALANCED[step > MOST_STEPS // 16]
             after, rests = self._increment(drive, state, around, balanced)
             if rests.any():
                 self.rests[going[rests]] = True
@@ -172,15 +175,15 @@ class Path:
         closing = (state.s < drive.closing)[:, None]
         catching = CATCHING * drive.closing[:, None]
         dragged = state.been | (mode == ON)
-        across = np.where(
-            state.stop == 0, (state.s - drive.closing)[:, None].clip(0.0) / catching, 0.0
-        )
-        part = np.where(dragged, 1.0, across)
+        # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
+        bears = (mode != OFF) | (state.stop == 0)
+        across = (state.s - drive.closing)[:, None].clip(0.0) / catching
+        part = np.where(dragged, 1.0, across) * bears
         drag = np.where(caught, drive.drag * part, 0.0)
         shears = drag * around.share * f
         d_shears = (drag * f)[..., None] * around.d_share
         # per newton of s
-        late = caught & ~dragged & (state.stop == 0)
+        late = caught & bears & ~dragged
         grows = np.where(closing, drag, np.where(late, drive.drag * f / catching, 0.0))
         grows = grows * around.share
         normals = np.where(mode != OFF, state.normals, 0.0)
@@ -199,7 +202,7 @@ class Path:
         self, drive: Drive, state: State, around: Around, balanced: float
     ) -> tuple[State, Flags]:
         """Return where fingers come to next, and which of them are at their ends."""
-        stride = state.stride
+        stride, gives = state.stride, GIVES * self._length
         caught = (state.spines == CAUGHT) & (around.share > 0.0)
         # how far a phalanx may be off the rock
         near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
@@ -226,7 +229,7 @@ class Path:
             # damped joints may be slow in leaving where they should not be
             slow = (state.damping > STIFF * drive.torque)[:, None]
             closes = ~active & (gap < -CLOSES) & ((change < 0.0) | ~slow)
-            grows = ~active & caught & (gap > least + CLOSES) & ((change > 0.0) | ~slow)
+            grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
             balance = forces.torque - times(damped, turn[..., 0])
             balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
             frees = held & (stop * balance < -ROUNDING * drive.torque[:, None])
@@ -256,11 +259,10 @@ class Path:
         waits &= state.damping < MOST_DAMPING * drive.torque
         turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
         turns_back &= (size > 100.0 * RESTS) & ~waits
-        # as far as the joints may turn, and no gap closes
+        # as far as the joints may turn, whose arms are of one, two and three phalanges
         air = ~active.any(axis=1)
-        clear = np.maximum(around.gap.min(axis=1), 0.0) / (JOINTS * self._shape.end)
-        most = np.minimum(stride, np.where(air, FIRST_STRIDE, MOST_STRIDE))
-        most = np.maximum(most, np.where(air, clear, 0.0))
+        clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * self._shape.end)
+        most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
         rate = times(around.d_gap, grow)
         until = np.where(~active & (rate < 0.0), (gap + 2.0 * CLOSES) / -rate, np.inf).min(axis=1)
         end = drive.end
@@ -369,7 +371,7 @@ class Path:
         deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
         too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
         too_far |= deeper.max(axis=1) > DEEPEST * self._length
-        too_far &= moved > LEAST_STRIDE
+        too_far &= moved > 2.0 * LEAST_STRIDE
         exact = wrong < EXACT * drive.torque
         stride = np.minimum(np.where(exact, 2.0, 1.3) * after.stride, MOST_STRIDE)
         # a damped increment that was as foreseen may be damped less
@@ -380,9 +382,10 @@ class Path:
             stride=stride,
             damping=np.where(falls, _falls(after.damping, floor), after.damping),
         )
+        tougher = _grows(after.damping, 0.5 * DAMPING, drive)
         back = state._replace(
             stride=np.maximum(0.3 * moved, LEAST_STRIDE),
-            damping=_grows(after.damping, 0.5 * DAMPING, drive),
+            damping=np.where(after.s > state.s, after.damping, tougher),
         )
         return choose(too_far, back, good), choose(too_far, around, there)
 

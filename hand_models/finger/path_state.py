@@ -259,6 +259,8 @@ def put(rows: Rows, fingers: Indices, own: Rows) -> None:
 
 def choose(chosen: Flags, those: Rows, others: Rows) -> Rows:
     """Return those for fingers that are chosen, others for the rest."""
+    if not chosen.any():
+        return others
     return type(those)(
         *(
             np.where(chosen.reshape(-1, *[1] * (this.ndim - 1)), this, other)

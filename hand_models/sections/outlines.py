@@ -22,6 +22,9 @@ NOTHING: Final = 1e-12
 ROUNDING: Final = 1e-9
 """Of how many parts a piece has."""
 
+SHARP: Final = math.radians(15.0)
+"""By how much an outline turns where it has a corner."""
+
 
 class Outlines(NamedTuple):
     """Rock in the planes of n fingers.
@@ -63,16 +66,19 @@ class Outlines(NamedTuple):
 
 
 def _points(section: Section | None, reach: float, spacing: float) -> Outlines:
-    """Return places in the middle of equal parts of the boundary within reach."""
+    """Return places along the boundary within reach, at its corners as well."""
     found = [Outlines(np.zeros(0, dtype=complex), np.zeros(0))]
     for chain in () if section is None else section.outline(reach, spacing):
         begin, step = chain[:-1], np.diff(chain)
         size = np.abs(step)
         part = -(begin * step.conj()).real / np.maximum(size * size, NOTHING**2)
         near = np.abs(begin + np.clip(part, 0.0, 1.0) * step) <= reach
-        # runs of pieces that come within reach
+        # runs of pieces that come within reach, from corner to corner
         ends = np.diff(near.astype(np.int8), prepend=0, append=0).nonzero()[0]
-        for first, last in ends.reshape(-1, 2).tolist():
+        turns = np.abs(np.angle(step[1:] * step[:-1].conj())) > SHARP
+        corners = (turns & near[1:] & near[:-1]).nonzero()[0] + 1
+        stops = np.sort(np.concatenate([ends, corners, corners]))
+        for first, last in stops.reshape(-1, 2).tolist():
             found.append(_parts(chain[first : last + 1], size[first:last], spacing))
     points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
     kept = np.abs(points) <= reach
@@ -80,11 +86,10 @@ def _points(section: Section | None, reach: float, spacing: float) -> Outlines:
 
 
 def _parts(chain: Complexes, size: Array, spacing: float) -> Outlines:
-    """Return places in the middle of equal parts of a chain whose pieces have these lengths [m]."""
+    """Return the ends of equal parts of a chain whose pieces have these lengths [m]."""
     at = np.append(0.0, np.cumsum(size))
     count = max(math.ceil(at[-1] / spacing - ROUNDING), 1)
-    middle = (np.arange(count) + 0.5) * (at[-1] / count)
-    piece = np.clip(np.searchsorted(at, middle, side="right") - 1, 0, len(size) - 1)
-    way = np.diff(chain)[piece] / np.maximum(size[piece], NOTHING)
-    points = chain[piece] + (middle - at[piece]) * way
-    return Outlines(points, np.full(count, at[-1] / count))
+    places = np.linspace(0.0, at[-1], count + 1)
+    lengths = np.full(count + 1, at[-1] / count)
+    lengths[[0, -1]] *= 0.5
+    return Outlines(np.interp(places, at, chain), lengths)

@@ -79,18 +79,18 @@ class ProfileSection(Section):
         turns = np.linspace(-most, most, ROUGH + 1)
         places = self._on_disc(turns)
         steps = np.abs(np.diff(places))
-        near = (np.abs(places[:-1]) <= reach + steps).nonzero()[0]
-        chains = []
-        for i, count in zip(near, np.ceil(steps[near] / spacing).astype(int), strict=True):
-            between = np.linspace(turns[i], turns[i + 1], max(int(count), 1) + 1)
-            chains.append(self._on_disc(between))
+        near = np.abs(places[:-1]) <= reach + steps
+        parts = np.where(near, np.ceil(steps / spacing), 1.0).clip(1.0)
+        at = np.append(0.0, np.cumsum(parts))
+        places = self._on_disc(np.interp(np.arange(at[-1] + 1.0), at, turns))
         if self.half_angle is not None:
+            ends = []
             for end, side in ((places[0], -1.0), (places[-1], 1.0)):
                 x, z = np.linalg.solve(self.M, [side * math.sin(half), math.cos(half)])
                 face = complex(x, z)
-                ray = end + np.array([0.0, (abs(end) + reach) / abs(face)]) * face
-                chains.append(ray if side > 0.0 else ray[::-1])
-        return chains if np.linalg.det(self.M) > 0.0 else [chain[::-1] for chain in chains]
+                ends.append(end + (abs(end) + reach) / abs(face) * face)
+            places = np.concatenate([ends[:1], places, ends[1:]])
+        return [places if np.linalg.det(self.M) > 0.0 else places[::-1]]
 
     def _on_disc(self, turns: Array) -> Complexes:
         """Return places of the section on its disc, where the normal has turned from the crest."""

@@ -134,6 +134,10 @@ def distinct(points: Array, slack: float) -> Array:
     """Return the points that differ by more than ``slack`` in some coordinate."""
     if len(points) < 2:
         return points
+    # of very many alike the tree would list all pairs
+    cells = np.round(points / (10.0 * slack))
+    _, first = np.unique(cells, axis=0, return_index=True)
+    points = points[np.sort(first)]
     pairs = KDTree(points).query_pairs(10.0 * slack, p=np.inf, output_type="ndarray")
     keep = np.ones(len(points), dtype=bool)
     keep[pairs[:, 1]] = False

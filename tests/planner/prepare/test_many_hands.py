@@ -15,6 +15,9 @@ from tests.suite.helpers import peer
 from tests.suite.helpers.crawlers import crawler_in, crawler_question
 from tests.suite.helpers.efforts import promised, told_effort
 
+UNPROVEN = 1e-3
+"""How far plans may be from the least utilisation that warn that it is not proven."""
+
 
 @pytest.fixture(scope="module")
 def crawler(tmp_path_factory) -> Robot:
@@ -33,7 +36,9 @@ def check(asked: Question, margin: Plan, effort: Plan, tolerance: float) -> None
     best = peer.least_utilisation(asked, [hand.space for hand in margin.hands])
     assert best.status == 0, best.message
     used = max(hand.utilisation for hand in margin.hands)
-    assert used == pytest.approx(best.fun, abs=tolerance)
+    # where a search for floating wrists ended early, which it says, another may be a little better
+    early = UNPROVEN if margin.warnings else 0.0
+    assert best.fun - tolerance <= used <= best.fun + tolerance + early
     assert effort.effort <= margin.effort + 1e-9
     if not effort.warnings:
         assert promised(asked, effort, 1.0 + SLACK) <= 10.0 * tolerance

@@ -140,9 +140,11 @@ class PlainFinger:
         return Beside(found.gap, share, -arms.imag, -arms.real)
 
     def shears(self, beside: Beside, tension: float, late: float) -> np.ndarray:
-        dragged = self.been | (np.array(self.modes) == ROCK)
-        part = np.where(dragged, 1.0, np.where(np.array(self.sides) == FREE, late, 0.0))
-        return np.asarray(np.where(self.able, part, 0.0) * self.drag * beside.share * tension)
+        modes, sides = np.array(self.modes), np.array(self.sides)
+        part = np.where(self.been | (modes == ROCK), 1.0, late)
+        # off the rock, a phalanx whose joint is at a limit is drawn in by nothing
+        bears = self.able & ((modes != AIR) | (sides == FREE))
+        return np.asarray(np.where(bears, part, 0.0) * self.drag * beside.share * tension)
 
     def torque(self, beside: Beside, q: np.ndarray, tension: float, late: float) -> np.ndarray:
         """Of tendon, springs and drag; the normal forces are still to be found."""
