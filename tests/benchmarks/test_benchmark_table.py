@@ -55,6 +55,7 @@ def test_tables_are_put_between_the_marks_and_nowhere_else(tmp_path):
         into(file, "")
 
 
+@pytest.mark.slow
 def test_the_command_measures_every_part(tmp_path):
     pytest.importorskip("qoco")
     pytest.importorskip("pycapacity")

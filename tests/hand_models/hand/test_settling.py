@@ -179,7 +179,7 @@ def turned(frame, angle):
     )
 
 
-@settings(max_examples=35, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(seeds)
 def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
     rng = np.random.default_rng(seed)
@@ -200,7 +200,7 @@ def test_tendons_that_rub_load_outer_fingers_less(seed):
             check_hand(placement, settled, hand)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(seeds)
 def test_neither_company_nor_order_changes_a_hand(seed):
     rng = np.random.default_rng(seed)
@@ -415,7 +415,7 @@ def test_recent_answers_are_those_asked_for_last(most, steps):
 # The bottom-up state of a finger ------------------------------------------------------------------
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_a_finger_is_laid_as_on_its_section(seed):
     """On planes of any tilt through smooth holds."""

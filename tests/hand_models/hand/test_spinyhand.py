@@ -19,6 +19,7 @@ from hand_models import (
     Sphere,
 )
 from hand_models.finger import PHALANGES
+from hand_models.hand import Placement
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, settled_at
 from tests.suite.helpers.rocks import in_hand
 
@@ -28,6 +29,13 @@ MESH_ORIGIN = np.array([-19.85, 0.0, 43.4])
 MIRROR = np.array([1.0, -1.0, 1.0])
 
 seeds = st.integers(0, 2**32 - 1)
+
+
+def off_a_wall(offs):
+    """Hands whose outer fingers are not turned, off a wall by so much [m]."""
+    poses = [Pose(np.array([0.0, 0.0, off]), np.eye(3)) for off in offs]
+    grasp = Grasp(outer_rotation=0.0)
+    return HAND.settle_each([Placement(Plane(), ROCK, grasp, pose) for pose in poses])
 
 
 def test_the_hand_has_22_tiles_8_of_them_in_the_palm():
@@ -141,12 +149,8 @@ def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
 
 
 def test_what_a_palm_carries_fades_with_its_distance_from_the_rock():
-    grasp, found = Grasp(outer_rotation=0.0), []
-    for gap in np.linspace(0.0, 5.01e-3, 502):
-        pose = Pose(np.array([0.0, 0.0, gap]), np.eye(3))
-        palm = HAND.settle(Plane(), ROCK, grasp, pose).palm
-        found.append((palm.shear_limit, palm.pressing_limit))
-    found = np.array(found)
+    palms = [settled.palm for settled in off_a_wall(np.linspace(0.0, 5.01e-3, 502))]
+    found = np.array([(palm.shear_limit, palm.pressing_limit) for palm in palms])
     np.testing.assert_allclose(found[0], [8 * 63.0, 8 * 250.0], rtol=0.03)
     np.testing.assert_array_equal(found[-1], 0.0)
     # by a hundredth of a millimetre at a time, no more than a five-hundredth of it all
@@ -176,7 +180,8 @@ def test_left_and_right_mirror_each_other(hold, rotation):
 def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     pose = HAND.seat(hold, PINCH).pose
     turns = np.linspace(0.0, math.pi, 315)
-    hands = [HAND.settle(hold, ROCK, Grasp(outer_rotation=float(t)), pose) for t in turns]
+    grasps = [Grasp(outer_rotation=float(turn)) for turn in turns]
+    hands = HAND.settle_each([Placement(hold, ROCK, grasp, pose) for grasp in grasps])
     for one, other in itertools.pairwise(hands):
         if one.tiles == other.tiles:
             # at most the 0.2 m arm times 0.01 rad, and the same again for closing; a tile that is
@@ -246,10 +251,8 @@ def test_impossible_grasps_are_refused_by_field(values, field):
 
 def test_a_base_tile_fades_with_its_distance_from_the_rock():
     """From rock that stands through its plane, within the spines' travel too, to beyond it."""
-    grasp, found = Grasp(outer_rotation=0.0), []
-    offs = np.linspace(-2e-4, 6e-3, 125)
-    for off in offs:
-        settled = HAND.settle(Plane(), ROCK, grasp, Pose(np.array([0.0, 0.0, off]), np.eye(3)))
+    found, offs = [], np.linspace(-2e-4, 6e-3, 125)
+    for settled in off_a_wall(offs):
         assert settled.tiles[0].contact == ("face" if settled.engagement[0] > 0.0 else "none")
         others = settled.engagement[1:4].sum()
         found.append(

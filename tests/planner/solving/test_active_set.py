@@ -17,7 +17,7 @@ def problems():
     """Data of random stances, and of the wall under an uneven load, within their limits."""
     rng = np.random.default_rng(5)
     found = [program_data(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0))))]
-    while len(found) < 25:
+    while len(found) < 12:
         stance = random_stance(rng)
         try:
             data = program_data(ask(stance, load=Load(float(rng.uniform(5.0, 60.0)))))
