@@ -22,7 +22,6 @@ from hand_models.finger.model import (
 from hand_models.finger.open_finger import ClosedFinger, OpenFinger, Refused
 from hand_models.finger.path_state import (
     CAUGHT,
-    CLOSES,
     JOINTS,
     OFF,
     Around,
@@ -103,7 +102,7 @@ def _in_rock(
     q: Array,
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
-    near = Around.of(rock, shape, drive, q).gap.min(axis=1) < -CLOSES
+    near = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
     inside = [_depth(shape, *each) > shape.radius for each in zip(sections, q, strict=True)]
     return np.asarray(near | np.array(inside))
 
@@ -125,7 +124,7 @@ def _depth(shape: PhalanxShape, section: Section | None, q: Array, lift: float =
 def _refused(shape: PhalanxShape, section: Section | None, q: Array) -> Refused | None:
     """Return why a finger cannot be open as it is; None if it can."""
     depth, low, high = _depth(shape, section, q), 0.0, JOINTS * shape.end
-    if depth <= CLOSES:
+    if depth <= shape.closes:
         return None
     if _depth(shape, section, q, high) > 0.0:
         return Refused(depth, np.inf)

@@ -37,7 +37,6 @@ from hand_models.base import Array
 from hand_models.finger.path_state import (
     CATCHING,
     CAUGHT,
-    CLOSES,
     EYE,
     FIRST_STRIDE,
     HELD,
@@ -202,7 +201,7 @@ class Path:
         self, drive: Drive, state: State, around: Around, balanced: float
     ) -> tuple[State, Flags]:
         """Return where fingers come to next, and which of them are at their ends."""
-        stride, gives = state.stride, GIVES * self._length
+        stride, gives, slack = state.stride, GIVES * self._length, self._shape.closes
         caught = (state.spines == CAUGHT) & (around.share > 0.0)
         # how far a phalanx may be off the rock
         near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
@@ -228,7 +227,7 @@ class Path:
             gap = around.gap + part * change
             # damped joints may be slow in leaving where they should not be
             slow = (state.damping > STIFF * drive.torque)[:, None]
-            closes = ~active & (gap < -CLOSES) & ((change < 0.0) | ~slow)
+            closes = ~active & (gap < -slack) & ((change < 0.0) | ~slow)
             grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
             balance = forces.torque - times(damped, turn[..., 0])
             balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
@@ -264,7 +263,7 @@ class Path:
         clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * self._shape.end)
         most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
         rate = times(around.d_gap, grow)
-        until = np.where(~active & (rate < 0.0), (gap + 2.0 * CLOSES) / -rate, np.inf).min(axis=1)
+        until = np.where(~active & (rate < 0.0), (gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
         end = drive.end
         target = np.where(state.s < drive.closing, drive.closing, end)
         more = np.minimum(target - state.s, INCREMENT * drive.closing)

@@ -18,7 +18,6 @@ from hand_models.tile import engaged_share
 __all__ = [
     "CATCHING",
     "CAUGHT",
-    "CLOSES",
     "EYE",
     "FIRST_STRIDE",
     "HELD",
@@ -39,9 +38,6 @@ __all__ = [
     "take",
     "times",
 ]
-
-CLOSES: Final = 1e-8
-"""By how much a gap may be negative without being closed [m]."""
 
 JOINTS: Final = len(PHALANGES)
 

@@ -43,6 +43,9 @@ POINTS: Final = 48
 FINENESS: Final = 4800.0
 """Of the gap, in parts of the length of a tile."""
 
+ROUNDINGS: Final = 2.4e6
+"""Gaps that may be negative without being closed, in as many parts of it."""
+
 MOST_STEPS: Final = 20
 LEVEL: Final = 1e-12
 """Of the search for a level: how many steps, and how exactly, in parts of a tile's length."""
@@ -111,6 +114,11 @@ class PhalanxShape(NamedTuple):
     def fine(self) -> float:
         """How far the gap may be from the least distance, about [m]."""
         return (self.far - self.near) / FINENESS
+
+    @property
+    def closes(self) -> float:
+        """By how much a gap may be negative without being closed [m]."""
+        return (self.far - self.near) / ROUNDINGS
 
     def beside(
         self, points: Complexes, lengths: Array, joint: Complexes, u: Complexes, depth: Array
