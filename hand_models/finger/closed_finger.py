@@ -30,7 +30,7 @@ from hand_models.finger.path_state import (
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
-from hand_models.sections import Flags, Outlines, Section
+from hand_models.sections import Complexes, Flags, Outlines, Section
 
 __all__ = ["cling", "close_all"]
 
@@ -79,7 +79,7 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     blocked = _in_rock(rock, shape, drive, sections, straight)
     shut = blocked & _in_rock(rock, shape, drive, sections, lower)
     found = [
-        _refused(shape, section, q) if starts else None
+        _refused(shape, section, q) if starts and section is not None else None
         for section, q, starts in zip(sections, lower, shut.tolist(), strict=True)
     ]
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
@@ -103,36 +103,39 @@ def _in_rock(
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
     near = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
-    inside = [_depth(shape, *each) > shape.radius for each in zip(sections, q, strict=True)]
+    inside = [
+        section is not None and section.distances(_axes(shape, turns)).min() < 0.0
+        for section, turns in zip(sections, q, strict=True)
+    ]
     return np.asarray(near | np.array(inside))
 
 
-def _depth(shape: PhalanxShape, section: Section | None, q: Array, lift: float = 0.0) -> float:
-    """Return about how deep rock is in a finger turned by q and lifted, below zero if clear [m].
-
-    Where it is deeper than the bar's radius, the axis is in the rock.
-    """
-    if section is None:
-        return -np.inf
+def _axes(shape: PhalanxShape, q: Array) -> Complexes:
+    """Return places along the axes of the phalanges of a finger."""
     joints, u = fan_out(q, shape.end)
     along = np.linspace(shape.near, shape.end, SAMPLES)
     rise = np.interp(along, [shape.far, shape.end], [shape.lift, 0.0])
-    places = joints[:, None] + (along + 1j * rise) * u[:, None] - 1j * lift
-    return float(shape.radius - section.distances(places).min())
+    return np.asarray(joints[:, None] + (along + 1j * rise) * u[:, None])
 
 
-def _refused(shape: PhalanxShape, section: Section | None, q: Array) -> Refused | None:
-    """Return why a finger cannot be open as it is; None if it can."""
-    depth, low, high = _depth(shape, section, q), 0.0, JOINTS * shape.end
-    if depth <= shape.closes:
-        return None
-    if _depth(shape, section, q, high) > 0.0:
-        return Refused(depth, np.inf)
+def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
+    """Return how deep rock is in a finger, and the lift that would clear it."""
+    places, most = _axes(shape, q), JOINTS * shape.end
+    rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing, NEAREST)
+
+    def depth(lift: float) -> float:
+        lifted = places - 1j * lift
+        away = np.abs(lifted[..., None] - rock.points[0]).min(axis=-1)
+        inside = section.distances(lifted) < 0.0
+        return float(shape.radius - np.where(inside, -away, away).min())
+
+    now, low, high = max(depth(0.0), shape.closes), 0.0, most
+    if depth(high) > 0.0:
+        return Refused(now, np.inf)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        deep = _depth(shape, section, q, middle) > 0.0
-        low, high = (middle, high) if deep else (low, middle)
-    return Refused(depth, high)
+        low, high = (middle, high) if depth(middle) > 0.0 else (low, middle)
+    return Refused(now, high)
 
 
 def _closed(

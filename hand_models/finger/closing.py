@@ -221,6 +221,7 @@ class Path:
             # contacts that would pull more than they hold, or push across a gap
             caught = (spines == CAUGHT) & (around.share > 0.0)
             over = self._over(drive, around, active, caught, forces.shears, normals[..., 0])
+            over = np.where(caught & (part < 1.0), 0.0, over)
             pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
             # gaps that would close, or grow beyond what spines let them
             change = times(around.d_gap, turn[..., 0])

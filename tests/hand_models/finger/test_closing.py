@@ -368,6 +368,14 @@ def test_a_little_change_of_the_rock_changes_little():
     assert np.mean(np.array(moved) < 1e-3) > 0.95
 
 
+def test_a_finger_that_snaps_ends_alike_at_every_tension():
+    """Around a pipe of 100 mm the tip touches first and slides: its spines hold all the while."""
+    for tension in (12.0, 13.0, 16.6, 25.0, 30.0, 32.0, 37.0):
+        grasp = Grasp(math.pi, closing_tension=tension)
+        finger = HAND.settle(Cylinder(0.1), ROCK, grasp).fingers[1]
+        assert [contact.kind for contact in finger.contacts] == ["none", "face", "face"]
+
+
 # Refused ------------------------------------------------------------------------------------------
 
 
