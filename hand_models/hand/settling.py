@@ -127,9 +127,12 @@ def _settle(
 
 
 def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
+    # along z of the hand, which may be nearly along the rock
+    far = -depth > hand.finger.reach
+    stands = "deep" if far else f"{-1e3 * depth:.1f} mm"
     return InvalidInputError(
-        f"the hold stands {-1e3 * depth:.1f} mm inside the palm; "
-        f"at most {1e3 * hand.spine_travel:g} mm (the spines' travel) is possible",
+        f"the hold stands {stands} inside the palm; at most {1e3 * hand.spine_travel:g} mm "
+        "(the spines' travel) is possible: move the hand away from the rock along its -z",
         field="hold",
     )
 
