@@ -149,7 +149,7 @@ class Path:
         going = np.arange(len(self.rests))
         rock, drive, state, around = self._rock, self._drive, self.end, self.around
         for step in range(MOST_STEPS):
-            balanced = BALANCED[step > MOST_STEPS // 16]
+            balanced = BALANCED[step > MOST_STEPS // 4]
             after, rests = self._increment(drive, state, around, balanced)
             if rests.any():
                 self.rests[going[rests]] = True
