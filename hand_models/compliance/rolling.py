@@ -32,7 +32,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.finger import PHALANGES, Contact, SettledFinger
+from hand_models.finger import PHALANGES, Contact, SettledFinger, middle_of_bed
 from hand_models.sections import Section, Vector2
 
 __all__ = ["MovedPosture", "Numbers", "RollingContact", "bearing_angle"]
@@ -178,13 +178,10 @@ class _Link:
         if not (self.rolls and self.depth > 0.0):
             return 0.0 * c
         widest = math.sqrt(2.0 * self.depth * self.radius)
-        load = moment = 0.0 * c
-        for side, room in ((-1.0, c - self.start), (1.0, self.end - c)):
-            reach = np.where(room.real < widest, room, widest)
-            square = reach * reach
-            load = load + reach * (self.depth - square / (6.0 * self.radius))
-            moment = moment + side * square * (self.depth / 2.0 - square / (8.0 * self.radius))
-        return np.asarray(moment / load)
+        reaches = [
+            np.where(room.real < widest, room, widest) for room in (c - self.start, self.end - c)
+        ]
+        return middle_of_bed(reaches, [1.0 / self.radius] * 2, self.depth)
 
     def _touch_line(self, jx: Numbers, jz: Numbers) -> Numbers:
         ahead, above = self.along + self.contact, self.above + self.height

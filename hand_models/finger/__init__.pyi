@@ -16,8 +16,8 @@ from .open_finger import (
     OpenFinger as OpenFinger,
     Refused as Refused,
 )
+from .phalanx_gaps import middle_of_bed as middle_of_bed
 from .sequential_closure import (
-    EDGE as EDGE,
     FACE as FACE,
     KINDS as KINDS,
     NONE as NONE,

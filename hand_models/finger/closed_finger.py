@@ -77,7 +77,11 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     drive = Drive.of(model, closings)
     lower, straight = drive.lower, np.clip(0.0, drive.lower, drive.upper)
     blocked = _in_rock(rock, shape, drive, sections, straight)
-    shut = blocked & _in_rock(rock, shape, drive, sections, lower)
+    bent = blocked.nonzero()[0]
+    shut = blocked.copy()
+    shut[bent] = _in_rock(
+        take(rock, bent), shape, take(drive, bent), [sections[i] for i in bent], lower[bent]
+    )
     found = [
         _refused(shape, section, q) if starts and section is not None else None
         for section, q, starts in zip(sections, lower, shut.tolist(), strict=True)
@@ -102,12 +106,12 @@ def _in_rock(
     q: Array,
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
-    near = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
-    inside = [
-        section is not None and section.distances(_axes(shape, turns)).min() < 0.0
-        for section, turns in zip(sections, q, strict=True)
-    ]
-    return np.asarray(near | np.array(inside))
+    found = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
+    for i in (~found).nonzero()[0].tolist():
+        section = sections[i]
+        if section is not None:
+            found[i] = section.clearances(_axes(shape, q[i])).min() < 0.0
+    return np.asarray(found)
 
 
 def _axes(shape: PhalanxShape, q: Array) -> Complexes:
@@ -126,7 +130,7 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     def depth(lift: float) -> float:
         lifted = places - 1j * lift
         away = np.abs(lifted[..., None] - rock.points[0]).min(axis=-1)
-        inside = section.distances(lifted) < 0.0
+        inside = section.clearances(lifted) < 0.0
         return float(shape.radius - np.where(inside, -away, away).min())
 
     now, low, high = max(depth(0.0), shape.closes), 0.0, most

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.finger.sequential_closure import EDGE, ClosedPhalanx
+from hand_models.finger.sequential_closure import ClosedPhalanx
 from hand_models.tile import Surface
 
 __all__ = ["ClosureLoads", "TendonLoads", "stays"]
@@ -49,9 +49,9 @@ class _Drawn(NamedTuple):
     preload: float
     radius: float
 
-    def shear(self, kind: int, closing: float) -> complex:
-        """Return what its tile is dragged with, if that is on rock."""
-        return complex(self.engaged * closing, self.gain) if kind <= EDGE else 0j
+    def shear(self, closing: float) -> complex:
+        """Return what its tile is dragged with."""
+        return complex(self.engaged * closing, self.gain)
 
     def torque(self, turn: float) -> complex:
         """Return the torque of spring and tendon on its joint, turned by an angle [N·m, m]."""
@@ -98,13 +98,10 @@ class TendonLoads:
             Whether a base tile comes first on the tendon.
         """
         first, second, third = self._drawn[base_tile]
-        (angle_0, _, q_0, c_0, kind_0, _), (angle_1, u_1, q_1, c_1, kind_1, _), last = laid
-        angle_2, u_2, q_2, c_2, kind_2, _ = last
+        (angle_0, _, q_0, c_0, _), (angle_1, u_1, q_1, c_1, _), (angle_2, u_2, q_2, c_2, _) = laid
         if not min(c_0, c_1, c_2) > 0.0:
             return None
-        s_0 = first.shear(kind_0, closing)
-        s_1 = second.shear(kind_1, closing)
-        s_2 = third.shear(kind_2, closing)
+        s_0, s_1, s_2 = (each.shear(closing) for each in (first, second, third))
         # from earlier joints to later contacts, along and across the contacts' phalanges; from a
         # phalanx's own joint that is (c, h)
         h = self._height
@@ -120,16 +117,14 @@ class TendonLoads:
         return ClosureLoads((s_0, s_1, s_2), (n_0, n_1, n_2))
 
 
-def stays(
-    laid: Sequence[ClosedPhalanx], loads: ClosureLoads, surface: Surface, tension: float
-) -> bool:
+def stays(loads: ClosureLoads, surface: Surface, tension: float) -> bool:
     """Whether no contact of a finger breaks at a tension."""
-    for phalanx, t, n in zip(laid, *loads, strict=True):
+    for t, n in zip(*loads, strict=True):
         normal = n.real + n.imag * tension
         if normal >= 0.0:
             continue
         shear = t.real + t.imag * tension
-        if phalanx.kind > EDGE or shear < 0.0:
+        if shear < 0.0:
             return False
         # a tile that slips under shear keeps its contact
         if shear > surface.shear_limit:

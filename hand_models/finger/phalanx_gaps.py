@@ -24,15 +24,17 @@ the other without a jump.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.finger.model import FingerModel
 from hand_models.sections import Complexes, Outlines
 
-__all__ = ["NEAREST", "Beside", "PhalanxShape", "fan_out", "nearest_points"]
+__all__ = ["NEAREST", "Beside", "PhalanxShape", "fan_out", "middle_of_bed", "nearest_points"]
 
 NEAREST: Final = 96
 """How many points of rock are looked at for a phalanx: on flat rock, all along it and beyond."""
@@ -51,6 +53,8 @@ LEVEL: Final = 1e-12
 """Of the search for a level: how many steps, and how exactly, in parts of a tile's length."""
 
 TINY: Final = 1e-30
+
+Pressed = TypeVar("Pressed", float, NDArray[Any])
 
 
 class Beside(NamedTuple):
@@ -181,6 +185,28 @@ class PhalanxShape(NamedTuple):
             if not going.any():
                 break
         return np.asarray(level)
+
+
+def middle_of_bed(reaches: Iterable[Pressed], bends: Iterable[float], depth: float) -> Pressed:
+    """Return how far from where a face touches rock the middle of its bed's pressures is [m].
+
+    Parameters
+    ----------
+    reaches : pair of float or of ndarray
+        How far the bed is pressed toward the beginning of the face, and toward its end [m].
+    bends : pair of float
+        Curvature of the rock on either side [1/m].
+    depth : float
+        How far the bed is pressed in where the face touches [m].
+    """
+    load: Any = 0.0
+    moment: Any = 0.0
+    for side, reach, bend in zip((-1.0, 1.0), reaches, bends, strict=True):
+        square = reach * reach
+        load = load + reach * (depth - bend * square / 6.0)
+        moment = moment + side * square * (0.5 * depth - bend * square / 8.0)
+    found: Pressed = moment / load
+    return found
 
 
 def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:

@@ -13,7 +13,7 @@ import math
 from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.finger.phalanx_gaps import PhalanxShape
+from hand_models.finger.phalanx_gaps import PhalanxShape, middle_of_bed
 from hand_models.sections import Face, SmoothCut
 
 __all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
@@ -37,8 +37,6 @@ class ClosedPhalanx(NamedTuple):
         x + i z of its joint in F [m].
     along : float
         c, of its contact from the joint [m].
-    kind : int
-        Code of `KINDS`.
     bends : tuple of float
         Curvature of the rock under the face, toward its beginning and its end [1/m].
     """
@@ -47,7 +45,6 @@ class ClosedPhalanx(NamedTuple):
     u: complex
     joint: complex
     along: float
-    kind: int
     bends: tuple[float, float] = (0.0, 0.0)
 
     def pressed(self, face: Face, depth: float) -> ClosedPhalanx:
@@ -62,12 +59,7 @@ class ClosedPhalanx(NamedTuple):
                 (self.along - face.start, face.end - self.along), self.bends, strict=True
             )
         )
-        load = moment = 0.0
-        for side, reach, bend in zip((-1.0, 1.0), (near, far), self.bends, strict=True):
-            square = reach * reach
-            load += reach * (depth - bend * square / 6.0)
-            moment += side * square * (0.5 * depth - bend * square / 8.0)
-        return self._replace(along=self.along + moment / load)
+        return self._replace(along=self.along + middle_of_bed((near, far), self.bends, depth))
 
 
 Rested = tuple[float, complex, float, bool]
@@ -118,7 +110,7 @@ class SequentialClosure:
                     # on an edge of the tile or beyond it
                     break
                 bends = self._bends(cut, joint, u, along)
-            laid.append(ClosedPhalanx(angle, u, joint, along, FACE, bends))
+            laid.append(ClosedPhalanx(angle, u, joint, along, bends))
             joint += self._spacing * u
         return laid
 

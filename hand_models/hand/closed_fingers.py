@@ -16,7 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.finger import (
-    EDGE,
+    FACE,
     FREE,
     KINDS,
     PHALANGES,
@@ -182,7 +182,7 @@ def _row_laid(
         for each, depth in zip(laid, depths, strict=True)
     ]
     loads = hand.tendon_loads.loads(laid, tension, base_tile)
-    if loads is None or not stays(laid, loads, placement.surface, tension):
+    if loads is None or not stays(loads, placement.surface, tension):
         return None
     return _row(laid, hand.finger.tile_height, loads)
 
@@ -235,11 +235,11 @@ def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> I
 def _row(phalanges: Sequence[ClosedPhalanx], height: float, loads: ClosureLoads) -> FingerNumbers:
     """Return the numbers of a finger that is laid; ``height`` of its tiles [m]."""
     row: FingerNumbers = []
-    for (angle, u, joint, along, kind, _), t, n in zip(phalanges, *loads, strict=True):
+    for (angle, u, joint, along, _), t, n in zip(phalanges, *loads, strict=True):
         place = joint + complex(along, height) * u
-        # a phalanx that is laid either has its tile on the rock, with all spines, or not at all
+        # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
-        row += (t.real, t.imag, n.real, n.imag, float(kind <= EDGE), kind, FREE)
+        row += (t.real, t.imag, n.real, n.imag, 1.0, FACE, FREE)
         row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 

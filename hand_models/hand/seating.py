@@ -127,9 +127,9 @@ def propose(hand: HandModel, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
     return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
 
 
-def touches_seat(hand: HandModel, kind: str, along: float) -> bool:
-    """Whether an inner finger's proximal contact is where a seat meant it to be."""
-    return kind == "face" and abs(along - hand.seated_contact) < PLACED
+def touches_seat(hand: HandModel, along: float) -> bool:
+    """Whether an inner finger's proximal tile touches where a seat meant it to."""
+    return abs(along - hand.seated_contact) < PLACED
 
 
 def _shifted(x: float, z: float) -> Pose:
@@ -188,7 +188,7 @@ def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
         hand_in_hold.rotation[:, 2],
     )
     contact = settle_finger(hand.finger, section, (0.0, 0.0)).contacts[0]
-    return touches_seat(hand, contact.kind, contact.along)
+    return contact.kind == "face" and touches_seat(hand, contact.along)
 
 
 # Rock that is known by its outline only -----------------------------------------------------------

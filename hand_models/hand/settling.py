@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.finger import BALANCE, KINDS, NONE, PHALANGES, ClosedPhalanx
+from hand_models.finger import BALANCE, NONE, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import BASES
 from hand_models.hand.hooked_nails import hook_nails, no_nails
@@ -235,4 +235,4 @@ def _laid(placed: PlacedHands, known: Known) -> list[list[list[ClosedPhalanx]]]:
 
 def _on_seat(hand: HandModel, laid: list[ClosedPhalanx]) -> bool:
     """Whether a finger's proximal contact is where a seat meant it to be."""
-    return bool(laid) and touches_seat(hand, KINDS[laid[0].kind], laid[0].along)
+    return bool(laid) and touches_seat(hand, laid[0].along)

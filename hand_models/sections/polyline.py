@@ -73,12 +73,8 @@ class PolylineSection(Section):
     def clearance(self, point: Vector2) -> float:
         return float(self.boundary.clearances(np.array(complex(*point))))
 
-    def distances(self, places: Complexes) -> Array:
+    def clearances(self, places: Complexes) -> Array:
         return self.boundary.clearances(places)
-
-    def clearances(self, points: Array) -> Array:
-        """Return the distances of points (n, 2) from the rock, negative inside [m]."""
-        return self.distances(points[:, 0] + 1j * points[:, 1])
 
     def normal(self, point: Vector2) -> Vector2:
         out = self.boundary.normal(complex(*point))

@@ -23,8 +23,8 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.sections.conics import circle_crossings
-from hand_models.sections.rows import Complexes, Flags, SmoothRows, Span, angles_within
-from hand_models.sections.section import FACE_SAMPLES
+from hand_models.sections.rows import Complexes, Flags, Rests, Span, angles_within
+from hand_models.sections.section import FACE_SAMPLES, LEVEL
 
 __all__ = ["ProfileRows"]
 
@@ -93,8 +93,8 @@ class _Numbers(NamedTuple):
     toward: Array
 
 
-class ProfileRows(SmoothRows[_Numbers]):
-    """Profiles cut obliquely.
+class ProfileRows:
+    """Profiles cut obliquely; of a single one, for any number of rows.
 
     Parameters
     ----------
@@ -137,18 +137,52 @@ class ProfileRows(SmoothRows[_Numbers]):
             normals=np.hypot(s, t),
             toward=np.arctan2(t, s),
         )
-        super().__init__(_Numbers(*(np.ascontiguousarray(value) for value in numbers)))
+        self._numbers = _Numbers(*(np.ascontiguousarray(value) for value in numbers))
 
     def take(self, rows: Indices) -> ProfileRows:
-        taken = super().take(rows)
+        """Return some of the rows, or the same ones more than once."""
+        if self._numbers.radius.shape[-1] == 1:
+            return self
+        taken = object.__new__(ProfileRows)
         taken._edged = self._edged
+        taken._numbers = _Numbers(*(value[..., rows] for value in self._numbers))
         return taken
 
     # Faces that turn ------------------------------------------------------------------------------
 
+    def rests(self, joint: Complexes, span: Span, low: Array, high: Array) -> Rests:
+        """Return where faces first meet the rock as their phalanges turn from low to high."""
+        blocked = self.face_clearances(joint, span, low) <= 0.0
+        angle, distance = self.tangents(joint, span, low, high)
+        start, end = span.ends
+        on = (angle <= high) & (distance >= start) & (distance <= end)
+        flat = np.zeros(on.shape, dtype=bool)
+        off = (~on).nonzero()[0]
+        if len(off):
+            rock, rest = self.take(off), (joint[off], span.take(off), low[off], high[off])
+            angle[off], distance[off], flat[off] = rock._ends(*rest)
+        return Rests(angle, distance, flat, blocked)
+
+    def _ends(
+        self, joint: Complexes, span: Span, low: Array, high: Array
+    ) -> tuple[Array, Array, Flags]:
+        """Return where faces meet the rock with one of their ends, or both."""
+        first, last = self.touches(joint, span, low, high)
+        start, end = span.ends
+        angle = np.fmin(first, last)
+        distance = np.where((first <= last) | np.isnan(last), start, end)
+        flat = np.abs(first - last) * (end - start) <= LEVEL
+        if flat.any():
+            flat &= self._straight(joint, span, angle)
+        return angle, distance, flat
+
     def tangents(
         self, joint: Complexes, span: Span, low: Array, high: Array
     ) -> tuple[Array, Array]:
+        """Return angle and distance at which the faces' lines touch the curved part of the rock.
+
+        NaN where they do not.
+        """
         rock, h = self._numbers, span.height
         s_ss, s_st, s_tt = rock.S
         w_s, w_t = rock.middle[0] - joint.real, rock.middle[1] - joint.imag
@@ -184,6 +218,7 @@ class ProfileRows(SmoothRows[_Numbers]):
         return angles_within(theta, low, high), s * u + t * v
 
     def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
+        """Return the first angle at which both ends of faces are on the rock, (2, n); or NaN."""
         rock, arms = self._numbers, span.arms
         p_x, p_z = self._in_profile(joint)
         a_x, a_z, b_x, b_z = rock.axes
@@ -217,6 +252,7 @@ class ProfileRows(SmoothRows[_Numbers]):
         return np.asarray(np.fmin.reduce(angles_within(angles - span.phases, low, high)))
 
     def _straight(self, joint: Complexes, span: Span, angle: Array) -> Flags | bool:
+        """Whether the rock nearest both ends of faces at an angle is straight."""
         if not self._edged:
             return False
         sine, cosine = self._numbers.wedge
@@ -229,9 +265,11 @@ class ProfileRows(SmoothRows[_Numbers]):
     # Distances ------------------------------------------------------------------------------------
 
     def clearances(self, points: Complexes) -> Array:
+        """Return about how far points (..., n) are from the rock, negative inside [m]."""
         return self._distances(*self._in_profile(points))
 
     def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
+        """Return about how far faces at an angle are from the rock, negative if they cut it [m]."""
         a, b, c, d = self._numbers.M
         u = np.exp(1j * angle)
         start, end = span.ends

@@ -101,6 +101,9 @@ class ProfileSection(Section):
     def clearance(self, point: Vector2) -> float:
         return float(self._rows.clearances(_place(point)).item())
 
+    def clearances(self, places: Complexes) -> Array:
+        return self._rows.clearances(places)
+
     def rest(
         self, joint: Vector2, start: float, end: float, height: float, low: float, high: float
     ) -> Rest | None:

@@ -7,20 +7,18 @@ Arrays have a row as their last axis; numbers of a single section serve any numb
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from typing import Generic, NamedTuple, Self, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices
-from hand_models.sections.section import LEVEL, Complexes
+from hand_models.sections.section import Complexes
 
 __all__ = [
     "Complexes",
     "Flags",
     "Rests",
-    "SmoothRows",
     "Span",
     "angles_within",
 ]
@@ -74,84 +72,6 @@ class Rests(NamedTuple):
     distance: Array
     flat: Flags
     blocked: Flags
-
-
-Numbers = TypeVar("Numbers", bound=tuple[Array | Complexes, ...])
-
-
-class SmoothRows(ABC, Generic[Numbers]):
-    """Sections that a face touches with its line, or else with one of its ends.
-
-    Parameters
-    ----------
-    numbers : tuple of ndarray, shapes (..., n)
-        What describes the sections; of a single one, for any number of rows.
-    """
-
-    def __init__(self, numbers: Numbers) -> None:
-        self._numbers = numbers
-
-    @abstractmethod
-    def clearances(self, points: Complexes) -> Array:
-        """Return about how far points (..., n) are from the rock, negative inside [m]."""
-
-    @abstractmethod
-    def face_clearances(self, joint: Complexes, span: Span, angle: Array) -> Array:
-        """Return about how far faces at an angle are from the rock, negative if they cut it [m]."""
-
-    def take(self, rows: Indices) -> Self:
-        """Return some of the rows, or the same ones more than once."""
-        if self._numbers[0].shape[-1] == 1:
-            return self
-        taken = object.__new__(type(self))
-        taken._numbers = type(self._numbers)(*(value[..., rows] for value in self._numbers))
-        return taken
-
-    def tangents(
-        self, joint: Complexes, span: Span, low: Array, high: Array
-    ) -> tuple[Array, Array] | None:
-        """Return angle and distance at which the faces' lines touch the curved part of the rock.
-
-        NaN where they do not; None if no rock is curved.
-        """
-        return None
-
-    @abstractmethod
-    def touches(self, joint: Complexes, span: Span, low: Array, high: Array) -> Array:
-        """Return the first angle at which both ends of faces are on the rock, (2, n); or NaN."""
-
-    def _straight(self, joint: Complexes, span: Span, angle: Array) -> Flags | bool:
-        """Whether the rock nearest both ends of faces at an angle is straight."""
-        return False
-
-    def rests(self, joint: Complexes, span: Span, low: Array, high: Array) -> Rests:
-        """Return where faces first meet the rock as their phalanges turn from low to high."""
-        blocked = self.face_clearances(joint, span, low) <= 0.0
-        tangents = self.tangents(joint, span, low, high)
-        if tangents is None:
-            return Rests(*self._ends(joint, span, low, high), blocked)
-        angle, distance = tangents
-        start, end = span.ends
-        on = (angle <= high) & (distance >= start) & (distance <= end)
-        flat = np.zeros(on.shape, dtype=bool)
-        off = (~on).nonzero()[0]
-        if len(off):
-            rock, rest = self.take(off), (joint[off], span.take(off), low[off], high[off])
-            angle[off], distance[off], flat[off] = rock._ends(*rest)
-        return Rests(angle, distance, flat, blocked)
-
-    def _ends(
-        self, joint: Complexes, span: Span, low: Array, high: Array
-    ) -> tuple[Array, Array, Flags]:
-        """Return where faces meet the rock with one of their ends, or both."""
-        first, last = self.touches(joint, span, low, high)
-        start, end = span.ends
-        angle = np.fmin(first, last)
-        distance = np.where((first <= last) | np.isnan(last), start, end)
-        flat = np.abs(first - last) * (end - start) <= LEVEL
-        if flat.any():
-            flat &= self._straight(joint, span, angle)
-        return angle, distance, flat
 
 
 def angles_within(angle: Array, low: Array, high: Array) -> Array:

@@ -103,7 +103,7 @@ class Section(ABC):
         Exact on flat and round sections, and everywhere its sign is.
         """
 
-    def distances(self, places: Complexes) -> Array:
+    def clearances(self, places: Complexes) -> Array:
         """Return about how far places (...) are from the rock, negative inside [m]."""
         each = [self.clearance((place.real, place.imag)) for place in places.ravel().tolist()]
         return np.array(each).reshape(places.shape)

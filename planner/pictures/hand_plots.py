@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from hand_models.base import Array
 from hand_models.finger import PHALANGES, Contact, SettledFinger
 from hand_models.hand import FINGERS, NAIL, SettledHand
-from hand_models.sections import PolylineSection, Section
+from hand_models.sections import Section
 from hand_models.wrench_spaces import WrenchSpace
 
 if TYPE_CHECKING:
@@ -240,12 +240,7 @@ def _along(contact: Contact, along: float, height: float) -> tuple[float, float]
 
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
     s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, CELLS, strict=True))
-    points = np.stack(np.meshgrid(s, t), axis=-1).reshape(-1, 2) / MM
-    if isinstance(section, PolylineSection):
-        clearance = section.clearances(points)
-    else:
-        clearance = np.array([section.clearance((u, v)) for u, v in points.tolist()])
-    clearance = clearance.reshape(len(t), len(s))
+    clearance = section.clearances((s + 1j * t[:, None]) / MM)
     if clearance.min() < 0.0:
         axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=[ROCK])
         if clearance.max() > 0.0:

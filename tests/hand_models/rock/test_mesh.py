@@ -106,7 +106,7 @@ def test_a_cut_is_the_surface_in_its_plane_with_the_rock_on_its_left(seed):
     on_rock = np.concatenate(pieces)[::5]
     np.testing.assert_allclose(distance(hold, in_hold(on_rock)), 0.0, atol=1e-9)
     points = rng.uniform(-0.5, 0.5, (60, 2))
-    clear = PolylineSection(pieces).clearances(points)
+    clear = PolylineSection(pieces).clearances(points @ [1.0, 1j])
     want = distance(hold, in_hold(points))
     assert (np.sign(clear) == np.sign(want)).all()
     assert (np.abs(clear) >= np.abs(want) - 1e-9).all()
@@ -137,7 +137,7 @@ def test_a_corner_is_rounded_at_the_scale_of_a_tile_and_never_cut():
     corner = np.array([[-0.1, 0.1], [0.0, 0.0], [0.1, 0.1]])
     section = PolylineSection([smooth(corner, Scale.of())])
     line = np.linspace(-0.09, 0.09, 1001)
-    off = section.clearances(np.column_stack([line, np.abs(line)]))
+    off = section.clearances(line + 1j * np.abs(line))
     assert off.max() < 2e-5
     assert off.min() > -2e-3
     assert off[np.abs(line) > 0.05].min() > -1e-4
@@ -151,7 +151,7 @@ def test_no_raw_rock_stands_out_of_a_smoothed_cut(seed):
     raw = np.column_stack([x, 0.05 * rng.random() * np.abs(x) + 4e-3 * rng.random(80)])
     curve = smooth(raw, Scale.of())
     inner = np.abs(raw[:, 0]) < 0.15
-    assert PolylineSection([curve]).clearances(raw[inner]).max() < 1e-4
+    assert PolylineSection([curve]).clearances(raw[inner] @ [1.0, 1j]).max() < 1e-4
 
 
 def check_entry(seed):
@@ -302,8 +302,8 @@ def test_narrow_holes_are_bridged_and_wide_ones_end_the_rock():
     )
     assert len(whole.pieces) == len(narrow.pieces) == 1
     assert len(wide.pieces) == 2
-    grid = np.array([[0.05, 0.02], [0.06, 0.012], [0.07, 0.02]])
-    np.testing.assert_allclose(narrow.clearances(grid), whole.clearances(grid), atol=1e-4)
+    places = np.array([0.05 + 0.02j, 0.06 + 0.012j, 0.07 + 0.02j])
+    np.testing.assert_allclose(narrow.clearances(places), whole.clearances(places), atol=1e-4)
     # in the middle of the wide hole the rock is its border, 10 mm away
     assert wide.clearance((0.06, 0.0127)) == pytest.approx(0.01, abs=1.5e-3)
 

@@ -96,7 +96,7 @@ def test_a_section_never_leaves_raw_rock_outside(seed):
     origin = np.array([*rng.uniform(-0.05, 0.05, 2), -0.02])
     section = hold.section(origin, axes[:, 0], axes[:, 2])
     points = rng.uniform(-0.12, 0.12, (200, 2))
-    clear = section.clearances(points)
+    clear = section.clearances(points @ [1.0, 1j])
     raw = distance(hold, origin + points[:, :1] * axes[:, 0] + points[:, 1:] * axes[:, 2])
     x = (origin + points[:, :1] * axes[:, 0] + points[:, 1:] * axes[:, 2])[:, 0]
     ends = hold.outlines[0][[0, -1], 0]

@@ -65,7 +65,7 @@ def test_points_lie_on_the_rock_at_most_a_spacing_apart(seed):
     assert (np.abs(points) <= REACH).all()
     assert (lengths <= SPACING * (1.0 + 1e-6)).all()
     # chords of the sharpest rock here leave it by a few micrometres
-    assert (np.abs(section.distances(points)) < 5e-6).all()
+    assert (np.abs(section.clearances(points)) < 5e-6).all()
 
 
 @settings(max_examples=200, deadline=None)
@@ -78,8 +78,8 @@ def test_outlines_have_the_rock_on_their_left(seed):
         way = np.diff(chain)
         middle, left = chain[:-1] + 0.5 * way, 1e-4j * way / np.abs(way)
         near = np.abs(middle) <= REACH
-        assert (section.distances((middle + left)[near]) < 0.0).all()
-        assert (section.distances((middle - left)[near]) > 0.0).all()
+        assert (section.clearances((middle + left)[near]) < 0.0).all()
+        assert (section.clearances((middle - left)[near]) > 0.0).all()
 
 
 @pytest.mark.parametrize("kind", [random_smooth, random_polyline])
@@ -91,7 +91,7 @@ def test_distances_of_many_places_are_their_clearances_one_by_one(kind, seed):
     if section is None:
         return
     places = rng.uniform(-0.06, 0.06, (3, 10)) + 1j * rng.uniform(-0.06, 0.06, (3, 10))
-    found = section.distances(places)
+    found = section.clearances(places)
     assert found.shape == places.shape
     for i, place in np.ndenumerate(places):
         exact = section.clearance((place.real, place.imag))

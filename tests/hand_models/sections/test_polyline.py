@@ -83,7 +83,7 @@ def test_on_a_fine_circle_a_face_rests_as_on_the_disc(seed):
     assert got.distance == pytest.approx(want.distance, abs=5e-5)
     points = rng.uniform(-0.1, 0.1, (50, 2))
     np.testing.assert_allclose(
-        ours.clearances(points), [disc.clearance(tuple(p)) for p in points], atol=2e-6
+        ours.clearances(points @ [1.0, 1j]), [disc.clearance(tuple(p)) for p in points], atol=2e-6
     )
     normal = ours.normal((float(ring[7, 0]), float(ring[7, 1])))
     np.testing.assert_allclose(normal, (ring[7] - centre) / radius, atol=0.02)
@@ -100,7 +100,9 @@ def test_clearance_is_the_signed_distance(seed):
     want = outside(outline, points)
     ends = np.minimum(*(np.linalg.norm(points - outline[i], axis=1) for i in (0, -1)))
     inner = np.abs(want) < 0.999 * ends
-    np.testing.assert_allclose(section.clearances(points)[inner], want[inner], atol=1e-12)
+    np.testing.assert_allclose(
+        section.clearances(points @ [1.0, 1j])[inner], want[inner], atol=1e-12
+    )
 
 
 @settings(max_examples=100, deadline=None)
