@@ -2,6 +2,7 @@ from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp
 from .model import HandModel as HandModel
 from .names import (
+    CLOSURES as CLOSURES,
     FINGERS as FINGERS,
     FINGERTIP_FORCE as FINGERTIP_FORCE,
     NAIL as NAIL,
@@ -10,6 +11,11 @@ from .names import (
 from .placement import Placement as Placement
 from .seating import Seating as Seating
 from .settled_hand import SettledHand as SettledHand, Tile as Tile
-from .spinyhand import SpinyHand as SpinyHand, spiny_hand as spiny_hand
+from .spinyhand import (
+    NearbyClosure as NearbyClosure,
+    SpinyHand as SpinyHand,
+    nearby_closures as nearby_closures,
+    spiny_hand as spiny_hand,
+)
 from .structure import HELD as HELD
 from .tightening import closing_sequence as closing_sequence

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
-from hand_models.finger import STOPS, Contact, FingerModel, SettledFinger
+from hand_models.finger import BALANCE, NONE, STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
-from hand_models.hand.names import CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
+from hand_models.hand.names import CLOSURES, CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
@@ -203,6 +203,28 @@ class SettledHand:
     def fingers(self) -> tuple[SettledFinger, ...]:
         """The fingers, in the order of `FINGERS`."""
         return self.postures.fingers(self.hand.finger)
+
+    @cached_property
+    def closures(self) -> tuple[str, ...]:
+        """How each finger has ended, one of `CLOSURES`."""
+        laid, hooked, wedged, curled, stopped, straight = CLOSURES
+        if self.grasp.fingernail:
+            return (straight,) * len(FINGERS)
+        postures = self.postures
+        words = []
+        for shares, kinds, stops in zip(
+            postures.engagement.tolist(),
+            postures.kinds.tolist(),
+            postures.stops.tolist(),
+            strict=True,
+        ):
+            if any(shares):
+                words.append(laid if all(shares) else hooked)
+            elif any(kind != NONE for kind in kinds):
+                words.append(wedged)
+            else:
+                words.append(curled if BALANCE in stops else stopped)
+        return tuple(words)
 
     @cached_property
     def touching(self) -> Array:

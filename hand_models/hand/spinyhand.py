@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from hand_models.base import BoundedStore, InvalidInputError, Pose
 from hand_models.hand.grasp import Grasp
@@ -17,13 +19,35 @@ from hand_models.parameters import ParameterTable, hand_table
 from hand_models.rock import Hold
 from hand_models.tile import Surface
 
-__all__ = ["SpinyHand", "spiny_hand"]
+__all__ = ["NearbyClosure", "SpinyHand", "nearby_closures", "spiny_hand"]
 
 KEPT: Final = 256
 """Settled hands that are kept, those used last: sixty-four stances of four hands."""
 
 SCANS: Final = 16
 """Settled hands on meshes and profiles that are kept, those used last."""
+
+NEARBY: Final = 1e-4
+"""How far the rock is moved to see whether fingers end otherwise there [m]."""
+
+REFUSED: Final = "refused"
+"""Where a hand cannot be, in place of how its fingers end."""
+
+
+class NearbyClosure(NamedTuple):
+    """How a finger ends where the rock is a little elsewhere.
+
+    Attributes
+    ----------
+    closures : tuple of str
+        Ends other than where it is, of `hand_models.hand.CLOSURES`, and ``refused`` where the hand
+        cannot be there.
+    turn : float
+        The most by which any of its joints ends elsewhere [rad].
+    """
+
+    closures: tuple[str, ...]
+    turn: float
 
 
 class SpinyHand(HandModel):
@@ -138,6 +162,44 @@ class SpinyHand(HandModel):
                     known[i] = outcome
             store.keep(kept)
         return [outcome for outcome in known if outcome is not None]
+
+
+def nearby_closures(settled: SettledHand, distance: float = NEARBY) -> tuple[NearbyClosure, ...]:
+    """Return how each finger of a settled hand ends where the rock is a little elsewhere.
+
+    Closed anew with the hold moved by a distance to and fro along each axis of H. Where two
+    equilibria are close, fingers end in one here and in the other there.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    distance : float, optional
+        [m]
+
+    Returns
+    -------
+    tuple of NearbyClosure
+        In the order of `FINGERS`.
+    """
+    pose = settled.seating.pose
+    places = [
+        Pose(pose.position + step, pose.rotation)
+        for step in distance * np.vstack([np.eye(3), -np.eye(3)])
+    ]
+    there = settle_hands(
+        settled.hand,
+        [Placement(settled.hold, settled.surface, settled.grasp, at) for at in places],
+    )
+    hands = [each for each in there if isinstance(each, SettledHand)]
+    refused = {REFUSED} if len(hands) < len(there) else set()
+    bent = [np.diff(hand.postures.angles, prepend=0.0) for hand in (settled, *hands)]
+    turns = np.abs(np.array(bent) - bent[0]).max(axis=(0, 2))
+    return tuple(
+        NearbyClosure(tuple(sorted(({*ends} | refused) - {now})), turn)
+        for now, turn, *ends in zip(
+            settled.closures, turns.tolist(), *(hand.closures for hand in hands), strict=True
+        )
+    )
 
 
 def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:

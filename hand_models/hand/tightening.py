@@ -56,11 +56,14 @@ class ClosingSequence(NamedTuple):
     in_order : bool
         Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
         sooner than the one before it ends.
+    closure : str
+        How it has ended, one of `hand_models.hand.CLOSURES`.
     """
 
     finger: str
     stages: tuple[ClosingStage, ...]
     in_order: bool
+    closure: str
 
 
 def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
@@ -110,5 +113,5 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
         ordered = all(
             later.starts >= earlier.ends for earlier, later in itertools.pairwise(stages[:-1])
         )
-        sequence.append(ClosingSequence(name, tuple(stages), ordered))
+        sequence.append(ClosingSequence(name, tuple(stages), ordered, settled.closures[i]))
     return tuple(sequence)

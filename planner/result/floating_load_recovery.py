@@ -72,6 +72,7 @@ def recover_floating_hand(
         palm=palm,
         utilisation=max(0.0, float(space.utilisations(wrist.twist).max())),
         seating=settled.seating,
+        closures=settled.closures,
         space=space,
         wrist=wrist,
     )

@@ -150,6 +150,8 @@ class HandPlan:
     utilisation : float
     seating : Seating
         Where the hold is in H.
+    closures : tuple of str
+        How each finger has ended on the hold, of `hand_models.hand.CLOSURES`.
     space : WrenchSpace
         The set that the program used; of a floating hand linearised where its wrist goes.
     laws : ndarray, shape (n, 2, 2), or None
@@ -176,6 +178,7 @@ class HandPlan:
     palm: PalmPlan
     utilisation: float
     seating: Seating
+    closures: tuple[str, ...]
     space: WrenchSpace
     laws: Array | None = None
     nail_planes: Mapping[int, tuple[HalfPlane, ...]] = field(default_factory=dict)

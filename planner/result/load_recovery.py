@@ -184,6 +184,7 @@ class LoadRecovery:
                     palm=PalmPlan(place, force, moments[h], arrays.engaged[h], palm_used[h]),
                     utilisation=used[h],
                     seating=hand.seating,
+                    closures=hand.closures,
                     space=space,
                     laws=hand.loads,
                     nail_planes=nails.get(h, {}),

@@ -12,7 +12,7 @@ from msgspec import UNSET
 from hand_models.base import Array, EmptySetError
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import TensionLimit
-from hand_models.hand import FINGERS, Seating, SettledHand, Tile, closing_sequence
+from hand_models.hand import FINGERS, NearbyClosure, Seating, SettledHand, Tile, closing_sequence
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
 from planner.result import HandPlan, LimitName, Plan, Price, TensionPath, WristPlan
@@ -68,6 +68,7 @@ def wrench_space_reply(
     settled: SettledHand,
     space: WrenchSpace,
     limits: Iterable[TensionLimit],
+    nearby: Iterable[NearbyClosure],
     wrist: WristPlan | None = None,
 ) -> replies.WrenchSpaceReply:
     """Return one hand's wrench space as a reply, with its views at utilisation 1.
@@ -114,8 +115,11 @@ def wrench_space_reply(
                 closing.finger,
                 [replies.ClosingStage(*stage) for stage in closing.stages],
                 closing.in_order,
+                closing.closure,
+                list(there.closures),
+                there.turn,
             )
-            for closing in closing_sequence(settled)
+            for closing, there in zip(closing_sequence(settled), nearby, strict=True)
         ],
         tension_limits=[
             replies.TensionLimit(limit.finger, _number(limit.tension), limit.phalanx)
@@ -280,17 +284,18 @@ def _fingers(part: HandPlan, model: bool) -> list[replies.Finger]:
         )
     if model:
         _add_models(part, [tile for own in tiles.values() for tile in own])
-    drives = zip(FINGERS, part.tensions.tolist(), *part.drives.tolist(), strict=True)
+    drives = zip(FINGERS, part.closures, part.tensions.tolist(), *part.drives.tolist(), strict=True)
     return [
         replies.Finger(
             name=name,
+            closure=closure,
             tendon_tension=tension,
             motor_torque=torque,
             motor_current=current,
             winch_angle=angle,
             tiles=tiles[name],
         )
-        for name, tension, torque, current, angle in drives
+        for name, closure, tension, torque, current, angle in drives
     ]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.fixed_wrist import tension_limits
+from hand_models.hand import nearby_closures
 from hand_models.parameters import ParameterTable
 from planner import deadline, prepare, solving
 from planner.deadline import DeadlineError
@@ -126,6 +127,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         hand.settled,
         hand.space,
         tension_limits(hand.settled),
+        nearby_closures(hand.settled),
         wrist,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
@@ -16,6 +17,7 @@ from service.replies import (
     AXES,
     AxisCapability,
     Certificate,
+    ClosingSequence,
     Finger,
     Hand,
     LimitName,
@@ -30,6 +32,9 @@ __all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
+
+NEARLY: Final = 0.02
+"""Turns of joints that are told where the rock is a little elsewhere; less is not much [rad]."""
 
 JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
@@ -108,6 +113,9 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         _closing_table(reply),
         out,
     )
+    for closing in reply.closing:
+        if closing.nearby or closing.nearby_turn > NEARLY:
+            out.print(_nearby_sentence(closing))
     tensions = table_of("finger", "phalanx")
     tensions.add_column("f_t(max) N", justify="right")
     for limit in reply.tension_limits:
@@ -222,13 +230,25 @@ def _closing_table(reply: WrenchSpaceReply) -> Table:
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
     for part in (stage.part for stage in reply.closing[0].stages):
         table.add_column(part, justify="right")
+    table.add_column("ends")
     for closing in reply.closing:
         cells = [
             f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
             for stage in closing.stages
         ]
-        table.add_row(closing.finger, kinds.get((closing.finger, "base"), ""), *cells)
+        table.add_row(
+            closing.finger, kinds.get((closing.finger, "base"), ""), *cells, closing.closure
+        )
     return table
+
+
+def _nearby_sentence(closing: ClosingSequence) -> str:
+    """Say how else a finger would end."""
+    ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
+    return (
+        f"{closing.finger} is {closing.closure} here; with the rock 0.1 mm elsewhere its joints "
+        f"end up to {math.degrees(closing.nearby_turn):.1f}° from here{ends}"
+    )
 
 
 def _path_sentence(path: TensionPath) -> str:

@@ -43,10 +43,12 @@ class Tile(Struct, kw_only=True):
 class Finger(Struct, kw_only=True):
     """One finger: its tendon, its motor while it tightens that, its tiles from the base outward.
 
-    The winch's angle is from the open finger [rad].
+    ``closure``: how it has ended on its hold: ``laid``, ``hooked``, ``wedged``, ``curled``,
+    ``stopped`` or ``straight``. The winch's angle is from the open finger [rad].
     """
 
     name: str
+    closure: str
     tendon_tension: float
     motor_torque: float
     motor_current: float

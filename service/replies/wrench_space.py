@@ -48,12 +48,18 @@ class ClosingStage(Struct):
 class ClosingSequence(Struct):
     """How a finger has closed: its nail, its joints from the base outward, its tiles.
 
-    ``in_order``: whether nail and joints move one after the other.
+    ``in_order``: whether nail and joints move one after the other. ``closure``: how it has ended:
+    ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or ``straight``. ``nearby``: how else
+    it would end if the rock were 0.1 mm elsewhere, ``refused`` if the hand could not be there;
+    ``nearby_turn``: by how much a joint would end elsewhere [rad].
     """
 
     finger: str
     stages: list[ClosingStage]
     in_order: bool
+    closure: str
+    nearby: list[str]
+    nearby_turn: float
 
 
 class TensionLimit(Struct):

@@ -1,13 +1,17 @@
 """In which order a finger's springs let it close, and at which tension each stage is over."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from hand_models import Cylinder, Plane, Pose
-from hand_models.hand import closing_sequence
+from hand_models import Cylinder, Grasp, InvalidInputError, Plane, Pose, Profile, Sphere
+from hand_models.finger import PHALANGES
+from hand_models.hand import closing_sequence, nearby_closures
 from hand_models.hand.tightening import TILES
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, pinch
+from tests.suite.helpers.rocks import random_profile
 
 PARTS = ["nail", "proximal", "middle", "distal", TILES]
 
@@ -68,3 +72,75 @@ def test_friction_makes_the_far_joints_later():
     assert after[1].ends == pytest.approx(before[1].ends)
     assert after[2].ends == pytest.approx(before[2].ends / 0.7)
     assert after[3].ends == pytest.approx(before[3].ends / 0.49)
+
+
+KNOB = Profile(
+    np.array([[-0.6, 0.06], [-0.075, 0.06], [-0.04, 0.0], [0.04, 0.0], [0.075, 0.06], [0.6, 0.06]])
+)
+"""On a wall 60 mm behind it."""
+
+BALL = Sphere(0.03)
+LEFT = Pose(np.array([0.11, 0.0165, 0.03]), np.eye(3))
+"""Under inner_left alone."""
+
+AWAY = Pose(np.array([0.0, 0.0, 1.0]), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("hold", "grasp", "pose", "closures"),
+    [
+        (Cylinder(0.3), PINCH, None, "laid laid laid laid"),
+        (KNOB, PINCH, None, "wedged wedged wedged wedged"),
+        (BALL, Grasp(closing_tension=37.0), LEFT, "stopped hooked stopped stopped"),
+        (BALL, Grasp(closing_tension=8.0), LEFT, "curled hooked curled curled"),
+        (Plane(), PINCH, AWAY, "stopped stopped stopped stopped"),
+        (Cylinder(0.3), replace(PINCH, fingernail=True), None, "straight " * 4),
+    ],
+)
+def test_it_is_told_how_fingers_end(hold, grasp, pose, closures):
+    settled = HAND.settle(hold, ROCK, grasp, pose)
+    assert [each.closure for each in closing_sequence(settled)] == closures.split()
+
+
+def test_how_fingers_end_is_what_their_contacts_say():
+    seen = set()
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        try:
+            settled = HAND.settle(random_profile(rng), ROCK, PINCH)
+        except InvalidInputError:
+            continue
+        for finger, closure in zip(settled.fingers, settled.closures, strict=True):
+            held, bearing = sum(finger.touching), len(finger.bearing)
+            assert (closure == "laid") == (held == len(PHALANGES))
+            assert (closure == "hooked") == (0 < held < len(PHALANGES))
+            assert (closure == "wedged") == (held == 0 < bearing)
+            seen.add(closure)
+    assert seen >= {"laid", "hooked"}
+
+
+def test_where_the_rock_is_a_little_elsewhere_fingers_end_as_told():
+    """Hands on rough rock, one of whose fingers loses a tile within a tenth of a millimetre."""
+    settled = HAND.settle(random_profile(np.random.default_rng(18)), ROCK, PINCH)
+    told = nearby_closures(settled)
+    pose = settled.seating.pose
+    there = [
+        HAND.settle(settled.hold, ROCK, settled.grasp, Pose(pose.position + step, pose.rotation))
+        for step in 1e-4 * np.vstack([np.eye(3), -np.eye(3)])
+    ]
+    assert any(each.closures for each in told)
+    for k, each in enumerate(told):
+        assert set(each.closures) == {hand.closures[k] for hand in there} - {settled.closures[k]}
+        turns = [hand.fingers[k].joint_angles - settled.fingers[k].joint_angles for hand in there]
+        assert each.turn == pytest.approx(np.abs(turns).max())
+
+
+def test_a_hand_that_cannot_be_a_little_nearer_is_told():
+    """Open fingers have 0.28 mm between a plane and their tiles' faces, beside a palm on it."""
+    settled = HAND.settle(Plane(), ROCK, Grasp(), Pose(np.array([0.0, 0.0, -2.5e-4]), np.eye(3)))
+    assert all("refused" in each.closures for each in nearby_closures(settled))
+    assert not any("refused" in each.closures for each in nearby_closures(settled, 1e-5))
+
+
+def test_nothing_is_near_where_nothing_is_moved():
+    assert nearby_closures(pinch(), 0.0) == (((), 0.0),) * 4

@@ -129,8 +129,9 @@ def test_every_field_of_the_contract_is_there_and_nothing_of_the_model_unasked()
     }  # fmt: skip
     finger = reply["hands"][0]["fingers"][0]
     assert set(finger) == {
-        "name", "tendon_tension", "motor_torque", "motor_current", "winch_angle", "tiles"
+        "name", "closure", "tendon_tension", "motor_torque", "motor_current", "winch_angle", "tiles"
     }  # fmt: skip
+    assert finger["closure"] == "laid"
     assert reply["survival_probability"] is reply["joint_torque"] is reply["prices"] is None
     assert "load_at_zero" not in finger["tiles"][0]
     assert "wrench_space" not in reply["hands"][0]
