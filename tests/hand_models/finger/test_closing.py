@@ -20,6 +20,7 @@ from hand_models.hand.tightening import resting_tensions
 from hand_models.rock import Profile
 from hand_models.sections import FlatSection, PolylineSection, RoundSection
 from tests.suite.helpers.fingers import (
+    GRASPS,
     any_hold,
     faults,
     lifted,
@@ -73,7 +74,10 @@ def test_wherever_a_finger_closes_it_is_clear_of_rock_whole_and_in_balance_slow(
 
 
 def on_rough_rock(first, count):
-    on_holds = [rough_opening(MODEL, ROCK, seed) for seed in range(first, first + count)]
+    on_holds = [
+        rough_opening(MODEL, ROCK, seed, GRASPS[seed % len(GRASPS)])
+        for seed in range(first, first + count)
+    ]
     found = close_all(MODEL, [on_hold.opened for on_hold in on_holds])
     wrong = {
         seed: what
