@@ -17,13 +17,12 @@ import zenoh
 from hand_models.base import InvalidInputError, Pose
 from planner.robots import load_robot, robosimian
 from service import CruxClient
-from service.answering import dispatch, read_robot, robots_of, with_hand, with_robot
+from service.answering import dispatch, read_hand, read_robot, robots_of, with_hand, with_robot
 from service.answering.questions import question
 from service.commands.cli import run
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import NoServiceError, ServiceError, decode_request, service_key
-from tests.suite.helpers.commands import process
 from tests.suite.helpers.hands import entry_toml
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import pose, put, wall_request
@@ -335,38 +334,50 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
             CruxClient(alone, "loris", timeout=PATIENCE).plan(request)
 
 
-def test_serve_and_query_a_robot_and_a_hand(file: Path, written, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def served(file: Path) -> Iterator[Served]:
+    """A process that serves the robot of the file."""
+    server = Served(free_endpoint(), "--robot", str(file))
+    yield server
+    server.stop(signal.SIGTERM)
+    assert server.process.returncode == 0
+
+
+def flags_to(served: Served) -> list[str]:
+    flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting", "--json"]
+    return [*flags, "--timeout", str(PATIENCE)]
+
+
+def test_serve_and_query_a_robot_and_a_hand(
+    served: Served, file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("structure", "held_mass", 20.0))
-    own = read_robot(file)
-    served = Served(free_endpoint(), "--robot", str(file))
-    flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting", "--json"]
-    flags += ["--timeout", str(PATIENCE)]
-    try:
-        assert set(served.ready["keys"]) == {
-            service_key("arms", name) for name in dispatch.SERVICES
-        }
-        path = written(hanging(file))
-        asked = process("query", path, *flags, "--robot", str(file), "--hand", str(hand))
-        assert (asked.returncode, asked.stderr) == (0, b"")
-        from service.answering import read_hand
+    assert set(served.ready["keys"]) == {service_key("arms", name) for name in dispatch.SERVICES}
+    flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
+    assert run(["query", written(hanging(file)), *flags]) == 0
+    request = with_hand(plan_request(hanging(file)), read_hand(hand))
+    want = dispatch.plan(request, robots_of(read_robot(file)))
+    assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
-        request = with_hand(plan_request(hanging(file)), read_hand(hand))
-        want = dispatch.plan(request, robots_of(own))
-        got = json.loads(asked.stdout)
-        assert got["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
-        named = written(put(hanging(file), ("stance", "robot"), "arms"), "named.json")
-        asked = process("query", named, *flags)
-        assert (asked.returncode, asked.stderr) == (0, b"")
-        with zenoh.open(client_config(served.endpoint)) as session:
-            far = hanging(file, "solve")
-            far["stance"]["hands"][1]["pose"]["position"][2] += 1.0
-            with pytest.raises(ServiceError, match="right is out of reach by 0") as caught:
-                CruxClient(session, "arms", timeout=PATIENCE).plan(plan_request(far))
-            assert caught.value.kind == "unreachable"
-    finally:
-        served.stop(signal.SIGTERM)
-    assert served.process.returncode == 0
+
+def test_a_query_that_names_the_robot_goes_to_its_service(
+    served: Served, file: Path, written, capfd: pytest.CaptureFixture[str]
+) -> None:
+    named = written(put(hanging(file), ("stance", "robot"), "arms"))
+    assert run(["query", named, *flags_to(served)]) == 0
+    assert told(capfd)["status"] == "optimal"
+
+
+def test_a_service_says_what_its_robot_does_not_reach(served: Served, file: Path) -> None:
+    far = hanging(file, "solve")
+    far["stance"]["hands"][1]["pose"]["position"][2] += 1.0
+    with (
+        CruxClient(client_config(served.endpoint), "arms", timeout=PATIENCE) as client,
+        pytest.raises(ServiceError, match="right is out of reach by 0") as caught,
+    ):
+        client.plan(plan_request(far))
+    assert caught.value.kind == "unreachable"
 
 
 def test_the_demo_is_of_the_robot(

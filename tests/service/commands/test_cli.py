@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -317,32 +318,65 @@ def test_a_picture_that_cannot_be(
 # serve and query ----------------------------------------------------------------------------------
 
 
-def test_query_and_serve(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
     server = Served(free_endpoint())
-    flags = ["-m", "client", "-e", server.endpoint, "--no-multicast-scouting"]
-    flags += ["--timeout", str(PATIENCE)]
-    try:
-        asked = process("query", stance_file(wall_request()), *flags, "--json")
-        assert (asked.returncode, asked.stderr) == (DONE, b"")
-        reply = json.loads(asked.stdout)
-        assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
-        assert reply["prices"]
-        heavy = json.dumps(wall_request(HEAVY)).encode()
-        asked = process("query", "-", *flags, given=heavy)
-        assert (asked.returncode, asked.stderr) == (OVERLOADED, b"")
-        assert asked.stdout.startswith(b"OVERLOADED")
-        twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
-        assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
-        assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
-        taken = process("serve", "-l", server.endpoint, "--no-multicast-scouting", "--json")
-        assert (taken.returncode, taken.stdout) == (FAILED, b"")
-        assert taken.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
-    finally:
-        server.process.terminate()
-        server.process.communicate()
+    yield server
+    server.process.terminate()
+    server.process.communicate()
+
+
+def flags_to(endpoint: str) -> list[str]:
+    flags = ["-m", "client", "-e", endpoint, "--no-multicast-scouting"]
+    return [*flags, "--timeout", str(PATIENCE)]
+
+
+def test_query_and_serve(served: Served, stance_file) -> None:
+    flags = flags_to(served.endpoint)
     asked = process("query", stance_file(wall_request()), *flags, "--json")
-    assert (asked.returncode, asked.stdout) == (FAILED, b"")
-    assert asked.stderr.splitlines()[-1].startswith(b"crux: no zenoh session: ")
+    assert (asked.returncode, asked.stderr) == (DONE, b"")
+    reply = json.loads(asked.stdout)
+    assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
+    assert reply["prices"]
+
+
+def test_a_query_from_standard_input(
+    served: Served, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heavy = io.BytesIO(json.dumps(wall_request(HEAVY)).encode())
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=heavy))
+    assert run(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.startswith("OVERLOADED")
+
+
+def test_what_the_service_refuses_is_bad_input(
+    served: Served, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
+    flags = flags_to(served.endpoint)
+    assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
+
+
+def no_session(capfd: pytest.CaptureFixture[str]) -> bool:
+    """Whether that is what was said at last, and only on standard error."""
+    out, err = capfd.readouterr()
+    return out == "" and err.splitlines()[-1].startswith("crux: no zenoh session: ")
+
+
+def test_an_endpoint_that_is_taken_is_not_served(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"]) == FAILED
+    assert no_session(capfd)
+
+
+def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+    flags = flags_to(free_endpoint())
+    assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
+    assert no_session(capfd)
 
 
 def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
