@@ -249,13 +249,23 @@ def test_the_odd_hands_are_odd():
     assert any(hand.palm.engaged and hand.nail_rows for hand in hands)
 
 
+last_seeds = pytest.mark.parametrize("last", [15, pytest.param(60, marks=pytest.mark.slow)])
+
+
+def drawn_hands(data: st.DataObject, fewest: int, last: int) -> list[SettledHand]:
+    """Up to five random hands of seeds up to the last."""
+    seeds = data.draw(st.lists(st.integers(0, last), min_size=fewest, max_size=5))
+    return [hand for hand in map(random_hand, seeds) if hand is not None]
+
+
+@last_seeds
 @given(
-    st.lists(st.integers(0, 60), min_size=1, max_size=5),
-    st.lists(st.integers(0, 9), max_size=2),
-    st.one_of(st.none(), st.floats(1.0, 1e3)),
+    data=st.data(),
+    odd=st.lists(st.integers(0, 9), max_size=2),
+    cap=st.one_of(st.none(), st.floats(1.0, 1e3)),
 )
-def test_every_number_is_that_of_its_formula(seeds, odd, cap):
-    hands = [hand for hand in map(random_hand, seeds) if hand is not None]
+def test_every_number_is_that_of_its_formula(last, data, odd, cap):
+    hands = drawn_hands(data, 1, last)
     hands += [odd_hands()[i] for i in odd]
     spaces = wrench_spaces(hands, cap)
     assert len(spaces) == len(hands)
@@ -313,10 +323,11 @@ def test_no_hands_have_no_sets():
     assert wrench_spaces([]) == []
 
 
-@given(st.lists(st.integers(0, 60), min_size=2, max_size=5))
-def test_a_set_is_the_same_to_the_last_bit_whatever_other_hands_there_are(seeds):
+@last_seeds
+@given(data=st.data())
+def test_a_set_is_the_same_to_the_last_bit_whatever_other_hands_there_are(last, data):
     # copies, of which no set is known
-    hands = [replace(hand) for hand in map(random_hand, seeds) if hand is not None]
+    hands = [replace(hand) for hand in drawn_hands(data, 2, last)]
     for hand, together in zip(hands, wrench_spaces(hands), strict=True):
         alone = wrench_space(replace(hand))
         for name in ("origin", "generators", "L", "l0", "s", "H", "h"):

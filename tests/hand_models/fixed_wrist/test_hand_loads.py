@@ -1,11 +1,12 @@
 """What the tiles of a hand carry: every force of every finger, and their sum."""
 
 import numpy as np
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
 from hand_models import FINGERS
 from hand_models.fixed_wrist import wrench_space
 from tests.suite.helpers.hands import HAND, pinch, settled_at
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -61,8 +62,7 @@ def equation_6(settled, i, tension):
     return np.einsum("tkx,tx->tk", settled.axes[tiles, :2], on_rock)
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds, st.floats(0.0, 700.0))
+@given_some(35, 100, seeds, st.floats(0.0, 700.0))
 def test_loads_are_those_of_the_full_system_of_equation_6(seed, tension):
     settled = settled_at(seed)
     if settled is None:
@@ -75,8 +75,7 @@ def test_loads_are_those_of_the_full_system_of_equation_6(seed, tension):
         np.testing.assert_allclose(loads[tiles, :2] / scale, expected / scale, atol=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds)
+@given_some(35, 100, seeds)
 def test_the_hands_wrench_is_the_sum_of_its_tiles_and_palms_forces(seed):
     settled = settled_at(seed)
     if settled is None:

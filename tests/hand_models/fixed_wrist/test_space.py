@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
 from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, Pose, SpinyHand
 from hand_models.fixed_wrist import wrench_space
@@ -22,6 +22,7 @@ from tests.suite.helpers.hands import (
     settled_at,
     without_hand_load,
 )
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -89,8 +90,7 @@ def test_the_origin_is_c_sys_and_a_generator_is_c_act_of_equation_14():
         np.testing.assert_allclose(space.generators[:, i], c_act, atol=1e-12)
 
 
-@settings(max_examples=80, deadline=None)
-@given(seeds)
+@given_some(27, 80, seeds)
 def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -111,8 +111,7 @@ def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
     assert named == touching
 
 
-@settings(max_examples=80, deadline=None)
-@given(seeds)
+@given_some(27, 80, seeds)
 def test_rows_say_what_tile_by_tile_reckoning_says(seed):
     """Utilisation from each tile's own load, and hard rows from its shear and the stops."""
     settled = settled_at(seed)

@@ -5,11 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
 from hand_models import FINGERS, Cylinder, Pose, Surface, tension_limits
 from hand_models.fixed_wrist import wrench_space
 from tests.suite.helpers.hands import HAND, ROCK, pinch, settled_at
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -37,8 +38,7 @@ def own_tiles(settled, i):
     return np.flatnonzero((settled.finger_of == i) & settled.touching)
 
 
-@settings(max_examples=60, deadline=None)
-@given(seeds)
+@given_some(25, 60, seeds)
 def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -55,8 +55,7 @@ def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
         assert (limit.phalanx is None) == math.isinf(limit.tension)
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds)
+@given_some(35, 100, seeds)
 def test_just_below_f_t_max_every_tile_holds_and_just_above_its_tile_lets_go(seed):
     settled = settled_at(seed)
     if settled is None:

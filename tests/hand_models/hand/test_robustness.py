@@ -25,6 +25,7 @@ from hand_models import (
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import closing_sequence
 from tests.suite.helpers.hands import HAND
+from tests.suite.helpers.shares import some_and_all
 
 ROCK = Surface.named("rock")
 SIZES = [1e-3, 1e-2, 1.0, 30.0, 1e3]
@@ -70,18 +71,29 @@ def stress(hold, surface, grasp, pose):
         return "held"
 
 
-def test_holds_from_a_millimetre_to_a_kilometre_can_be_taken():
-    ends = set()
-    for size, rotation in itertools.product(SIZES, (0.0, 0.4, 2.8, math.pi)):
-        for hold in (Cylinder(size), Sphere(size), Edge(size, 1.2)):
-            ends.add(stress(hold, ROCK, Grasp(rotation), None))
+@some_and_all(
+    "cases",
+    itertools.product(
+        SIZES, (0.0, 0.4, 2.8, math.pi), (Cylinder, Sphere, lambda size: Edge(size, 1.2))
+    ),
+    7,
+)
+def test_holds_from_a_millimetre_to_a_kilometre_can_be_taken(cases):
+    ends = {stress(hold(size), ROCK, Grasp(rotation), None) for size, rotation, hold in cases}
     assert "held" in ends
 
 
-@pytest.mark.parametrize("angle", [1e-9, 1e-3, math.pi - 1e-3, math.pi - 1e-9])
-@pytest.mark.parametrize("radius", [1e-4, 0.1])
-def test_knife_edges_and_edges_that_are_nearly_flat(angle, radius):
-    for rotation, tilt in ((0.0, 0.1), (1.0, 0.0), (math.pi, 0.1)):
+@some_and_all(
+    "cases",
+    itertools.product(
+        (1e-9, 1e-3, math.pi - 1e-3, math.pi - 1e-9),
+        (1e-4, 0.1),
+        ((0.0, 0.1), (1.0, 0.0), (math.pi, 0.1)),
+    ),
+    5,
+)
+def test_knife_edges_and_edges_that_are_nearly_flat(cases):
+    for angle, radius, (rotation, tilt) in cases:
         pose = Pose(
             np.array([0.03, 0.0, 0.004]), Rotation.from_rotvec([0.0, tilt, 0.2]).as_matrix()
         )
@@ -98,13 +110,20 @@ def test_an_edge_that_is_nearly_flat_holds_like_a_plane():
     np.testing.assert_allclose(edge.loads, plane.loads, atol=1e-3)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 0.5, 1.2, math.pi / 2, math.pi])
 @pytest.mark.parametrize("hold", [Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)])
-def test_holds_tilted_as_far_as_they_go(hold, tilt):
-    for axis in np.vstack([np.eye(3), [[0.6, 0.8, 0.0]]]):
+@some_and_all(
+    "poses",
+    itertools.product(
+        (0.0, 0.5, 1.2, math.pi / 2, math.pi),
+        np.vstack([np.eye(3), [[0.6, 0.8, 0.0]]]),
+        ([0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [0.1, 0.1, 0.1]),
+    ),
+    7,
+)
+def test_holds_tilted_as_far_as_they_go(hold, poses):
+    for tilt, axis, place in poses:
         turned = Rotation.from_rotvec(tilt * axis).as_matrix()
-        for place in ([0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [0.1, 0.1, 0.1]):
-            stress(hold, ROCK, Grasp(1.0), Pose(np.array(place), turned))
+        stress(hold, ROCK, Grasp(1.0), Pose(np.array(place), turned))
 
 
 @pytest.mark.parametrize("distance", [0.05, 1.0, 1e4])
@@ -132,8 +151,17 @@ def test_a_joint_in_the_middle_of_a_ball_is_no_division_by_zero():
     assert stress(Sphere(1e-3), ROCK, Grasp(), pose) in ("held", "empty")
 
 
-@pytest.mark.parametrize("strength", [1e-3, 1.0, 1e5])
-@pytest.mark.parametrize("closing", [6.5, 37.0, 700.0])
+MANY_VERTICES = (1e5, 6.5)
+"""Strength and closing tension with which one set has vertices for half a minute."""
+
+
+@pytest.mark.parametrize(
+    ("strength", "closing"),
+    [
+        pytest.param(*case, marks=pytest.mark.slow if case == MANY_VERTICES else ())
+        for case in itertools.product((1e-3, 1.0, 1e5), (6.5, 37.0, 700.0))
+    ],
+)
 def test_strengths_and_closing_tensions_of_any_size(strength, closing):
     for half_planes, lateral in ((1, True), (3, False)):
         surface = Surface.from_values({"shear_limit": strength, "half_planes": half_planes})

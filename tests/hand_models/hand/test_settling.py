@@ -26,6 +26,7 @@ from tests.suite.helpers.rocks import (
     random_mesh,
     random_profile,
 )
+from tests.suite.helpers.shares import given_some
 from tests.suite.helpers.stances import on_wall
 
 seeds = st.integers(0, 2**32 - 1)
@@ -179,8 +180,7 @@ def turned(frame, angle):
     )
 
 
-@settings(max_examples=15, deadline=None)
-@given(seeds)
+@given_some(5, 15, seeds)
 def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
     rng = np.random.default_rng(seed)
     placements = [random_placement(rng) for _ in range(rng.integers(1, 5))]
@@ -189,8 +189,7 @@ def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
             check_hand(placement, settled)
 
 
-@settings(max_examples=10, deadline=None)
-@given(seeds)
+@given_some(4, 10, seeds)
 def test_tendons_that_rub_load_outer_fingers_less(seed):
     rng = np.random.default_rng(seed)
     hand = changed_hand("tendon", "friction", 0.1)
@@ -200,8 +199,7 @@ def test_tendons_that_rub_load_outer_fingers_less(seed):
             check_hand(placement, settled, hand)
 
 
-@settings(max_examples=8, deadline=None)
-@given(seeds)
+@given_some(3, 8, seeds)
 def test_neither_company_nor_order_changes_a_hand(seed):
     rng = np.random.default_rng(seed)
     placements = [random_placement(rng, rough=0.1) for _ in range(4)]
@@ -369,7 +367,7 @@ def test_threads_share_what_is_kept():
     rng = np.random.default_rng(11)
     placements = [random_placement(rng, rough=0.0) for _ in range(12)]
     orders = [rng.integers(0, len(placements), 6) for _ in range(60)]
-    with ThreadPoolExecutor(8) as pool:
+    with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda o: hand.settle_each([placements[i] for i in o]), orders))
     alone = SpinyHand().settle_each(placements)
     for order, outcomes in zip(orders, found, strict=True):
@@ -415,8 +413,7 @@ def test_recent_answers_are_those_asked_for_last(most, steps):
 # The bottom-up state of a finger ------------------------------------------------------------------
 
 
-@settings(max_examples=50, deadline=None)
-@given(seeds)
+@given_some(17, 50, seeds)
 def test_a_finger_is_laid_as_on_its_section(seed):
     """On planes of any tilt through smooth holds."""
     rng = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
 from hand_models import (
     FINGERS,
@@ -22,6 +22,7 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import Placement
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, settled_at
 from tests.suite.helpers.rocks import in_hand
+from tests.suite.helpers.shares import given_some
 
 MESH_ORIGIN = np.array([-19.85, 0.0, 43.4])
 """Of H in the frame of the published CAD mesh, axes parallel [mm]."""
@@ -148,13 +149,14 @@ def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
     assert palm.shear_limit == pytest.approx(63.0 * share.sum())  # alike tiles share alike
 
 
-def test_what_a_palm_carries_fades_with_its_distance_from_the_rock():
-    palms = [settled.palm for settled in off_a_wall(np.linspace(0.0, 5.01e-3, 502))]
+@pytest.mark.parametrize("steps", [100, pytest.param(501, marks=pytest.mark.slow)])
+def test_what_a_palm_carries_fades_with_its_distance_from_the_rock(steps):
+    palms = [settled.palm for settled in off_a_wall(np.linspace(0.0, 5.01e-3, steps + 1))]
     found = np.array([(palm.shear_limit, palm.pressing_limit) for palm in palms])
     np.testing.assert_allclose(found[0], [8 * 63.0, 8 * 250.0], rtol=0.03)
     np.testing.assert_array_equal(found[-1], 0.0)
     # by a hundredth of a millimetre at a time, no more than a five-hundredth of it all
-    assert (np.abs(np.diff(found, axis=0)) <= 0.0021 * found[0]).all()
+    assert (np.abs(np.diff(found, axis=0)) <= 1.05 / steps * found[0]).all()
 
 
 def test_a_grasp_without_palm_has_none():
@@ -193,8 +195,7 @@ def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 20
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds)
+@given_some(35, 100, seeds)
 def test_tiles_said_to_touch_are_on_the_rock(seed):
     settled = settled_at(seed)
     if settled is None:

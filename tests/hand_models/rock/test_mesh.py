@@ -23,6 +23,7 @@ from tests.suite.helpers.rocks import (
     random_mesh,
     random_profile,
 )
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -154,7 +155,8 @@ def test_no_raw_rock_stands_out_of_a_smoothed_cut(seed):
     assert PolylineSection([curve]).clearances(raw[inner] @ [1.0, 1j]).max() < 1e-4
 
 
-def check_entry(seed):
+@given_some(8, 60, seeds)
+def test_entry_is_where_a_line_first_meets_the_rock(seed):
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng)
     direction = random_axes(rng, 0.5)[:, 2]
@@ -172,19 +174,6 @@ def check_entry(seed):
         assert along[steps < found].min(initial=1.0) > -1e-9
 
 
-@settings(max_examples=15, deadline=None)
-@given(seeds)
-def test_entry_is_where_a_line_first_meets_the_rock(seed):
-    check_entry(seed)
-
-
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None)
-@given(seeds)
-def test_every_entry_is_where_a_line_first_meets_the_rock(seed):
-    check_entry(seed)
-
-
 def test_a_palm_inside_the_rock_is_told_how_deep():
     hold = Mesh(*cylinder_mesh(0.3, 1000))
     assert hold.entry([0.0, 0.0, 0.003], Z) == pytest.approx(-0.003, abs=1e-5)
@@ -192,8 +181,7 @@ def test_a_palm_inside_the_rock_is_told_how_deep():
     assert hold.entry([0.0, 0.0, 0.35], Z) == math.inf
 
 
-@settings(max_examples=50, deadline=None)
-@given(seeds)
+@given_some(17, 50, seeds)
 def test_tiles_rest_on_the_rock_and_not_in_it(seed):
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng) if rng.random() < 0.6 else random_profile(rng)

@@ -202,10 +202,11 @@ def random_palm(rng, n, own):
 
 @pytest.mark.parametrize("own", [False, True], ids=["tiles", "tiles and palm"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-def test_the_loads_are_those_of_every_consistent_friction_pattern(n, own):
+@pytest.mark.parametrize("palms", [3, pytest.param(8, marks=pytest.mark.slow)])
+def test_the_loads_are_those_of_every_consistent_friction_pattern(n, own, palms):
     """From rest, after a reversal, and after another."""
     rng = np.random.default_rng(n)
-    for _ in range(8):
+    for _ in range(palms):
         palm = random_palm(rng, n, own)
         state = palm.rest()
         for travel in (1e-3, rng.uniform(0.1, 0.95) * 1e-3, 0.97e-3):

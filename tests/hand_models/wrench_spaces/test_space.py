@@ -16,6 +16,11 @@ from tests.suite.helpers.hands import HAND, ROCK, pinch, settled_at, without_han
 EXACT = {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9}
 SEEDS = range(240)
 
+SELDOM = (28, 34, 42, 131, 127)
+"""Hands with flat sets that wrench rows cut, and one with a set of three dimensions."""
+
+SOME = sorted({*SEEDS[::5], *SELDOM})
+
 
 @functools.cache
 def space_of(seed):
@@ -30,23 +35,21 @@ def feasible(space):
     return result.status == 0
 
 
-@pytest.fixture(
-    params=[SEEDS[::5], pytest.param(SEEDS, marks=pytest.mark.slow)], ids=["some", "all"]
-)
+@pytest.fixture(params=[SOME, pytest.param(SEEDS, marks=pytest.mark.slow)], ids=["some", "all"])
 def seeds(request):
     """Random hands: a few, and where there is time for it all."""
     return request.param
 
 
 @functools.cache
-def non_empty_seeds():
-    return [seed for seed in SEEDS if space_of(seed) is not None and feasible(space_of(seed))]
+def is_empty(seed):
+    return space_of(seed) is None or not feasible(space_of(seed))
 
 
 def each_set(seeds=SEEDS):
     """Every random hand's set with something in it, its size in scaled wrenches [N], and an rng."""
-    for seed in non_empty_seeds():
-        if seed not in seeds:
+    for seed in seeds:
+        if is_empty(seed):
             continue
         space = space_of(seed)
         size = 1.0 + float(np.abs(space.vertices() * SCALE).max())
@@ -82,24 +85,28 @@ def mixture(rng, points):
     return rng.dirichlet(np.ones(len(some))) @ some
 
 
-def is_cut(space):
+@functools.cache
+def is_cut(seed):
     """Whether the set without its wrench rows reaches beyond one of them."""
+    space = space_of(seed)
     whole = without_hand_load(space)
     held = space.s[len(space.s) - len(space.D) :]
     return any(largest(whole, d) > s for d, s in zip(space.D, held, strict=True))
 
 
-def test_there_are_hands_of_every_sort_among_them():
-    spaces = [space_of(seed) for seed in non_empty_seeds()]
-    assert len(spaces) >= 150
-    assert len(SEEDS) - len(spaces) >= 10
+def test_there_are_hands_of_every_sort_among_them(seeds):
+    own = [seed for seed in seeds if not is_empty(seed)]
+    spaces, count = [space_of(seed) for seed in own], len(seeds)
+    assert len(spaces) >= 0.65 * count
+    assert count - len(spaces) >= 0.05 * count
     assert {space.dimension for space in spaces} >= {3, 4, 5, 6}
-    assert sum(any("lateral" in c for c in space.columns) for space in spaces) >= 50
-    assert sum(any("palm" in c for c in space.columns) for space in spaces) >= 50
-    assert sum(any(r.limit == "joint_stop" for r in space.rows) for space in spaces) >= 4
+    assert sum(any("lateral" in c for c in space.columns) for space in spaces) >= 0.22 * count
+    assert sum(any("palm" in c for c in space.columns) for space in spaces) >= 0.22 * count
+    stops = sum(any(r.limit == "joint_stop" for r in space.rows) for space in spaces)
+    assert stops >= max(2, count // 60)
     # wrench rows cut many, flat ones too, and leave as many as they are
-    cut = [space for space in spaces if is_cut(space)]
-    assert 30 <= len(cut) <= len(spaces) - 30
+    cut = [space_of(seed) for seed in own if is_cut(seed)]
+    assert 0.13 * count <= len(cut) <= len(spaces) - 0.13 * count
     assert {space.dimension for space in cut} >= {4, 5, 6}
 
 
@@ -197,8 +204,8 @@ def test_off_a_flat_set_nothing_is_contained():
     assert flat >= 50
 
 
-def test_capability_ends_where_the_set_does():
-    for space, size, rng in itertools.islice(each_set(), 60):
+def test_capability_ends_where_the_set_does(seeds):
+    for space, size, rng in itertools.islice(each_set(seeds[::2]), 60):
         direction = mixture(rng, space.vertices())
         ends = space.capability(direction)
         if ends is None:
@@ -259,9 +266,9 @@ def largest_column(space, k, sign):
     return float(linprog(cost, space.A, space.b, bounds=(None, None)).x[k])
 
 
-def test_volume_without_lateral_is_that_of_a_zonotope():
-    checked = 0
-    for held, _, _ in each_set():
+def test_volume_without_lateral_is_that_of_a_zonotope(seeds):
+    checked, wanted = 0, min(50, len(seeds) // 3)
+    for held, _, _ in each_set(seeds):
         space = without_hand_load(held)
         if not any("lateral" in c for c in space.columns) and space.dimension:
             expected, r = segments_volume(space)
@@ -269,16 +276,17 @@ def test_volume_without_lateral_is_that_of_a_zonotope():
             assert dimension == r
             assert volume == pytest.approx(expected, rel=1e-4)
             checked += 1
-        if checked == 50:
+        if checked == wanted:
             break
-    assert checked == 50
+    assert checked == wanted
 
 
-def test_what_wrench_rows_cut_off_is_the_share_of_random_points_beyond_them():
+def test_what_wrench_rows_cut_off_is_the_share_of_random_points_beyond_them(seeds):
     checked = 0
-    for space, _, rng in each_set():
-        if not 2 <= space.dimension <= 4 or not is_cut(space):
+    for seed in seeds:
+        if is_empty(seed) or not 2 <= space_of(seed).dimension <= 4 or not is_cut(seed):
             continue
+        space, rng = space_of(seed), np.random.default_rng(seed)
         whole = without_hand_load(space)
         faces = whole.half_spaces()
         # points of the whole set, from a box about it in its own flat

@@ -80,7 +80,7 @@ def test_load_factor_is_no_less_than_a_smaller_load_proves():
     assert whole.load_factor >= 0.75 * part.load_factor * (1.0 - 3e-3)
 
 
-@pytest.mark.parametrize("preload", [None, 80.0, 37.0])
+@pytest.mark.parametrize("preload", [None, pytest.param(80.0, marks=pytest.mark.slow), 37.0])
 def test_utilisation_and_load_factor_agree(preload):
     if preload is None:
         _, answer = all_float()

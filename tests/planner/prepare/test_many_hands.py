@@ -54,7 +54,12 @@ def test_hands_with_fixed_wrists(crawler, count, joints):
 
 @pytest.mark.parametrize(
     ("count", "floating", "joints"),
-    [(1, 1, True), (2, 2, True), (5, 2, False), (16, 1, True)],
+    [
+        (1, 1, True),
+        (2, 2, True),
+        (5, 2, False),
+        pytest.param(16, 1, True, marks=pytest.mark.slow),
+    ],
 )
 def test_some_hands_float(crawler, count, floating, joints):
     asked = crawler_question(crawler, count, floating, joints=joints)

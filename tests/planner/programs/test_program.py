@@ -23,7 +23,7 @@ from tests.suite.helpers.stances import (
     random_question,
 )
 
-SEEDS = range(40)
+SEEDS = range(16)
 
 many = pytest.mark.parametrize(
     "seeds", [SEEDS, pytest.param(range(200), marks=pytest.mark.slow)], ids=["few", "many"]

@@ -13,11 +13,11 @@ from planner.solving.active_set import active_set_optimum
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall, program_data, random_stance
 
 
-def problems():
+def problems(count):
     """Data of random stances, and of the wall under an uneven load, within their limits."""
     rng = np.random.default_rng(5)
     found = [program_data(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0))))]
-    while len(found) < 12:
+    while len(found) < count:
         stance = random_stance(rng)
         try:
             data = program_data(ask(stance, load=Load(float(rng.uniform(5.0, 60.0)))))
@@ -29,9 +29,9 @@ def problems():
     return found
 
 
-@pytest.fixture(scope="module")
-def data_of_all():
-    return problems()
+@pytest.fixture(scope="module", params=[5, pytest.param(12, marks=pytest.mark.slow)])
+def data_of_all(request):
+    return problems(request.param)
 
 
 def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
@@ -68,11 +68,19 @@ def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
     assert found is None or found.utilisation == pytest.approx(outcome.value, abs=1e-6)
 
 
-def test_tensions_change_continuously_where_plans_become_overloaded():
+SHARES = np.linspace(0.95, 1.1, 60)
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [SHARES[20:40], pytest.param(SHARES, marks=pytest.mark.slow)],
+    ids=["near", "far"],
+)
+def test_tensions_change_continuously_where_plans_become_overloaded(shares):
     """Across 1.25, where the bound of one solve no longer suffices."""
     known = KnownStance(ask(on_wall(overhang=0.5)))
     before = None
-    for share in np.linspace(0.95, 1.1, 60):
+    for share in shares:
         answer = known.plan(share * known.prepared.wrench)
         tensions = np.array([[f.tendon_tension for f in hand.fingers] for hand in answer.hands])
         if before is not None:

@@ -97,8 +97,14 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "seed"), CASES)
-@pytest.mark.parametrize("load", [0.5, 1.0])
+LOADED = [
+    pytest.param(*case, load, marks=() if i % 2 == k else pytest.mark.slow)
+    for i, case in enumerate(CASES)
+    for k, load in enumerate((0.5, 1.0))
+]
+
+
+@pytest.mark.parametrize(("kind", "seed", "load"), LOADED)
 def test_set_points_say_what_plans_say(kind, seed, load):
     question = streamable(KINDS[kind](seed))
     question = replace(question, body_wrench=load * question.body_wrench)
