@@ -338,7 +338,7 @@ def test_a_stop_does_not_wait_for_a_long_question(
 FLOOD, FLOODS = 300, 4
 """Questions that a flood has at once, and floods."""
 
-BEFORE = 100
+BEFORE = 300
 """Others' questions that may be answered before one: far fewer than are waiting."""
 
 
