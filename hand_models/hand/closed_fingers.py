@@ -68,6 +68,9 @@ class ClosedFingers:
         Index of each finger's row, hand by hand.
     alone : dict of int to ClosedFinger
         Fingers that could not be left as they were laid.
+    lifts : dict of int to float
+        By how much hands would have to be lifted along −z of H whose open fingers have rock in
+        them [m].
 
     Attributes
     ----------
@@ -80,9 +83,13 @@ class ClosedFingers:
     """
 
     def __init__(
-        self, rows: Sequence[FingerNumbers], row_of: Sequence[int], alone: dict[int, ClosedFinger]
+        self,
+        rows: Sequence[FingerNumbers],
+        row_of: Sequence[int],
+        alone: dict[int, ClosedFinger],
+        lifts: dict[int, float],
     ) -> None:
-        self.alone = alone
+        self.alone, self.lifts = alone, lifts
         count = len(FINGERS)
         shape = len(row_of) // count, count, len(PHALANGES), NUMBERS
         self._table = np.array(rows).take(row_of, axis=0).reshape(shape)
@@ -156,14 +163,18 @@ def close_fingers(
                 rows.append(row)
             row_of[k] = known[key]
     alone: dict[int, ClosedFinger] = {}
+    lifts: dict[int, float] = {}
     for k, finger in zip(left, _alone(placed, left, tensions), strict=True):
         i = k // len(FINGERS)
         if isinstance(finger, ClosedFinger):
             alone[k], row_of[k] = finger, len(rows)
             rows.append(_row_alone(finger))
-        elif i not in errors:
+            continue
+        if finger.depth > 0.0:
+            lifts[i] = max(finger.lift, lifts.get(i, 0.0))
+        if i not in errors:
             errors[i] = _no_way(placed, i, k % len(FINGERS), finger)
-    return ClosedFingers(rows, row_of, alone)
+    return ClosedFingers(rows, row_of, alone, lifts)
 
 
 def _row_laid(

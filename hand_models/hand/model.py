@@ -85,6 +85,7 @@ class HandModel:
         self.bending_stiffness = table.positive("beam", "bending_stiffness")
         self.torsional_stiffness = table.positive("beam", "torsional_stiffness")
         self.seated_contact = table.scalar("finger", "seated_contact")
+        self.back_off = table.scalar("finger", "back_off")
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))

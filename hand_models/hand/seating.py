@@ -9,7 +9,9 @@ the grasp, and the other follows.
 - Otherwise the *palm rests on the rock*, and the crest's place along x follows.
 - Where that cannot be had the palm rests on the rock with the crest under its centre.
 - On rock known by its outline only the palm rests on the highest rock found under it, on a few
-  lines along it; the crest of a pinch is the hold's origin.
+  lines along it; the crest of a pinch is the hold's origin; c₁ is the mean of both inner fingers'.
+- A seat in which rock would stand in an open finger backs off along −z of H until that is clear, as
+  far as `HandModel.back_off` at most.
 - On a plane every tile lies flat: the palm stands off by the tiles' height, within the spines'
   travel.
 """
@@ -17,7 +19,7 @@ the grasp, and the other follows.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, TypeVar
@@ -30,7 +32,7 @@ from hand_models.finger import settle_finger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
-from hand_models.sections import PolylineSection
+from hand_models.sections import PolylineSection, Section
 
 __all__ = ["CENTRED", "Seating", "propose", "seat", "seating_given", "touches_seat"]
 
@@ -65,10 +67,20 @@ class Seating:
         The hold's frame in H.
     rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
         How it was found.
+    backed_off : float
+        How far along −z of H the hand then backed off, so that its open fingers are clear of the
+        rock [m].
     """
 
     pose: Pose
     rule: str
+    backed_off: float = 0.0
+
+    def off(self, distance: float) -> Seating:
+        """Return the seating of a hand that backs off by a distance [m]."""
+        position = self.pose.position + np.array([0.0, 0.0, distance])
+        position.setflags(write=False)
+        return Seating(Pose(position, self.pose.rotation), self.rule, distance)
 
 
 def seating_given(pose: Pose) -> Seating:
@@ -115,9 +127,13 @@ def propose(hand: HandModel, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
     crest = hand.pinch_crest if pinch else None
     circle = hold.crest_circle(y)
     if circle is None and hold.swept is None:
-        section = hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
-        if isinstance(section, PolylineSection):
-            return _on_outline(hand, section, _Top(hand, hold), crest), False
+        under = [
+            section
+            for side in (y, -y)
+            if isinstance(section := _section_at(hold, side), PolylineSection)
+        ]
+        if under:
+            return _on_outline(hand, under, _Top(hand, hold), crest), False
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
         return CENTRED, False
@@ -194,16 +210,18 @@ def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
 # Rock that is known by its outline only -----------------------------------------------------------
 
 
+def _section_at(hold: Hold, y: float) -> Section | None:
+    """Return the rock in a plane along a palm, y beside the hold's origin."""
+    return hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
+
+
 class _Top:
     """How high the rock stands under a palm, on a few lines along it."""
 
     def __init__(self, hand: HandModel, hold: Hold) -> None:
         self._half = 0.5 * hand.palm_length
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
-        sections = (
-            hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
-            for y in np.linspace(-across, across, LINES)
-        )
+        sections = (_section_at(hold, y) for y in np.linspace(-across, across, LINES).tolist())
         self._lines = [line for line in sections if isinstance(line, PolylineSection)]
 
     def __call__(self, x: float) -> float | None:
@@ -213,23 +231,24 @@ class _Top:
 
 
 def _on_outline(
-    hand: HandModel, section: PolylineSection, top: _Top, crest: float | None
+    hand: HandModel, under: Sequence[PolylineSection], top: _Top, crest: float | None
 ) -> Seating:
-    """Seat a hand on a hold whose section under ``inner_left`` is a polyline."""
+    """Seat a hand on a hold whose sections under the inner fingers are polylines."""
     x, _, z = hand.inner_joint.tolist()
     model = hand.finger
     face = model.tile_range[0], model.joint_spacing, model.tile_height
     limits = model.joint_lower[0], model.joint_upper[0]
 
     def miss(place: Place | None) -> float:
-        """By how much the proximal contact misses c₁; least in rock, most where there is none."""
+        """By how much proximal contacts miss c₁; least in rock, most where there is none."""
         if place is None:
             return math.nan
         joint = x - place[0], z - place[1]
-        if section.face_clearance(joint, *face, limits[0]) <= 0.0:
+        if any(section.face_clearance(joint, *face, limits[0]) <= 0.0 for section in under):
             return -hand.seated_contact
-        rest = section.rest(joint, *face, *limits)
-        return (model.joint_spacing if rest is None else rest.distance) - hand.seated_contact
+        rests = [section.rest(joint, *face, *limits) for section in under]
+        along = [model.joint_spacing if rest is None else rest.distance for rest in rests]
+        return sum(along) / len(along) - hand.seated_contact
 
     def resting(along: float, stand_off: float = 0.0) -> Place | None:
         highest = top(along)
@@ -238,8 +257,8 @@ def _on_outline(
     level = resting(0.0, z + model.tile_height)
     if level is None:
         return CENTRED
-    lying = section.rest((x, z - level[1]), *face, *limits)
-    if lying is not None and lying.flat and abs(lying.angle) < LEVEL:
+    lying = [section.rest((x, z - level[1]), *face, *limits) for section in under]
+    if all(rest is not None and rest.flat and abs(rest.angle) < LEVEL for rest in lying):
         return Seating(_shifted(*level), "flat")
     if crest is None:
         half = 0.5 * hand.palm_length

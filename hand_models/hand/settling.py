@@ -32,6 +32,9 @@ __all__ = ["settle_hands"]
 Known = list[dict[FingerPlane, list[ClosedPhalanx]]]
 """Phalanges of each hand's fingers by what those depend on."""
 
+CLEAR: Final = 1e-6
+"""By how much a hand that backs off is clear of rock [m]."""
+
 SEATED: Final = FINGERS.index("inner_left")
 """The finger whose proximal contact seats a hand."""
 
@@ -72,11 +75,35 @@ def settle_hands(
     return [refused[i] if i in refused else next(settled) for i in range(len(placements))]
 
 
-@np.errstate(divide="ignore", invalid="ignore")
 def _settle(
     hand: HandModel, placements: Sequence[Placement], tensions: list[float]
 ) -> list[SettledHand | InvalidInputError]:
+    """Close hands; those without a place back off rock that stands in their open fingers."""
     placed, laid = _placed(hand, placements)
+    outcomes, lifts = _close(placed, laid, tensions)
+    backing = [
+        i
+        for i, lift in lifts.items()
+        if placements[i].hold_in_hand is None and lift < hand.back_off
+    ]
+    if backing:
+        seatings = [placed.seatings[i].off(lifts[i] + CLEAR) for i in backing]
+        others = [placements[i] for i in backing]
+        shapes = [each.hold.swept for each in others]
+        off = PlacedHands(hand, others, seatings, shapes)
+        again, _ = _close(off, _laid(off, [{} for _ in others]), [tensions[i] for i in backing])
+        for i, outcome in zip(backing, again, strict=True):
+            if isinstance(outcome, SettledHand):
+                outcomes[i] = outcome
+    return outcomes
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def _close(
+    placed: PlacedHands, laid: list[list[list[ClosedPhalanx]]], tensions: list[float]
+) -> tuple[list[SettledHand | InvalidInputError], dict[int, float]]:
+    """Return hands closed where they are placed, and the lifts of those with rock in fingers."""
+    hand, placements = placed.hand, placed.placements
     errors = {
         i: _in_palm(hand, depth)
         for i, depth in enumerate([min(depths[BASES:]) for depths in placed.gaps])
@@ -123,7 +150,7 @@ def _settle(
             palm=palms[i],
         )
         outcomes.append(settled)
-    return outcomes
+    return outcomes, closed.lifts
 
 
 def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:

@@ -98,7 +98,8 @@ class SpinyHand(HandModel):
             What a tile holds on it.
         grasp : Grasp, optional
         hold_in_hand : Pose, optional
-            The hold's frame in H; without it the hand is seated (see `seat`).
+            The hold's frame in H; without it the hand is seated (see `seat`), and backs off rock
+            that would stand in its open fingers, as far as ``back_off``.
 
         Raises
         ------

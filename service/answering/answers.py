@@ -330,9 +330,8 @@ def _both_signs(plane: HalfPlane) -> list[list[float]]:
 
 def _seating(seating: Seating) -> replies.Seating:
     pose = seating.pose
-    return replies.Seating(
-        seating.rule, replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
-    )
+    frame = replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
+    return replies.Seating(seating.rule, frame, seating.backed_off)
 
 
 def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:

@@ -105,7 +105,9 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     """Print what one hand can carry."""
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
-    out.print(f"hold seated by rule {reply.seating.rule}, its origin in H ({seat}) mm")
+    off = 1e3 * reply.seating.backed_off
+    backed = f", backed off {off:.1f} mm" if off else ""
+    out.print(f"hold seated by rule {reply.seating.rule}{backed}, its origin in H ({seat}) mm")
     if reply.wrist.error is not None:
         _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
     _show(

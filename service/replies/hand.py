@@ -74,10 +74,15 @@ class PlacedFrame(Struct):
 
 
 class Seating(Struct):
-    """Where the hold is in H, and how that was found."""
+    """Where the hold is in H, and how that was found.
+
+    ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
+    are clear [m].
+    """
 
     rule: str
     pose: PlacedFrame
+    backed_off: float = 0.0
 
 
 class Wrist(Struct, kw_only=True):

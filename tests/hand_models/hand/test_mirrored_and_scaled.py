@@ -91,9 +91,12 @@ def larger_hand() -> SpinyHand:
 LARGER = larger_hand()
 
 
-def check_mirrored(hold, rng, tolerance):
+def check_mirrored(hold, rng, tolerance, seated=False):
+    """Whether what a hand does on a hold is mirrored; returns if it can be there."""
     grasp, pose, surface = random_grasp(rng), random_pose(rng), random_surface(rng)
     other = Pose(MIRROR @ pose.position, MIRROR @ pose.rotation @ MIRROR)
+    if seated:
+        pose = other = None
     one, two = HAND.settle_each(
         [
             Placement(hold, surface, grasp, pose),
@@ -103,6 +106,9 @@ def check_mirrored(hold, rng, tolerance):
     if isinstance(one, InvalidInputError):
         assert isinstance(two, InvalidInputError)
         return 0
+    assert one.seating.rule == two.seating.rule
+    place = one.seating.pose.position
+    np.testing.assert_allclose(MIRROR @ place, two.seating.pose.position, atol=tolerance)
     for left, right in ((0, 3), (1, 2), (2, 1), (3, 0)):
         a, b = one.finger_of == left, two.finger_of == right
         size = max(1.0, np.abs(one.loads[a]).max())
@@ -136,6 +142,19 @@ def test_mirrored_holds_and_poses_have_mirrored_hands(seed):
 def test_mirrored_meshes_have_mirrored_hands(seed):
     rng = np.random.default_rng(seed)
     check_mirrored(random_mesh(rng), rng, 1e-6)
+
+
+@some_and_all("seeds", range(60), 6)
+def test_on_mirrored_holds_hands_have_mirrored_seats(seeds):
+    held = 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        if seed % 4:
+            hold = (random_hold, random_ellipsoid, random_profile)[seed % 4 - 1](rng)
+            held += check_mirrored(hold, rng, 1e-9, seated=True)
+        else:
+            held += check_mirrored(random_mesh(rng), rng, 1e-6, seated=True)
+    assert held > len(seeds) / 2
 
 
 def in_both_units(seed):

@@ -9,9 +9,9 @@ import pytest
 import trimesh
 from hypothesis import given, settings, strategies as st
 
-from hand_models import Cylinder, Grasp, Sphere
+from hand_models import Cylinder, Grasp, InvalidInputError, Pose, Sphere
 from hand_models.rock import Mesh, Profile
-from tests.suite.helpers.hands import HAND
+from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import cylinder_mesh, distance, random_mesh, random_profile
 
 seeds = st.integers(0, 2**32 - 1)
@@ -49,12 +49,44 @@ def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
     if seating.rule in ("palm_on_rock", "palm_on_rock_centred"):
         assert gaps.min() < 3e-3
     if seating.rule in ("pinch", "palm_on_rock"):
-        joint = seating.pose.inverse().apply(HAND.inner_joint)
-        section = hold.section(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
         model = HAND.finger
         face = model.tile_range[0], model.joint_spacing, model.tile_height
-        rest = section.rest((0.0, 0.0), *face, model.joint_lower[0], model.joint_upper[0])
-        assert rest.distance == pytest.approx(HAND.seated_contact, abs=2e-4)
+        along = []
+        for side in (1.0, -1.0):
+            joint = seating.pose.inverse().apply(HAND.inner_joint * [1.0, side, 1.0])
+            section = hold.section(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+            rest = section.rest((0.0, 0.0), *face, model.joint_lower[0], model.joint_upper[0])
+            along.append(model.joint_spacing if rest is None else rest.distance)
+        assert np.mean(along) == pytest.approx(HAND.seated_contact, abs=2e-4)
+
+
+def bumpy(height: float) -> Profile:
+    """A wall with a bump under the fingers' middles, so high over the palm's rock."""
+    x = np.linspace(-0.4, 0.4, 801)
+    return Profile(np.column_stack([x, -height * np.exp(-(((x - 0.12) / 0.03) ** 2))]))
+
+
+def test_a_hand_backs_off_rock_that_would_stand_in_its_open_fingers():
+    for height in (0.012, 0.02):
+        settled = HAND.settle(bumpy(height), ROCK, Grasp())
+        seat, seating = HAND.seat(bumpy(height), Grasp()), settled.seating
+        assert 0.0 < seating.backed_off < HAND.back_off
+        assert seating.rule == seat.rule
+        np.testing.assert_allclose(
+            seating.pose.position - seat.pose.position, [0.0, 0.0, seating.backed_off], atol=1e-12
+        )
+        # by no more than it must
+        nearer = Pose(seating.pose.position - [0.0, 0.0, 2e-4], seating.pose.rotation)
+        with pytest.raises(InvalidInputError, match="even with its joints fully open"):
+            HAND.settle(bumpy(height), ROCK, Grasp(), nearer)
+    with pytest.raises(InvalidInputError, match="even with its joints fully open"):
+        HAND.settle(bumpy(0.08), ROCK, Grasp())
+
+
+def test_a_hand_that_is_placed_does_not_back_off():
+    seat = HAND.seat(bumpy(0.02), Grasp())
+    with pytest.raises(InvalidInputError, match="even with its joints fully open"):
+        HAND.settle(bumpy(0.02), ROCK, Grasp(), seat.pose)
 
 
 def test_a_raised_ridge_under_the_palm_lifts_it():

@@ -1,0 +1,176 @@
+"""Seats that hold: of many places near the seat that a hand would take, the one that holds most.
+
+A hand that is seated (`hand_models.hand.seating`) backs off along −z of its frame H there, turns
+about that axis and tilts about x and y, all about the middle of its palm, within the bounds of the
+hand's parameters. Where it then reaches farthest in a direction, by the support function of its
+wrench space, is its best seat. The search has two stages, of which each is one batch: stand-offs
+and turns on a grid, then tilts and smaller steps about the best of these. So it is deterministic,
+and what it finds holds no less than the seat that it began with.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import (
+    Array,
+    EmptySetError,
+    InvalidInputError,
+    Pose,
+    finite_vector,
+    wrench_transport,
+)
+from hand_models.fixed_wrist.space import wrench_spaces
+from hand_models.hand import Placement, Seating, SettledHand, SpinyHand
+
+__all__ = ["BEST", "PULL_OFF", "best_seats"]
+
+BEST: Final = "best"
+"""The rule of a seat that was searched for."""
+
+PULL_OFF: Final = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+"""The wrench on the rock of a hand that is pulled off it, in H."""
+
+OFFS: Final = (0.0, 0.125, 0.25, 0.5, 1.0)
+"""Stand-offs of the first stage, in parts of the farthest."""
+
+TURNS: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Turns of the first stage, in parts of the largest."""
+
+TILTS: Final = (-1.0, 0.0, 1.0)
+"""Tilts of the second stage about each axis, in parts of the largest."""
+
+NEARER: Final = ((-0.125, 0.0), (0.125, 0.0), (0.0, -0.25), (0.0, 0.25))
+"""Smaller steps of the second stage, of stand-off and turn, in the same parts."""
+
+
+class _Move(NamedTuple):
+    """How a hand leaves its seat: parts of the farthest stand-off, largest turn, largest tilts."""
+
+    off: float
+    turn: float
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    def of(self, hand: SpinyHand) -> Pose:
+        """Return the frame of a hand that has moved, in that where it was seated."""
+        about = [hand.seat_tilt * self.tilt[0], hand.seat_tilt * self.tilt[1]]
+        tilted = Rotation.from_rotvec([*about, 0.0])
+        turned = Rotation.from_rotvec([0.0, 0.0, hand.seat_turn * self.turn])
+        position = np.array([0.0, 0.0, -hand.back_off * self.off])
+        return Pose(position, (turned * tilted).as_matrix())
+
+
+FIRST: Final = tuple(itertools.starmap(_Move, itertools.product(OFFS, TURNS)))
+
+
+def _about(move: _Move) -> list[_Move]:
+    """Return the moves of the second stage."""
+    tilted = [move._replace(tilt=tilt) for tilt in itertools.product(TILTS, TILTS) if any(tilt)]
+    moved = [move._replace(off=move.off + off, turn=move.turn + turn) for off, turn in NEARER]
+    return tilted + [each for each in moved if 0.0 <= each.off <= 1.0 and abs(each.turn) <= 1.0]
+
+
+def best_seats(
+    hand: SpinyHand, placements: Sequence[Placement], direction: ArrayLike = PULL_OFF
+) -> list[SettledHand | InvalidInputError]:
+    """Seat hands where they hold most.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+        Which all of them are.
+    placements : sequence of Placement
+        None of them with a pose.
+    direction : array_like, shape (6,), optional
+        In which the hands are to reach far: of a wrench on the rock, along the axes of H where the
+        hand is seated at first; the pull-off by default.
+
+    Returns
+    -------
+    list of SettledHand or InvalidInputError
+        In order, their seatings with the rule ``best``; an error in place of a hand that can be at
+        none of the places, why it cannot be where it was seated.
+
+    Raises
+    ------
+    InvalidInputError
+        If the direction is not six finite numbers, or a placement has a pose.
+    """
+    d = finite_vector(direction, 6, "direction")
+    for each in placements:
+        if each.hold_in_hand is not None:
+            raise InvalidInputError(
+                "a hand with a pose is not seated: leave out the pose, or ask for the seat 'rest'",
+                field="seat",
+            )
+    search = _Search(hand, placements, d)
+    search.look([FIRST for _ in placements])
+    search.look([[] if found is None else _about(found.move) for found in search.best])
+    return search.outcomes()
+
+
+class _Found(NamedTuple):
+    """A place that was looked at, and how far a hand reaches there."""
+
+    reach: float
+    move: _Move
+    settled: SettledHand
+
+
+class _Search:
+    """Hands that look for their seats."""
+
+    def __init__(self, hand: SpinyHand, placements: Sequence[Placement], direction: Array) -> None:
+        self._hand, self._placements, self._direction = hand, placements, direction
+        self._seats = [hand.seat(each.hold, each.grasp) for each in placements]
+        self._refused: list[InvalidInputError | None] = [None] * len(placements)
+        self.best: list[_Found | None] = [None] * len(placements)
+
+    def look(self, moves: Sequence[Iterable[_Move]]) -> None:
+        """Close each hand at each of its places, and keep the best of them."""
+        tries = [(i, move) for i, own in enumerate(moves) for move in own]
+        frames = [move.of(self._hand) for _, move in tries]
+        outcomes = self._hand.settle_each(
+            [
+                self._placements[i]._replace(
+                    hold_in_hand=frame.inverse() @ self._seats[i].pose
+                )
+                for (i, _), frame in zip(tries, frames, strict=True)
+            ]
+        )
+        hands = [each for each in outcomes if isinstance(each, SettledHand)]
+        spaces = iter(wrench_spaces(hands))
+        for (i, move), frame, outcome in zip(tries, frames, outcomes, strict=True):
+            if isinstance(outcome, InvalidInputError):
+                self._refused[i] = self._refused[i] or outcome
+                continue
+            try:
+                # the wrench as it is along the axes of the hand that has moved
+                along = wrench_transport(frame).T @ self._direction
+                reach = next(spaces).support(along)
+            except EmptySetError:
+                reach = -math.inf
+            best = self.best[i]
+            if best is None or reach > best.reach:
+                self.best[i] = _Found(reach, move, outcome)
+
+    def outcomes(self) -> list[SettledHand | InvalidInputError]:
+        """Return the hands where they hold most."""
+        found: list[SettledHand | InvalidInputError] = []
+        for best, refused in zip(self.best, self._refused, strict=True):
+            if best is None:
+                assert refused is not None
+                found.append(refused)
+                continue
+            seating = best.settled.seating
+            off = self._hand.back_off * best.move.off
+            found.append(replace(best.settled, seating=Seating(seating.pose, BEST, off)))
+        return found
