@@ -8,7 +8,7 @@ from .names import (
     NAIL as NAIL,
     NAIL_SHEAR as NAIL_SHEAR,
 )
-from .placement import Placement as Placement
+from .placement import Placement as Placement, PlacementKey as PlacementKey
 from .seating import Seating as Seating
 from .settled_hand import SettledHand as SettledHand, Tile as Tile
 from .spinyhand import (

@@ -68,12 +68,15 @@ class SpinyHand(HandModel):
     settled, settled_scans : BoundedStore
         Hands that were settled last on holds given by numbers, and on meshes and profiles;
         `settle_each` looks there first.
+    seated_best : BoundedStore
+        Hands whose best seats were searched for last (`hand_models.fixed_wrist.seat_search`).
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         super().__init__(table)
         self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore(KEPT)
         self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(SCANS)
+        self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(SCANS)
 
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
         return spiny_hand, (self.table,)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
-from hand_models.fixed_wrist import wrench_space
-from hand_models.hand import Placement, SettledHand
+from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
+from hand_models.hand import Placement, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_sets import widest_at_rest
 from planner.question import HandOnHold, Stance
@@ -26,7 +27,10 @@ __all__ = [
 
 def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
     """Close one hand of a stance on its hold."""
-    return stance.robot.hand.settle(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+    (settled,) = _settled(stance.robot.hand, [hand])
+    if isinstance(settled, InvalidInputError):
+        raise settled
+    return settled
 
 
 def settle_stance(stance: Stance) -> list[SettledHand]:
@@ -37,18 +41,37 @@ def settle_stance(stance: Stance) -> list[SettledHand]:
     InvalidInputError
         If a hand cannot be where it is; of the first one, its field relative to the question.
     """
-    outcomes = stance.robot.hand.settle_each([_placement(hand) for hand in stance.hands])
+    outcomes = _settled(stance.robot.hand, stance.hands)
     return [_or_raise(outcome, i) for i, outcome in enumerate(outcomes)]
 
 
 def settle_at(stance: Stance, index: int) -> SettledHand:
     """Close the hand of that index; an error's field is relative to the question."""
-    (outcome,) = stance.robot.hand.settle_each([_placement(stance.hands[index])])
+    (outcome,) = _settled(stance.robot.hand, [stance.hands[index]])
     return _or_raise(outcome, index)
 
 
-def _placement(hand: HandOnHold) -> Placement:
-    return Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold())
+def _settled(kind: SpinyHand, hands: Sequence[HandOnHold]) -> list[SettledHand | InvalidInputError]:
+    """Return hands of one kind closed on their holds; errors in place of those that cannot be."""
+    placements = [
+        Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold()) for hand in hands
+    ]
+    if all(hand.seat == "rest" for hand in hands):
+        return kind.settle_each(placements)
+    # those that look in the same direction search together
+    ways = [None if hand.seat == "rest" else _direction(hand) for hand in hands]
+    found: dict[int, SettledHand | InvalidInputError] = {}
+    for way in set(ways):
+        own = [i for i, each in enumerate(ways) if each == way]
+        group = [placements[i] for i in own]
+        settled = kind.settle_each(group) if way is None else best_seats(kind, group, way)
+        found.update(zip(own, settled, strict=True))
+    return [found[i] for i in range(len(hands))]
+
+
+def _direction(hand: HandOnHold) -> tuple[float, ...]:
+    given = hand.seat_direction
+    return PULL_OFF if given is None else tuple(given.tolist())
 
 
 def _or_raise(outcome: SettledHand | InvalidInputError, index: int) -> SettledHand:

@@ -19,6 +19,7 @@ __all__ = [
     "EARTH",
     "SOLVE",
     "HandOnHold",
+    "SeatRule",
     "Stance",
     "WristMode",
     "checked_body_wrench",
@@ -26,6 +27,11 @@ __all__ = [
 ]
 
 WristMode = Literal["fixed", "floating"]
+
+SeatRule = Literal["rest", "best"]
+
+SEATS: Final = get_args(SeatRule)
+"""How a hand without a pose of its hold is seated."""
 
 WRISTS: Final = get_args(WristMode)
 """How a wrist may be."""
@@ -125,6 +131,11 @@ class HandOnHold:
         default.
     wrench : tuple of float or None, length 6, optional
         What the hand must exert on the rock, in H [N, N·m]; components that are None are free.
+    seat : {'rest', 'best'}
+        How a hand is seated for which neither pose is given: as its grasp would have it, or near
+        there where it holds most (`hand_models.fixed_wrist.seat_search`).
+    seat_direction : ndarray, shape (6,), optional
+        In which wrench on the rock, in H, the best seat is to hold most; the pull-off by default.
     """
 
     limb: str
@@ -137,6 +148,8 @@ class HandOnHold:
     wrist: WristMode = "fixed"
     tendon_preload: Array | None = None
     wrench: tuple[float | None, ...] | None = None
+    seat: SeatRule = "rest"
+    seat_direction: Array | None = None
 
     def __post_init__(self) -> None:
         if self.wrist not in WRISTS:
@@ -158,6 +171,7 @@ class HandOnHold:
                 )
             given = [0.0 if value is None else value for value in self.wrench]
             checked_body_wrench(finite_vector(given, 6, "wrench"), "wrench")
+        self._check_seat()
         if self.hold_pose is not None and self.hold_in_hand is not None:
             raise InvalidInputError("give pose or pose_in_hand, not both", field="hold")
         _possible(self.pose, "pose")
@@ -165,6 +179,28 @@ class HandOnHold:
             _possible(self.hold_pose, "hold.pose")
         if self.hold_in_hand is not None:
             _possible(self.hold_in_hand, "hold.pose_in_hand")
+
+    def _check_seat(self) -> None:
+        if self.seat not in SEATS:
+            raise InvalidInputError(
+                f"unknown seat {self.seat!r}; known are {', '.join(SEATS)}", field="seat"
+            )
+        posed = self.hold_pose is not None or self.hold_in_hand is not None
+        if self.seat == "best" and posed:
+            raise InvalidInputError(
+                "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, or "
+                "the seat",
+                field="seat",
+            )
+        if self.seat_direction is not None:
+            if self.seat != "best":
+                raise InvalidInputError(
+                    "only a hand with the seat 'best' looks in a direction", field="seat_direction"
+                )
+            direction = finite_vector(self.seat_direction, 6, "seat_direction")
+            if not direction.any():
+                raise InvalidInputError("must not be zero", field="seat_direction")
+            object.__setattr__(self, "seat_direction", direction)
 
     def placed_hold(self) -> Pose | None:
         """Return the hold's frame in H, or None if the hand is to be seated."""

@@ -190,6 +190,10 @@ def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnH
             if message.tendon_preload is None
             else np.array(message.tendon_preload),
             wrench=message.wrench,
+            seat=message.seat,
+            seat_direction=None
+            if message.seat_direction is None
+            else np.array(message.seat_direction),
         )
 
 

@@ -92,6 +92,20 @@ class Hand(Strict, frozen=True, kw_only=True):
             "the plan's"
         ),
     ] = None
+    seat: Annotated[
+        Literal["rest", "best"],
+        Meta(
+            description="how a hand is seated whose hold has no pose: as its grasp would have it, "
+            "or near there where it holds most"
+        ),
+    ] = "rest"
+    seat_direction: Annotated[
+        tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry] | None,
+        Meta(
+            description="in which wrench on the rock, in H, the best seat is to hold most; by "
+            "default the pull-off"
+        ),
+    ] = None
 
 
 class Stance(Strict, frozen=True, kw_only=True):

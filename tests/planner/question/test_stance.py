@@ -210,3 +210,37 @@ def test_a_hand_given_in_millimetres_is_told_so():
     with pytest.raises(InvalidInputError, match="positions are in metres") as caught:
         replace(stance, hands=(stance.hands[0], far))
     assert caught.value.field == "hands[1].pose.position"
+
+
+# Seats --------------------------------------------------------------------------------------------
+
+
+def test_hands_that_look_for_their_seats_stand_beside_those_that_do_not():
+    stance = on_wall()
+    hands = list(stance.hands)
+    down = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    hands[0] = replace(hands[0], seat="best")
+    hands[2] = replace(hands[2], seat="best", seat_direction=down)
+    asked = replace(stance, hands=tuple(hands))
+    answer = plan(ask(asked))
+    assert answer.verified
+    assert [hand.seating.rule for hand in answer.hands] == ["best", "pinch", "best", "pinch"]
+    for hand, part in zip(asked.hands, answer.hands, strict=True):
+        assert settle_hand(hand, asked).seating == part.seating
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "told"),
+    [
+        ({"seat": "worst"}, "seat", "known are rest, best"),
+        ({"seat": "best", "hold_in_hand": Pose.identity()}, "seat", "is not seated"),
+        ({"seat_direction": np.ones(6)}, "seat_direction", "only a hand with the seat 'best'"),
+        ({"seat": "best", "seat_direction": np.zeros(6)}, "seat_direction", "must not be zero"),
+        ({"seat": "best", "seat_direction": [NAN] * 6}, "seat_direction", "finite"),
+        ({"seat": "best", "seat_direction": [1.0]}, "seat_direction", "6"),
+    ],
+)
+def test_impossible_seats_are_refused(change, field, told):
+    with pytest.raises(InvalidInputError, match=told) as caught:
+        replace(on_wall().hands[0], **change)
+    assert caught.value.field == field

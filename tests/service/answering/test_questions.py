@@ -56,6 +56,17 @@ def test_a_request_with_joints_becomes_a_question() -> None:
     ).stance.joints == ("solve")
 
 
+def test_seats_are_asked_for() -> None:
+    request = wall_request()
+    first, second, *_ = request["stance"]["hands"]
+    first["seat"], first["seat_direction"] = "best", [0, 0, -1, 0, 0, 0.1]
+    second["seat"] = "best"
+    one, two, three, _ = questions.question(plan_request(request)).stance.hands
+    assert (one.seat, two.seat, three.seat) == ("best", "best", "rest")
+    np.testing.assert_array_equal(one.seat_direction, [0.0, 0.0, -1.0, 0.0, 0.0, 0.1])
+    assert two.seat_direction is None
+
+
 def test_hold_placed_in_the_world() -> None:
     request = wall_request()
     hand = request["stance"]["hands"][0]

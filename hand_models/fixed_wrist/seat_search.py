@@ -2,17 +2,19 @@
 
 A hand that is seated (`hand_models.hand.seating`) backs off along −z of its frame H there, turns
 about that axis and tilts about x and y, all about the middle of its palm, within the bounds of the
-hand's parameters. Where it then reaches farthest in a direction, by the support function of its
-wrench space, is its best seat. The search has two stages, of which each is one batch: stand-offs
-and turns on a grid, then tilts and smaller steps about the best of these. So it is deterministic,
-and what it finds holds no less than the seat that it began with.
+hand's parameters. Its best seat is where it can carry most of a wrench with every other component
+zero; where it can nowhere do that, where it carries most of it with whatever else.
+
+The search has two stages, each of them one batch: stand-offs and turns on a grid, then tilts and
+smaller steps about the best of these. So it is deterministic, and what it finds holds no less than
+the seat that it began with.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -26,10 +28,10 @@ from hand_models.base import (
     InvalidInputError,
     Pose,
     finite_vector,
-    wrench_transport,
 )
 from hand_models.fixed_wrist.space import wrench_spaces
-from hand_models.hand import Placement, Seating, SettledHand, SpinyHand
+from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand
+from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["BEST", "PULL_OFF", "best_seats"]
 
@@ -90,8 +92,7 @@ def best_seats(
     placements : sequence of Placement
         None of them with a pose.
     direction : array_like, shape (6,), optional
-        In which the hands are to reach far: of a wrench on the rock, along the axes of H where the
-        hand is seated at first; the pull-off by default.
+        In which the hands are to reach far: of a wrench on the rock, in H; the pull-off by default.
 
     Returns
     -------
@@ -111,18 +112,36 @@ def best_seats(
                 "a hand with a pose is not seated: leave out the pose, or ask for the seat 'rest'",
                 field="seat",
             )
-    search = _Search(hand, placements, d)
-    search.look([FIRST for _ in placements])
+    keys = [(PlacementKey(each), *d.tolist()) for each in placements]
+    stored = zip(keys, hand.seated_best.find(keys), strict=True)
+    known: dict[Hashable, SettledHand | InvalidInputError | None] = dict(stored)
+    new = {key: each for key, each in zip(keys, placements, strict=True) if known[key] is None}
+    search = _Search(hand, list(new.values()), d)
+    search.look([FIRST for _ in new])
     search.look([[] if found is None else _about(found.move) for found in search.best])
-    return search.outcomes()
+    found = dict(zip(new, search.outcomes(), strict=True))
+    hand.seated_best.keep(
+        [(key, each) for key, each in found.items() if isinstance(each, SettledHand)]
+    )
+    known.update(found)
+    return [settled for key in keys if (settled := known[key]) is not None]
 
 
 class _Found(NamedTuple):
     """A place that was looked at, and how far a hand reaches there."""
 
-    reach: float
+    reach: tuple[float, float]
     move: _Move
     settled: SettledHand
+
+
+def _reach(space: WrenchSpace, direction: Array) -> tuple[float, float]:
+    """Return how far a set reaches in a direction: alone, and with whatever else; −∞ if not."""
+    try:
+        ends = space.capability(direction)
+        return -math.inf if ends is None else ends[1], space.support(direction)
+    except EmptySetError:
+        return -math.inf, -math.inf
 
 
 class _Search:
@@ -140,24 +159,17 @@ class _Search:
         frames = [move.of(self._hand) for _, move in tries]
         outcomes = self._hand.settle_each(
             [
-                self._placements[i]._replace(
-                    hold_in_hand=frame.inverse() @ self._seats[i].pose
-                )
+                self._placements[i]._replace(hold_in_hand=frame.inverse() @ self._seats[i].pose)
                 for (i, _), frame in zip(tries, frames, strict=True)
             ]
         )
         hands = [each for each in outcomes if isinstance(each, SettledHand)]
         spaces = iter(wrench_spaces(hands))
-        for (i, move), frame, outcome in zip(tries, frames, outcomes, strict=True):
+        for (i, move), outcome in zip(tries, outcomes, strict=True):
             if isinstance(outcome, InvalidInputError):
                 self._refused[i] = self._refused[i] or outcome
                 continue
-            try:
-                # the wrench as it is along the axes of the hand that has moved
-                along = wrench_transport(frame).T @ self._direction
-                reach = next(spaces).support(along)
-            except EmptySetError:
-                reach = -math.inf
+            reach = _reach(next(spaces), self._direction)
             best = self.best[i]
             if best is None or reach > best.reach:
                 self.best[i] = _Found(reach, move, outcome)
