@@ -28,6 +28,7 @@ from service.commands.options import (
     robot_option,
     with_extras,
 )
+from service.commands.rock import rock
 from service.commands.spaces import body_space, wrench_space
 from service.commands.stances import read_request, read_route
 from service.commands.stream import stream
@@ -237,7 +238,7 @@ def schema(as_json: bool) -> None:
     click.echo(text if as_json else msgspec.json.format(text))
 
 
-for command in (batch, stream, wrench_space, body_space, serve, query, demo):
+for command in (batch, stream, rock, wrench_space, body_space, serve, query, demo):
     crux.add_command(command)
 
 

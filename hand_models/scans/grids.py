@@ -1,0 +1,164 @@
+"""Grids of heights in files: NumPy arrays, GeoTIFF, ESRI ASCII.
+
+Columns go along x, rows against y: the first row is the farthest up the map, as in pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.scans.scan import RawScan
+
+__all__ = ["is_esri", "read_esri", "read_geotiff", "read_numpy"]
+
+Cell = tuple[float, float]
+"""Width along x and height along y of a cell of a grid, in the file's unit."""
+
+HEIGHTS: Final = ("elevation", "heights", "height", "z", "dem")
+"""Names of heights in an ``.npz``, if it has more than one array of two dimensions."""
+
+COLUMNS: Final = "ncols"
+"""The first word of an ESRI ASCII grid."""
+
+PIXEL_SCALE: Final = 33550
+TRANSFORMATION: Final = 34264
+GEO_KEYS: Final = 34735
+NO_DATA: Final = 42113
+"""Tags of a GeoTIFF."""
+
+MODEL_TYPE: Final = 1024
+GEOGRAPHIC: Final = 2
+"""The GeoKey of a model's type, and its value for degrees."""
+
+
+def read_numpy(path: Path, cell: float | None) -> RawScan:
+    """Return the heights of an ``.npy``, or of an ``.npz`` with its cells ``dx`` and ``dy``."""
+    with path.open("rb") as file:
+        found = np.load(file, allow_pickle=False)
+        arrays = {"": found} if isinstance(found, np.ndarray) else {k: found[k] for k in found}
+    flat = [name for name, array in arrays.items() if array.ndim == 2]
+    named = [name for name in HEIGHTS if name in flat]
+    if len(flat) != 1 and not named:
+        raise InvalidInputError(
+            f"one grid of heights is needed, or one named {', '.join(HEIGHTS)}; {path} has "
+            f"{len(flat)} arrays of two dimensions",
+            field="file",
+        )
+    heights = arrays[flat[0] if len(flat) == 1 else named[0]]
+    if heights.shape[1] == 3 < heights.shape[0]:
+        raise InvalidInputError(
+            f"three columns are points, no grid of heights: {path}; write them as .xyz",
+            field="file",
+        )
+    return _grid(heights, _sides(cell, _numpy_cell(arrays)))
+
+
+def _numpy_cell(arrays: Mapping[str, NDArray[Any]]) -> Cell | None:
+    if "dx" not in arrays:
+        return None
+    return float(arrays["dx"]), float(arrays.get("dy", arrays["dx"]))
+
+
+def read_geotiff(path: Path, cell: float | None) -> RawScan:
+    """Return the heights of a GeoTIFF of one band, with whatever compression libtiff knows."""
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ImportError:
+        raise InvalidInputError(
+            "reading GeoTIFF needs the package pillow: pip install 'crux[scans]'", field="file"
+        ) from None
+    try:
+        image = Image.open(path, formats=["TIFF"])
+    except UnidentifiedImageError:
+        raise InvalidInputError(
+            f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}",
+            field="file",
+        ) from None
+    with image:
+        tags = {tag: image.getexif().get(tag) for tag in (NO_DATA, PIXEL_SCALE, TRANSFORMATION)}
+        keys = tuple(image.getexif().get(GEO_KEYS, ()))
+        heights = np.asarray(image)
+    if heights.ndim != 2:
+        raise InvalidInputError(f"one band of heights is needed: {path}", field="file")
+    if tags[NO_DATA] is not None:
+        heights = _without(heights, float(str(tags[NO_DATA]).strip("\0 ")))
+    return _grid(heights, _sides(cell, _geo_cell(tags, keys)))
+
+
+def _geo_cell(tags: Mapping[int, Any], keys: tuple[int, ...]) -> Cell | None:
+    """Return the cell of a GeoTIFF in its unit, None if it is in degrees or not told."""
+    types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == MODEL_TYPE]
+    if GEOGRAPHIC in types:
+        return None
+    if tags[PIXEL_SCALE] is not None:
+        return float(tags[PIXEL_SCALE][0]), float(tags[PIXEL_SCALE][1])
+    if tags[TRANSFORMATION] is not None:
+        across, down = np.reshape(tags[TRANSFORMATION], (4, 4))[:2, :2].T
+        return float(np.hypot(*across)), float(np.hypot(*down))
+    return None
+
+
+def is_esri(path: Path) -> bool:
+    """Return whether a text is an ESRI ASCII grid, not columns."""
+    with path.open("rb") as file:
+        return file.read(len(COLUMNS)).lower() == COLUMNS.encode()
+
+
+def read_esri(path: Path, cell: float | None) -> RawScan:
+    """Return the heights of an ESRI ASCII grid."""
+    header: dict[str, float] = {}
+    with path.open(encoding="utf-8") as file:
+        lines = iter(file)
+        first = ""
+        for first in lines:
+            words = first.split()
+            if len(words) != 2 or not words[0][0].isalpha():
+                break
+            header[words[0].lower()] = float(words[1])
+        values = np.array(" ".join([first, *lines]).split(), dtype=float)
+    shape = int(header.get("nrows", 0)), int(header.get(COLUMNS, 0))
+    if values.size != math.prod(shape):
+        raise InvalidInputError(
+            f"{shape[0]} rows of {shape[1]} heights are needed, {values.size} are in {path}",
+            field="file",
+        )
+    heights = _without(values.reshape(shape), header.get("nodata_value", -9999.0))
+    if "cellsize" in header:
+        own: Cell | None = header["cellsize"], header["cellsize"]
+    else:
+        own = (header["dx"], header["dy"]) if {"dx", "dy"} <= set(header) else None
+    return _grid(heights, _sides(cell, own))
+
+
+def _without(heights: NDArray[Any], missing: float) -> Array:
+    found = np.array(heights, dtype=float)
+    # a float of 32 bits is not what the text says to the last digit
+    found[np.isclose(found, missing, rtol=1e-6, atol=0.0)] = np.nan
+    return found
+
+
+def _sides(cell: float | None, own: Cell | None) -> Cell:
+    sides = own if cell is None else (cell, cell)
+    if sides is None:
+        raise InvalidInputError(
+            "the file does not tell the distance between neighbours of its grid in a unit of "
+            "length; give it",
+            field="cell",
+        )
+    if not all(math.isfinite(side) and side > 0.0 for side in sides):
+        raise InvalidInputError(f"must be above zero, got {min(sides):g}", field="cell")
+    return sides
+
+
+def _grid(heights: NDArray[Any], cell: Cell) -> RawScan:
+    rows, columns = heights.shape
+    x, y = np.meshgrid(cell[0] * np.arange(columns), cell[1] * np.arange(rows)[::-1])
+    points = np.stack([x, y, heights.astype(float)], axis=-1).reshape(-1, 3)
+    return RawScan(points, heights=True)

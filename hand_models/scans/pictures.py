@@ -1,0 +1,88 @@
+"""Scanned rock as a picture: seen from outside, coloured by height, lit from the upper left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from hand_models.base import Array
+from hand_models.scans.rock import ScannedRock
+
+__all__ = ["plot_rock"]
+
+LIGHT: Final = np.array([0.5, -0.5, -0.7]) / np.linalg.norm([0.5, -0.5, -0.7])
+"""Toward the light, in the rock's frame."""
+
+DARK: Final = 0.35
+"""Brightness of rock that is turned away from the light."""
+
+NAMED: Final = 12
+"""Holes whose width is written beside them."""
+
+COLOURS: Final = "viridis"
+
+
+def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
+    """Draw rock as the scanner saw it, holes left white, and write the picture.
+
+    Parameters
+    ----------
+    rock : ScannedRock
+    path : Path
+        Of the picture; its ending says of what kind.
+    title : str
+    """
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    axes = figure.add_subplot()
+    corners = rock.vertices[rock.faces]
+    heights = -1e3 * corners[:, :, 2].mean(axis=1)
+    scale = Normalize(*np.percentile(heights, [0.5, 99.5]))
+    colours = ScalarMappable(scale, COLOURS)
+    painted = np.array(colours.to_rgba(heights))
+    painted[:, :3] *= _brightness(corners)[:, None]
+    axes.add_collection(
+        PolyCollection(
+            list(corners[:, :, [1, 0]]),
+            facecolors=painted,
+            edgecolors="face",
+            linewidths=0.2,
+            rasterized=True,
+        ),
+        autolim=False,
+    )
+    low, high = rock.vertices.min(axis=0), rock.vertices.max(axis=0)
+    margin = 0.03 * (high - low)[:2].max()
+    axes.set(
+        xlim=(low[1] - margin, high[1] + margin),
+        ylim=(low[0] - margin, high[0] + margin),
+        aspect="equal",
+        xlabel="y of the rock's frame [m]",
+        ylabel="x of the rock's frame [m]",
+        title=title,
+    )
+    axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
+    for hole in rock.holes[:NAMED]:
+        axes.annotate(
+            f"{1e3 * hole.width:.0f} mm",
+            (hole.place[1], hole.place[0]),
+            ha="center",
+            va="center",
+            color="red",
+            fontsize=8,
+        )
+    axes.legend(loc="upper right")
+    figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
+    figure.savefig(path, dpi=150)
+
+
+def _brightness(corners: Array) -> Array:
+    """Return how bright each triangle is, shape (m,)."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+    return np.asarray(DARK + (1.0 - DARK) * np.clip(normal @ LIGHT / length, 0.0, 1.0))

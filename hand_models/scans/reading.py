@@ -1,0 +1,146 @@
+"""Scans from files, in metres and with z up."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hand_models.base import Array, CruxError, InvalidInputError, finite_vector
+from hand_models.scans.grids import is_esri, read_esri, read_geotiff, read_numpy
+from hand_models.scans.points import read_columns, read_pcd, read_ply
+from hand_models.scans.scan import UNITS, UPS, RawScan, Scan, Unit, Up
+
+__all__ = ["ENDINGS", "read_scan"]
+
+ENDINGS: Final = (".pcd", ".ply", ".xyz", ".txt", ".csv", ".npy", ".npz", ".tif", ".tiff", ".asc")
+
+FEWEST: Final = 3
+"""Points of a triangle."""
+
+
+def read_scan(
+    path: Path,
+    *,
+    unit: Unit = "m",
+    up: Up = "z",
+    view: ArrayLike | None = None,
+    viewpoint: ArrayLike | None = None,
+    origin: ArrayLike | None = None,
+    cell: float | None = None,
+    width: float | None = None,
+) -> Scan:
+    """Return the points of a file, those that are not finite left out.
+
+    Parameters
+    ----------
+    path : Path
+        Of a point cloud (PCD, PLY, XYZ, CSV), or of a grid of heights (``.npy``, ``.npz``,
+        GeoTIFF, ESRI ASCII): columns along x, rows against y, heights along z.
+    unit : {'m', 'cm', 'mm'}
+        Of the file's numbers.
+    up : {'x', 'y', 'z', '-x', '-y', '-z'}
+        The file's axis that points up.
+    view : array_like, shape (3,), optional
+        In which direction the scanner looked, in the file's axes. By default from the viewpoint, if
+        that is given, to the points' middle; down a grid's heights; else what `Scan.direction`
+        finds.
+    viewpoint : array_like, shape (3,), optional
+        Where the scanner was, in the file's axes and unit; by default what a PCD file says, else
+        the file's origin.
+    origin : array_like, shape (3,), optional
+        Where the rock's frame is to begin, in the file's axes and unit; by default in the middle.
+    cell : float, optional
+        Distance between neighbours of a grid, in the file's unit, in place of the file's own.
+    width : float, optional
+        In place of a unit: all lengths are scaled so that this is the longest side [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be read or has no three points, a grid's cell is not known, or a
+        parameter is out of range.
+    """
+    if unit not in UNITS:
+        raise InvalidInputError(f"valid are {', '.join(UNITS)}, got {unit!r}", field="unit")
+    if up not in UPS:
+        raise InvalidInputError(f"valid are {', '.join(UPS)}, got {up!r}", field="up")
+    raw = _raw(path, cell)
+    finite = raw.points[np.isfinite(raw.points).all(axis=1)]
+    if len(finite) < FEWEST:
+        raise InvalidInputError(
+            f"at least three points are needed, {path} has {len(finite)} "
+            f"({len(raw.points) - len(finite)} more are not finite)",
+            field="file",
+        )
+    scale, turn = _scale(finite, unit, width), UPS[up]
+
+    def placed(point: ArrayLike, field: str) -> Array:
+        return np.asarray(scale * turn @ finite_vector(point, 3, field))
+
+    points = scale * finite @ turn.T
+    seen = None if view is None else turn @ finite_vector(view, 3, "view")
+    scanner = placed((0.0, 0.0, 0.0) if raw.viewpoint is None else raw.viewpoint, "viewpoint")
+    if viewpoint is not None:
+        scanner = placed(viewpoint, "viewpoint")
+    if seen is None and viewpoint is not None:
+        seen = points.mean(axis=0) - scanner
+    elif seen is None and raw.heights:
+        seen = -turn[:, 2]
+    return Scan(
+        points=points,
+        read=len(raw.points),
+        view=None if seen is None else _unit_vector(seen),
+        viewpoint=scanner,
+        origin=None if origin is None else placed(origin, "origin"),
+    )
+
+
+def _raw(path: Path, cell: float | None) -> RawScan:
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InvalidInputError(f"{path}: a scan's file ends in {', '.join(ENDINGS)}", field="file")
+    if not path.is_file():
+        raise InvalidInputError(f"no such file: {path}", field="file")
+    try:
+        match ending:
+            case ".pcd":
+                return read_pcd(path)
+            case ".ply":
+                return read_ply(path)
+            case ".npy" | ".npz":
+                return read_numpy(path, cell)
+            case ".tif" | ".tiff":
+                return read_geotiff(path, cell)
+        return read_esri(path, cell) if is_esri(path) else read_columns(path)
+    except CruxError:
+        raise
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
+    except Exception as error:
+        # every reader fails in its own way on what is no scan
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
+
+
+def _scale(points: Array, unit: Unit, width: float | None) -> float:
+    if width is None:
+        return UNITS[unit]
+    if unit != "m":
+        raise InvalidInputError("give a unit or a width, not both", field="width")
+    if not (math.isfinite(width) and width > 0.0):
+        raise InvalidInputError(f"must be above zero, got {width:g}", field="width")
+    longest = float(np.ptp(points, axis=0).max())
+    if longest == 0.0:
+        raise InvalidInputError("all points are at one place", field="file")
+    return width / longest
+
+
+def _unit_vector(vector: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    if length == 0.0:
+        raise InvalidInputError("a direction of length zero", field="view")
+    return np.asarray(vector / length)

@@ -1,0 +1,83 @@
+"""What a scan becomes: triangles in a hold's frame, where that is, and what holes are left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh.exchange.ply import export_ply
+
+from hand_models.base import Array, Indices, Pose
+
+__all__ = ["Hole", "ScannedRock", "write_rock"]
+
+
+@dataclass(frozen=True, eq=False)
+class Hole:
+    """Where the rock was not seen.
+
+    Attributes
+    ----------
+    width : float
+        Diameter of the widest circle without points, or the height of a step if that is more [m].
+    place : ndarray, shape (3,)
+        The middle of its corners, in the rock's frame [m].
+    """
+
+    width: float
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ScannedRock:
+    """Triangles of scanned rock, as a mesh hold has them.
+
+    Its frame begins on the rock; z goes into it along the view, x is up as far as it can be.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, 3)
+        In the rock's frame [m].
+    faces : ndarray of int, shape (m, 3)
+        Counterclockwise seen from outside.
+    pose : Pose
+        The rock's frame in the scan's, which has z up.
+    holes : tuple of Hole
+        That were left open, the widest first; the outline is not one of them.
+    read, dropped : int
+        Points of the file, and how many of them are not finite.
+    spacing : float
+        Median distance between neighbours [m].
+    """
+
+    vertices: Array
+    faces: Indices
+    pose: Pose
+    holes: tuple[Hole, ...]
+    read: int
+    dropped: int
+    spacing: float
+
+    @property
+    def extent(self) -> Array:
+        """Size along the axes of the rock's frame, shape (3,) [m]."""
+        return np.asarray(np.ptp(self.vertices, axis=0))
+
+    def normals(self) -> Array:
+        """Return the normal of each vertex, out of the rock, shape (n, 3), of length one."""
+        return np.array(self._mesh().vertex_normals, dtype=float)
+
+    def _mesh(self) -> trimesh.Trimesh:
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
+
+    def ply(self) -> bytes:
+        """Return a PLY file of vertices [m] with normals, and faces."""
+        found: bytes = export_ply(self._mesh(), vertex_normal=True)
+        return found
+
+
+def write_rock(rock: ScannedRock, path: Path) -> None:
+    """Write rock as a PLY file, which a mesh hold may name."""
+    path.write_bytes(rock.ply())
