@@ -21,6 +21,9 @@ __all__ = ["is_esri", "read_esri", "read_geotiff", "read_numpy"]
 Cell = tuple[float, float]
 """Width along x and height along y of a cell of a grid, in the file's unit."""
 
+MAGIC: Final = (b"\x93NUMPY", b"PK")
+"""How an ``.npy`` and an ``.npz`` begin."""
+
 HEIGHTS: Final = ("elevation", "heights", "height", "z", "dem")
 """Names of heights in an ``.npz``, if it has more than one array of two dimensions."""
 
@@ -41,6 +44,9 @@ GEOGRAPHIC: Final = 2
 def read_numpy(path: Path, cell: float | None) -> RawScan:
     """Return the heights of an ``.npy``, or of an ``.npz`` with its cells ``dx`` and ``dy``."""
     with path.open("rb") as file:
+        if not file.read(len(MAGIC[0])).startswith(MAGIC):
+            raise InvalidInputError(f"no NumPy file: {path}", field="file")
+        file.seek(0)
         found = np.load(file, allow_pickle=False)
         arrays = {"": found} if isinstance(found, np.ndarray) else {k: found[k] for k in found}
     flat = [name for name, array in arrays.items() if array.ndim == 2]

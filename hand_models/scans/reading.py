@@ -71,10 +71,10 @@ def read_scan(
     raw = _raw(path, cell)
     finite = raw.points[np.isfinite(raw.points).all(axis=1)]
     if len(finite) < FEWEST:
+        more = len(raw.points) - len(finite)
+        told = f", and {more} that are not finite" if more else ""
         raise InvalidInputError(
-            f"at least three points are needed, {path} has {len(finite)} "
-            f"({len(raw.points) - len(finite)} more are not finite)",
-            field="file",
+            f"at least three points are needed, {path} has {len(finite)}{told}", field="file"
         )
     scale, turn = _scale(finite, unit, width), UPS[up]
 
@@ -118,6 +118,8 @@ def _raw(path: Path, cell: float | None) -> RawScan:
         return read_esri(path, cell) if is_esri(path) else read_columns(path)
     except CruxError:
         raise
+    except UnicodeDecodeError:
+        raise InvalidInputError(f"no text: {path}", field="file") from None
     except OSError as error:
         raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
     except Exception as error:

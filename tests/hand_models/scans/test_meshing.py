@@ -1,0 +1,173 @@
+"""Scans as triangles: where they are, which way they face, and which holes they keep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from hand_models import Grasp, InvalidInputError, Mesh, Pose
+from hand_models.rock import read_mesh
+from hand_models.scans import mesh_scan, plot_rock, read_scan, write_rock
+from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.scans import relief, wall, write_cloud
+
+TERRAIN = Path(mpl.get_data_path()) / "sample_data" / "jacksboro_fault_dem.npz"
+
+
+def meshed(points, folder, reading=None, **options):
+    path = write_cloud(folder / "cloud.xyz", points)
+    return mesh_scan(read_scan(path, **(reading or {})), **options)
+
+
+def test_the_frame_begins_on_the_rock_z_goes_into_it_and_x_is_up(tmp_path):
+    rock = meshed(wall(), tmp_path, {"view": (0, 1, 0)})
+    np.testing.assert_allclose(rock.pose.rotation, [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-12)
+    x, y, z = rock.pose.apply(rock.vertices).T
+    np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-12)
+    assert np.abs(rock.vertices).max(axis=1).min() == 0.0
+    np.testing.assert_allclose(rock.extent[:2], [0.24, 0.24], atol=1e-9)
+    assert rock.spacing == pytest.approx(0.004)
+    assert (len(rock.vertices), len(rock.faces)) == (61**2, 2 * 60**2)
+
+
+def test_normals_are_those_of_the_rock_toward_the_scanner(tmp_path):
+    rock = meshed(wall(0.002), tmp_path, {"view": (0, 1, 0)})
+    x, _, z = rock.pose.apply(rock.vertices).T
+    slope = np.column_stack([-0.2 * np.cos(20 * x), -np.ones_like(x), 0.2 * np.sin(25 * z)])
+    want = slope / np.linalg.norm(slope, axis=1)[:, None] @ rock.pose.rotation
+    inside = np.abs(rock.vertices[:, :2]).max(axis=1) < 0.11
+    assert (rock.normals() * want).sum(axis=1)[inside].min() > 0.999
+    assert rock.normals()[:, 2].max() < 0.0
+
+
+@pytest.mark.parametrize("up", ["z", "y", "-x"])
+def test_looked_straight_down_the_picture_is_a_map(up, tmp_path):
+    points = wall()[:, [0, 2, 1]] - [0, 0, 5]
+    turn = {"z": points, "y": points[:, [1, 2, 0]], "-x": points[:, [2, 1, 0]] * [-1, 1, 1]}
+    rock = meshed(turn[up], tmp_path, {"up": up, "viewpoint": (0, 0, 0)})
+    assert rock.pose.rotation[2, 2] < -0.99
+
+
+def test_a_hole_of_5_mm_is_bridged_and_one_of_50_mm_stays_and_is_told(tmp_path):
+    for width, count in ((0.005, 0), (0.015, 0), (0.05, 1)):
+        rock = meshed(wall(0.001, 0.06, width), tmp_path, {"view": (0, 1, 0)})
+        assert len(rock.holes) == count
+        met = Mesh(rock.vertices, rock.faces).entry(_middle(rock), (0, 0, 1))
+        assert np.isfinite(met) == (count == 0)
+    (hole,) = rock.holes
+    assert hole.width == pytest.approx(0.05, abs=0.002)
+    np.testing.assert_allclose(hole.place[:2], _middle(rock)[:2], atol=0.005)
+
+
+def _middle(rock):
+    """A point before the middle of the wall, in the rock's frame."""
+    return rock.pose.inverse().apply((0.0, 0.5, 0.0))
+
+
+def test_the_widest_hole_that_is_bridged_is_an_option(tmp_path):
+    points = wall(0.002, 0.06, 0.03)
+    assert len(meshed(points, tmp_path, {"view": (0, 1, 0)}).holes) == 1
+    assert not meshed(points, tmp_path, {"view": (0, 1, 0)}, hole=0.04).holes
+
+
+def test_a_step_that_hides_rock_is_open(tmp_path):
+    points = wall(0.004)
+    points[:, 1] += np.where(np.abs(points[:, [0, 2]]).max(axis=1) < 0.04, 0.1, 0.0)
+    rock = meshed(points, tmp_path, {"view": (0, 1, 0)})
+    (ring,) = rock.holes
+    assert ring.width == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_spacing_keeps_one_point_a_square(tmp_path):
+    rock = meshed(wall(0.002), tmp_path, {"view": (0, 1, 0)}, spacing=0.01)
+    assert len(rock.vertices) <= 25**2
+    assert rock.spacing == pytest.approx(0.01, rel=0.2)
+    x, y, z = rock.pose.apply(rock.vertices).T
+    np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-12)
+
+
+def test_points_that_were_seen_twice_are_taken_once(tmp_path):
+    points = wall(0.004)
+    again = points + np.random.default_rng(1).uniform(-1e-4, 1e-4, points.shape)
+    rock = meshed(np.vstack([points, again, points]), tmp_path, {"view": (0, 1, 0)}, spacing=0.002)
+    once = meshed(points, tmp_path, {"view": (0, 1, 0)})
+    assert len(rock.vertices) < 2 * len(once.vertices)
+
+
+def test_an_origin_may_be_chosen_and_must_be_on_the_rock(tmp_path):
+    reading = {"view": (0, 1, 0), "unit": "mm"}
+    rock = meshed(1e3 * wall(), tmp_path, reading | {"origin": (50, 0, -30)})
+    np.testing.assert_allclose(rock.pose.position[[0, 2]], [0.05, -0.03], atol=0.003)
+    with pytest.raises(InvalidInputError, match=r"^origin: the nearest rock is 0\.\d+ m away"):
+        meshed(1e3 * wall(), tmp_path, reading | {"origin": (900, 0, 0)})
+
+
+def test_a_turned_noisy_cloud_far_from_its_origin_is_the_same_rock(tmp_path):
+    chance = np.random.default_rng(0)
+    points = wall(0.003)
+    points[:, 1] += chance.normal(0.0, 2e-4, len(points))
+    far = points + np.array([5e5, 5e6, 300.0])
+    near, moved = (meshed(p, tmp_path, {"view": (0, 1, 0)}) for p in (points, far))
+    assert len(near.faces) == pytest.approx(len(moved.faces), rel=0.01)
+    np.testing.assert_allclose(moved.extent, near.extent, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        (np.empty((0, 3)), "at least three points are needed"),
+        (np.ones((1, 3)), "at least three points are needed"),
+        (np.ones((9, 3)), "on one line"),
+        (np.linspace(0, 1, 9)[:, None] * [1, 2, 3], "on one line"),
+        (wall(0.004) * [0, 1, 1], "on one line"),
+    ],
+)
+def test_what_is_no_surface_is_refused(points, words, tmp_path):
+    with pytest.raises(InvalidInputError, match=words) as error:
+        meshed(points, tmp_path, {"view": (0, 1, 0)})
+    assert error.value.field == "file"
+
+
+@pytest.mark.parametrize("field", ["spacing", "hole"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan])
+def test_lengths_are_above_zero(field, value, tmp_path):
+    with pytest.raises(InvalidInputError, match=f"^{field}: must be above zero"):
+        meshed(wall(0.02), tmp_path, {"view": (0, 1, 0)}, **{field: value})
+
+
+def test_points_too_far_apart_are_told(tmp_path):
+    with pytest.raises(InvalidInputError, match=r"^hole: points are 40 mm apart, .* is the unit"):
+        meshed(wall(0.04), tmp_path, {"view": (0, 1, 0)})
+
+
+def test_progress_is_told(tmp_path):
+    told = []
+    meshed(wall(0.02), tmp_path, tell=lambda done, total: told.append((done, total)), hole=0.1)
+    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+
+
+def test_a_hand_settles_on_real_terrain_that_is_made_a_wall(tmp_path):
+    scan = read_scan(TERRAIN, cell=90.0, up="y", width=1.0)
+    rock = mesh_scan(scan, spacing=0.004)
+    np.testing.assert_allclose(rock.pose.rotation, [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-12)
+    assert rock.extent[1] == pytest.approx(1.0, abs=0.01)
+    assert 0.02 < rock.extent[2] < 0.03
+    assert not rock.holes
+    write_rock(rock, tmp_path / "rock.ply")
+    vertices, faces = read_mesh(tmp_path / "rock.ply")
+    np.testing.assert_allclose(vertices, rock.vertices, atol=1e-7)
+    np.testing.assert_array_equal(faces, rock.faces)
+    settled = HAND.settle(Mesh(vertices, faces), ROCK, Grasp(0.0))
+    assert settled.palm.engaged
+    plot_rock(rock, tmp_path / "rock.png", "terrain")
+    assert (tmp_path / "rock.png").stat().st_size > 50_000
+
+
+def test_the_pose_puts_the_rock_where_the_scan_has_it(tmp_path):
+    rock = meshed(wall(0.01), tmp_path, {"view": (0.2, 1, -0.1)})
+    again = Pose.from_quaternion(rock.pose.position, rock.pose.quaternion())
+    x, y, z = again.apply(rock.vertices).T
+    np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-9)

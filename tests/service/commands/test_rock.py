@@ -1,0 +1,113 @@
+"""``crux rock``: from a scan to a mesh hold on which a plan is made."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import trimesh
+
+from service.commands.cli import run
+from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
+from tests.suite.helpers.requests import put, wall_request
+from tests.suite.helpers.scans import wall, write_cloud
+
+TERRAIN = Path(mpl.get_data_path()) / "sample_data" / "jacksboro_fault_dem.npz"
+
+
+def scanned(folder: Path) -> str:
+    """A wall in millimetres with one point that is not finite, and a hole of 50 mm."""
+    points = np.vstack([wall(0.004, 0.2, 0.05), [np.nan] * 3])
+    return str(write_cloud(folder / "wall.xyz", 1e3 * points))
+
+
+def test_the_table_tells_what_was_read_and_what_is_open(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    output, picture = tmp_path / "rock.ply", tmp_path / "rock.png"
+    arguments = [scanned(tmp_path), "-o", str(output), "--unit", "mm", "--plot", str(picture)]
+    assert run(["rock", *arguments]) == DONE
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert str(output) in out
+    *table, _, _ = out.splitlines()
+    assert max(map(len, table)) <= 80
+    rows = {line[:12].strip(): line[12:].split() for line in table}
+    assert int(rows["points read"][0].replace(",", "")) > 10_000
+    assert rows["dropped"] == ["1", "not", "finite"]
+    assert rows["holes"][0] == "1"
+    assert float(rows["holes"][-2]) == pytest.approx(50, abs=5)
+    mesh = trimesh.load_mesh(str(output), process=False)
+    assert f"{len(mesh.faces):,}" == rows["triangles"][0]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_same_as_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "rock.ply"
+    options = ["--unit", "mm", "--view", "0,1,0", "--hole", "0.1", "--spacing", "0.01", "--json"]
+    assert run(["rock", scanned(tmp_path), "-o", str(output), *options]) == DONE
+    told = result(capfd)
+    assert told["dropped"] == 1
+    assert told["holes"] == []
+    assert told["spacing"] == pytest.approx(0.01, rel=0.25)
+    assert told["pose"]["orientation"] == pytest.approx([-0.5, -0.5, -0.5, 0.5])
+    assert told["file"] == str(output)
+
+
+def test_a_plan_is_made_on_scanned_terrain(
+    tmp_path: Path, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--cell", "90", "--width", "1", "--up", "y", "--spacing", "0.005", "--json"]
+    assert run(["rock", str(TERRAIN), "-o", str(tmp_path / "rock.ply"), *options]) == DONE
+    assert result(capfd)["extent"][1] == pytest.approx(1.0, abs=0.01)
+    request = wall_request(20.0)
+    for i in range(len(request["stance"]["hands"])):
+        request = put(
+            request, ("stance", "hands", i, "hold"), {"shape": "mesh", "file": "rock.ply"}
+        )
+    assert run(["plan", stance_file(request), "--json"]) in (0, 3)
+    reply = json.loads(capfd.readouterr().out)
+    assert reply["verified"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["none.pcd", "-o", "rock.ply"], "file: no such file: none.pcd"),
+        (["wall.stl", "-o", "rock.ply"], "file: wall.stl: a scan's file ends in"),
+        (["none.pcd"], "Missing option '-o'"),
+        (["none.pcd", "-o", "rock.stl"], "must end in .ply"),
+        (["none.pcd", "-o", "none/rock.ply"], "no such folder"),
+        (["none.pcd", "-o", "rock.ply", "--plot", "rock.txt"], "valid endings are"),
+        (["none.pcd", "-o", "rock.ply", "--unit", "inch"], "'m', 'cm', 'mm'"),
+        (["none.pcd", "-o", "rock.ply", "--up", "w"], "--up"),
+        (["none.pcd", "-o", "rock.ply", "--view", "0,1"], "three numbers with commas"),
+        (
+            ["none.pcd", "-o", "rock.ply", "--view", "0,1,0", "--viewpoint", "0,0,0"],
+            "view: give a view or a viewpoint",
+        ),
+        ([str(TERRAIN), "-o", "rock.ply", "--cell", "-1"], "cell: must be above zero"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["rock", *arguments]) == BAD_INPUT
+    assert words in complaint(capfd)
+    assert not (tmp_path / "rock.ply").exists()
+
+
+def test_a_file_in_the_wrong_unit_is_warned_of(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = write_cloud(tmp_path / "wall.xyz", 100.0 * wall(0.01))
+    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"]) == DONE
+    assert "m across, and a hold may be 10 m" in capfd.readouterr().out
