@@ -33,6 +33,9 @@ SAMPLE: Final = 20_000
 FLAT: Final = 1e-9
 """Width of points on a line, of their length."""
 
+GROWTH: Final = 1.15
+"""By how much squares grow at least until few enough points are left."""
+
 STEEP: Final = 0.1
 """Across the view, what is left of an axis that may point up in a picture."""
 
@@ -155,7 +158,7 @@ def _fewer(points: Array, side: float, most: int) -> Array:
         kept = points[_kept(points, side)]
         if len(kept) <= most:
             return kept
-        side *= 1.02 * math.sqrt(len(kept) / most)
+        side *= max(GROWTH, math.sqrt(len(kept) / most))
 
 
 def _kept(points: Array, side: float) -> Indices:

@@ -89,6 +89,16 @@ def test_a_spacing_keeps_one_point_a_square(tmp_path):
     np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-12)
 
 
+def test_a_large_cloud_is_thinned_to_what_a_hand_can_be_placed_on(tmp_path):
+    x, z = np.random.default_rng(0).uniform(-0.6, 0.6, (2, 200_000))
+    points = np.column_stack([x, 1.0 - relief(x, z), z])
+    path = write_cloud(tmp_path / "cloud.pcd", points, "binary")
+    rock = mesh_scan(read_scan(path))
+    assert 60_000 < len(rock.vertices) <= 100_000
+    assert len(rock.faces) < 200_000
+    assert not rock.holes
+
+
 def test_points_that_were_seen_twice_are_taken_once(tmp_path):
     points = wall(0.004)
     again = points + np.random.default_rng(1).uniform(-1e-4, 1e-4, points.shape)

@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import matplotlib as mpl
 import pytest
 
 from service.commands.cli import run
@@ -71,6 +72,17 @@ def test_the_example_of_an_own_hand_changes_the_plan(
     file.write_text(text, encoding="utf-8")
     assert run(["plan", "wall-300", "--hand", str(file), "--json"]) == 0
     assert json.loads(capfd.readouterr().out)["load_factor"] == pytest.approx(1.04, abs=0.005)
+
+
+def test_the_example_of_a_scan_makes_a_wall_of_terrain(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    (options,) = re.findall(r"^crux rock \$terrain (.*)$", README, re.MULTILINE)
+    terrain = Path(mpl.get_data_path()) / "sample_data" / "jacksboro_fault_dem.npz"
+    monkeypatch.chdir(tmp_path)
+    assert run(["rock", str(terrain), *options.split(), "--spacing", "0.01"]) == 0
+    assert capfd.readouterr().out.endswith("rock.ply\n")
+    assert (tmp_path / "rock.png").is_file()
 
 
 def test_every_command_line_uses_a_bundled_name_that_exists():

@@ -30,7 +30,8 @@ def write_cloud(path: Path, points, encoding: str = "ascii") -> Path:
             cloud = PointCloud.from_points(points, ("x", "y", "z"), (np.float64,) * 3)
             cloud.save(path, Encoding(encoding))
         case ".ply":
-            path.write_bytes(trimesh.PointCloud(points).export(file_type="ply"))
+            cloud = trimesh.PointCloud(points)
+            path.write_bytes(cloud.export(file_type="ply", encoding=encoding or "binary"))
         case ".csv":
             np.savetxt(path, points, delimiter=",", header="x,y,z", comments="")
         case _:
