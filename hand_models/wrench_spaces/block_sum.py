@@ -52,7 +52,7 @@ class BlockSum:
         summands = []
         for columns, vertices in self.blocks:
             image = (vertices @ self.generators[:, columns].T) * SCALE
-            summands.append(extreme_points(image))
+            summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
 
     @cached_property
@@ -120,4 +120,6 @@ class BlockSum:
         """Vertices of the sum of the blocks, without wrench rows."""
         if not self._parts:
             return np.zeros((1, 0))
+        if len(self._parts) == 1:
+            return self._parts[0].points
         return sum_vertices(self._parts, *self.facets, self.rounding)

@@ -27,8 +27,13 @@ class Summand(NamedTuple):
     dimension: int
 
 
-def extreme_points(image: Array) -> Summand:
-    """Return the extreme points of a few points (n, 6), in order around a polygon."""
+def extreme_points(image: Array, columns: int) -> Summand:
+    """Return the extreme points of a few points (n, 6), in order around a polygon.
+
+    They are the image of a block's vertices under a linear map of so many columns. Where that is
+    one to one they are all extreme: of many in a space of many dimensions a hull may lose some, as
+    it merges facets that are wide by rounding.
+    """
     centred = image - image.mean(axis=0)
     size = 1.0 + float(np.abs(image).max())
     if len(image) == 2:
@@ -41,6 +46,8 @@ def extreme_points(image: Array) -> Summand:
     flat = centred @ basis[:rank].T
     if rank == 1:
         return Summand(image[[flat[:, 0].argmin(), flat[:, 0].argmax()]], 1)
+    if rank == columns > 2:
+        return Summand(image, rank)
     return Summand(image[hull(flat).vertices], rank)
 
 

@@ -19,6 +19,9 @@ TOLERANCE: Final = 1e-9
 TIGHT: Final = 1e-10
 """Tolerance of linear programs that measure a polytope."""
 
+WIDE_MERGES, JOGGLED = "Q12", "QJ"
+"""Options of Qhull: to merge facets that are wide, to move points a little until it succeeds."""
+
 BEYOND: Final = 1e-6
 """By how much a row must clear a bounding box to be left out at once."""
 
@@ -147,18 +150,21 @@ def distinct(points: Array, slack: float) -> Array:
 def hull(points: Array, options: str | None = None) -> ConvexHull:
     """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
 
+    Where Qhull gives up at facets of which rounding leaves several, it may merge wide ones; only
+    then are points joggled, which makes many slivers of a facet with more corners than it needs.
+
     Raises
     ------
     SolverError
         If that fails as well.
     """
-    try:
-        return ConvexHull(points, qhull_options=options)
-    except QhullError:
+    failed = ""
+    for tried in (options, f"{options or ''} {WIDE_MERGES}".strip(), JOGGLED):
         try:
-            return ConvexHull(points, qhull_options="QJ")
+            return ConvexHull(points, qhull_options=tried)
         except QhullError as error:
-            raise SolverError(f"convex hull: {str(error).splitlines()[0]}") from None
+            failed = str(error).splitlines()[0]
+    raise SolverError(f"convex hull: {failed}")
 
 
 def hull_facets(points: Array) -> tuple[Array, Array]:
