@@ -88,6 +88,10 @@ class HandModel:
         self.back_off = table.scalar("seat", "back_off")
         self.seat_turn = table.scalar("seat", "turn")
         self.seat_tilt = table.scalar("seat", "tilt")
+        self.seat_scatter = (
+            table.scalar("seat", "scatter_position"),
+            table.scalar("seat", "scatter_angle"),
+        )
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))

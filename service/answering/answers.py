@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from msgspec import UNSET
 
 from hand_models.base import Array, EmptySetError
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import TensionLimit
+from hand_models.fixed_wrist import Robustness, TensionLimit
 from hand_models.hand import FINGERS, NearbyClosure, Seating, SettledHand, Tile, closing_sequence
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
@@ -19,7 +19,12 @@ from planner.result import HandPlan, LimitName, Plan, Price, TensionPath, WristP
 from service import replies
 from service.replies import AXES
 
-__all__ = ["limit_reply", "plan_reply", "vector", "wrench_space_reply"]
+__all__ = ["BOTH_WAYS", "limit_reply", "plan_reply", "vector", "wrench_space_reply"]
+
+SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
+"""Names of both directions along each axis, in the order of `BOTH_WAYS`."""
+
+BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
@@ -70,6 +75,7 @@ def wrench_space_reply(
     limits: Iterable[TensionLimit],
     nearby: Iterable[NearbyClosure],
     wrist: WristPlan | None = None,
+    robust: Robustness | None = None,
 ) -> replies.WrenchSpaceReply:
     """Return one hand's wrench space as a reply, with its views at utilisation 1.
 
@@ -128,8 +134,18 @@ def wrench_space_reply(
         origin=parts.origin,
         generators=parts.generators,
         rows=parts.rows,
+        robust=UNSET if robust is None else _robust(robust),
         **views._asdict(),
     )
+
+
+def _robust(found: Robustness) -> replies.RobustCapability:
+    worst, tenth = (
+        dict(zip(SIDES, map(_number, reach.tolist()), strict=True))
+        for reach in (found.worst, found.tenth)
+    )
+    numbers = found._asdict() | {"worst": worst, "tenth": tenth}
+    return replies.RobustCapability(**numbers)
 
 
 def _stop(settled: SettledHand, tile: Tile) -> str | None:

@@ -12,14 +12,14 @@ import msgspec
 import numpy as np
 
 from hand_models.base import CruxError, InvalidInputError
-from hand_models.fixed_wrist import tension_limits
+from hand_models.fixed_wrist import robustness, tension_limits
 from hand_models.hand import nearby_closures
 from hand_models.parameters import ParameterTable
 from planner import deadline, prepare, solving
 from planner.deadline import DeadlineError
 from planner.question import Question
 from planner.result import Plan, WristPlan
-from service.answering.answers import plan_reply, wrench_space_reply
+from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
 from service.answering.body_space import explore
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
@@ -120,6 +120,11 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     """
     asked = stance(request.stance, robots)
     hand = prepare.resting_hand(asked, request.limb)
+    robust = None
+    if "robust" in request.want:
+        if hand.palm is not None:
+            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
+        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     return wrench_space_reply(
         asked.robot.name,
@@ -129,6 +134,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         tension_limits(hand.settled),
         nearby_closures(hand.settled),
         wrist,
+        robust,
     )
 
 

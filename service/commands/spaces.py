@@ -49,6 +49,9 @@ __all__ = ["body_space", "wrench_space"]
     metavar="N",
     help="Of a floating hand: search N^6 poses of its wrist, too.",
 )
+@click.option(
+    "--robust", is_flag=True, help="And the least of it where the hand is a little elsewhere."
+)
 @robot_option
 @json_option
 def wrench_space(
@@ -56,6 +59,7 @@ def wrench_space(
     limb_and_hand: tuple[str, ParameterTable | None],
     picture: Path | None,
     per_axis: int | None,
+    robust: bool,
     robot: RobotFile | None,
     as_json: bool,
 ) -> int:
@@ -69,7 +73,10 @@ def wrench_space(
     limb, hand = limb_and_hand
     robots = robots_of(robot)
     request = WrenchSpaceRequest(
-        v=1, stance=asked(read_request(stance), hand, robot).stance, limb=limb
+        v=1,
+        stance=asked(read_request(stance), hand, robot).stance,
+        limb=limb,
+        want=["robust"] if robust else [],
     )
     reply = answering.wrench_space(request, robots)
     found = None

@@ -23,6 +23,7 @@ from service.replies import (
     LimitName,
     PlanReply,
     Price,
+    RobustCapability,
     TensionPath,
     Tile,
     WrenchSpaceReply,
@@ -132,6 +133,8 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         f"dimension {reply.dimension}"
     )
     _print_capability(reply.capability, out)
+    if isinstance(reply.robust, RobustCapability):
+        _print_robust(reply.robust, out)
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
@@ -164,6 +167,29 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
     ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
     if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
+
+
+def _print_robust(robust: RobustCapability, out: Console) -> None:
+    """Print what is left of each component where the hand is a little elsewhere."""
+    table = table_of("axis")
+    for name in ("worst least", "worst most", "9 in 10 least", "9 in 10 most"):
+        table.add_column(name, justify="right")
+    for axis in AXES:
+        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
+        cells = [
+            "-" if end is None else _fixed(sign * end, 2)
+            for pair in ends
+            for sign, end in zip((-1.0, 1.0), pair, strict=True)
+        ]
+        table.add_row(f"{axis} {'N' if axis.startswith('f') else 'N·m'}", *cells)
+    _show(
+        f"what is left of that at {robust.draws - robust.without} of {robust.draws} places within "
+        f"{1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad",
+        table,
+        out,
+    )
+    if robust.without:
+        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing")
 
 
 def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console) -> None:

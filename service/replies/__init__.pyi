@@ -41,6 +41,7 @@ from .wrench_space import (
     Contact as Contact,
     HalfSpaceEquations as HalfSpaceEquations,
     HalfSpaces as HalfSpaces,
+    RobustCapability as RobustCapability,
     TensionLimit as TensionLimit,
     WrenchSpaceReply as WrenchSpaceReply,
 )

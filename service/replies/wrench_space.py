@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
 
 from service.replies.hand import Seating, Wrist
 from service.replies.reply import Reply, Vector
@@ -15,6 +15,7 @@ __all__ = [
     "Contact",
     "HalfSpaceEquations",
     "HalfSpaces",
+    "RobustCapability",
     "TensionLimit",
     "WrenchSpaceReply",
 ]
@@ -96,6 +97,24 @@ class AxisCapability(Struct):
     extent: float
 
 
+class RobustCapability(Struct, kw_only=True):
+    """How far a set reaches along each axis where the hand is not quite where it was put.
+
+    Closed anew at so many ``draws`` of its place, to either side by at most ``position`` along each
+    axis of H [m] and ``angle`` about each [rad]; ``without``: at so many of them it cannot be, or
+    holds nothing. ``worst``: the least ``extent`` at the others; ``tenth``: what it exceeds at nine
+    in ten of them; null if there are none.
+    """
+
+    draws: int
+    without: int
+    position: float
+    angle: float
+    seed: int
+    worst: dict[str, float | None]
+    tenth: dict[str, float | None]
+
+
 class WrenchSpaceReply(Reply, kw_only=True):
     """What one hand can carry, at utilisation 1: if nothing, no vertices, and null for the rest."""
 
@@ -113,3 +132,4 @@ class WrenchSpaceReply(Reply, kw_only=True):
     half_spaces: HalfSpaces | None
     dimension: int | None
     capability: dict[str, AxisCapability] | None
+    robust: RobustCapability | UnsetType = UNSET

@@ -25,6 +25,13 @@ class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
 
     stance: Stance
     limb: Name
+    want: Annotated[
+        list[Literal["robust"]],
+        Meta(
+            max_length=1,
+            description="robust: the least that it can carry over a scatter of its place, too",
+        ),
+    ] = []
 
 
 class BodySpaceRequest(Request, frozen=True, kw_only=True):

@@ -12,8 +12,10 @@ from scipy.optimize import linprog
 
 from hand_models.base import InvalidInputError, SolverError, UnsupportedError, wrench_transport
 from planner import solving
+from service import answering
 from service.answering import dispatch
 from service.replies import WrenchSpaceReply
+from service.requests import WrenchSpaceRequest
 from tests.suite.helpers.replies import PLAN, refusal, reply_to
 from tests.suite.helpers.requests import (
     HEAVY,
@@ -21,6 +23,7 @@ from tests.suite.helpers.requests import (
     JSON,
     MSGPACK,
     flat_request,
+    plan_request,
     pose_of,
     request_with_joints,
     wall_request,
@@ -286,3 +289,29 @@ def test_a_hand_that_can_carry_nothing_still_tells_its_seating_and_rows() -> Non
     assert reply.dimension is None
     assert reply.capability is None
     assert reply.rows
+
+
+def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere():
+    request = WrenchSpaceRequest(
+        v=1, stance=plan_request(wall_request()).stance, limb="front_left", want=["robust"]
+    )
+    reply = answering.wrench_space(request)
+    robust = reply.robust
+    assert (robust.draws, robust.without, robust.seed) == (50, 0, 0)
+    assert set(robust.worst) == set(robust.tenth) == set(reply.capability)
+    for axis, nominal in reply.capability.items():
+        assert robust.worst[axis] <= robust.tenth[axis]
+        assert robust.worst[axis] < nominal.extent
+    plain = answering.wrench_space(msgspec.structs.replace(request, want=[]))
+    assert "robust" not in msgspec.to_builtins(plain)
+
+
+def test_robust_is_told_of_fixed_wrists_only():
+    request = plan_request(wall_request())
+    first, *others = request.stance.hands
+    floating = msgspec.structs.replace(first, wrist="floating")
+    stance = msgspec.structs.replace(request.stance, hands=[floating, *others])
+    asked = WrenchSpaceRequest(v=1, stance=stance, limb=first.limb, want=["robust"])
+    with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
+        answering.wrench_space(asked)
+    assert caught.value.field == "want"
