@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,9 @@ TIGHT: Final = 1e-10
 
 WIDE_MERGES, JOGGLED = "Q12", "QJ"
 """Options of Qhull: to merge facets that are wide, to move points a little until it succeeds."""
+
+SLIVER: Final = 1e-6
+"""Least singular value of a facet's edges, relative to the largest, at which they span a plane."""
 
 BEYOND: Final = 1e-6
 """By how much a row must clear a bounding box to be left out at once."""
@@ -158,10 +162,15 @@ def hull(points: Array, options: str | None = None) -> ConvexHull:
     SolverError
         If that fails as well.
     """
+    return _hull(points, (options, f"{options or ''} {WIDE_MERGES}".strip(), JOGGLED))[0]
+
+
+def _hull(points: Array, options: Sequence[str | None]) -> tuple[ConvexHull, str | None]:
+    """Return the convex hull by the first of Qhull's options that finds it, and those."""
     failed = ""
-    for tried in (options, f"{options or ''} {WIDE_MERGES}".strip(), JOGGLED):
+    for tried in options:
         try:
-            return ConvexHull(points, qhull_options=tried)
+            return ConvexHull(points, qhull_options=tried), tried
         except QhullError as error:
             failed = str(error).splitlines()[0]
     raise SolverError(f"convex hull: {failed}")
@@ -171,7 +180,26 @@ def hull_facets(points: Array) -> tuple[Array, Array]:
     """Return unit normals and offsets of the hull of points (n, r)."""
     if points.shape[1] == 1:
         return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
-    equations = hull(points).equations
+    found, options = _hull(points, (None, WIDE_MERGES, JOGGLED))
+    equations = found.equations
+    if options == JOGGLED:
+        equations = _planes(points, found)
     _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
     equations = equations[np.sort(first)]
     return equations[:, :-1], -equations[:, -1]
+
+
+def _planes(points: Array, found: ConvexHull) -> Array:
+    """Return the facets' equations of points of which a hull was found joggled.
+
+    Each by the points themselves; slivers, whose corners span no plane of their own, are left out.
+    """
+    corners = points[found.simplices]
+    _, sizes, axes = np.linalg.svd(corners[:, 1:] - corners[:, :1])
+    normals = axes[:, -1]
+    offsets = np.einsum("fi,fi->f", normals, corners[:, 0])
+    inside = normals @ points.mean(axis=0) > offsets
+    normals[inside] *= -1.0
+    offsets[inside] *= -1.0
+    spans = sizes[:, -1] > SLIVER * sizes[:, 0]
+    return np.column_stack([normals, -offsets])[spans]
