@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -20,8 +19,8 @@ TOLERANCE: Final = 1e-9
 TIGHT: Final = 1e-10
 """Tolerance of linear programs that measure a polytope."""
 
-WIDE_MERGES, JOGGLED = "Q12", "QJ"
-"""Options of Qhull: to merge facets that are wide, to move points a little until it succeeds."""
+JOGGLED: Final = "QJ"
+"""Option of Qhull: to move points a little until it succeeds."""
 
 SLIVER: Final = 1e-6
 """Least singular value of a facet's edges, relative to the largest, at which they span a plane."""
@@ -154,23 +153,16 @@ def distinct(points: Array, slack: float) -> Array:
 def hull(points: Array, options: str | None = None) -> ConvexHull:
     """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
 
-    Where Qhull gives up at facets of which rounding leaves several, it may merge wide ones; only
-    then are points joggled, which makes many slivers of a facet with more corners than it needs.
-
     Raises
     ------
     SolverError
         If that fails as well.
     """
-    return _hull(points, (options, f"{options or ''} {WIDE_MERGES}".strip(), JOGGLED))[0]
-
-
-def _hull(points: Array, options: Sequence[str | None]) -> tuple[ConvexHull, str | None]:
-    """Return the convex hull by the first of Qhull's options that finds it, and those."""
     failed = ""
-    for tried in options:
+    # not merged where they are wide (Q12), which costs vertices and makes facets that are none
+    for tried in (options, JOGGLED):
         try:
-            return ConvexHull(points, qhull_options=tried), tried
+            return ConvexHull(points, qhull_options=tried)
         except QhullError as error:
             failed = str(error).splitlines()[0]
     raise SolverError(f"convex hull: {failed}")
@@ -180,10 +172,10 @@ def hull_facets(points: Array) -> tuple[Array, Array]:
     """Return unit normals and offsets of the hull of points (n, r)."""
     if points.shape[1] == 1:
         return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
-    found, options = _hull(points, (None, WIDE_MERGES, JOGGLED))
-    equations = found.equations
-    if options == JOGGLED:
-        equations = _planes(points, found)
+    try:
+        equations = ConvexHull(points).equations
+    except QhullError:
+        equations = _planes(points, hull(points, JOGGLED))
     _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
     equations = equations[np.sort(first)]
     return equations[:, :-1], -equations[:, -1]

@@ -102,7 +102,7 @@ def test_orthogonal_blocks_have_the_product_of_their_areas():
 
 def test_a_hull_of_points_that_are_off_by_rounding_has_no_facets_of_its_own():
     """Of a cube of six dimensions with corners cut: Qhull gives up at one in two hundred."""
-    for seed in range(140, 160):
+    for seed in (140, 147, 150, 208):
         rng = np.random.default_rng(seed)
         A = np.vstack([rng.normal(size=(6, 6)), np.eye(6), -np.eye(6)])
         b = rng.uniform(0.3, 2.0, len(A))
@@ -121,6 +121,7 @@ def test_a_hull_of_points_that_are_off_by_rounding_has_no_facets_of_its_own():
 
 @settings(max_examples=25, deadline=None)
 @given(seeds, st.integers(3, 6))
+@example(150, 6)
 def test_one_block_of_many_columns_is_the_polytope_of_its_rows(seed, d):
     rng = np.random.default_rng(seed)
     A = np.vstack([rng.normal(size=(d, d)), np.eye(d), -np.eye(d)])
