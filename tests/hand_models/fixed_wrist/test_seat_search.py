@@ -50,7 +50,7 @@ def random_rock(seed):
     return random_mesh(rng) if seed % 3 == 0 else random_profile(rng)
 
 
-@some_and_all("seeds", range(18), 6)
+@some_and_all("seeds", range(18), 9)
 def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
     more = 0
     for seed in seeds:
@@ -77,7 +77,7 @@ def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
 
 
 @pytest.mark.parametrize("rotation", [0.0, math.pi])
-@pytest.mark.parametrize("hold", [Plane(), Cylinder(0.3), Sphere(0.4)])
+@pytest.mark.parametrize("hold", [Plane(), Sphere(0.4)])
 def test_a_hand_put_where_its_best_seat_is_is_the_same(hold, rotation):
     each = placement(hold, rotation)
     (best,) = best_seats(HAND, [each])

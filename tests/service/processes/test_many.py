@@ -201,7 +201,7 @@ class Handler(logging.StreamHandler):
         super().emit(record)
 
 logging.getLogger().addHandler(Handler())
-with Planners(3) as planners:
+with Planners(2) as planners:
     while not told:
         reply = planners.plan_many([plan_request(wall_request())] * 20)[-1]
     print(reply.status)
