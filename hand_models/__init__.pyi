@@ -5,7 +5,11 @@ from .base import (
     Pose as Pose,
 )
 from .compliance import CompliantHand as CompliantHand, FloatingWrist as FloatingWrist
-from .fixed_wrist import tension_limits as tension_limits, wrench_space as wrench_space
+from .fixed_wrist import (
+    place as place,
+    tension_limits as tension_limits,
+    wrench_space as wrench_space,
+)
 from .hand import (
     FINGERS as FINGERS,
     Grasp as Grasp,

@@ -1,3 +1,4 @@
+from .placing import UP as UP, approach_frame as approach_frame, place as place
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,
     KEPT as KEPT,

@@ -149,7 +149,7 @@ class _Search:
 
     def __init__(self, hand: SpinyHand, placements: Sequence[Placement], direction: Array) -> None:
         self._hand, self._placements, self._direction = hand, placements, direction
-        self._seats = [hand.seat(each.hold, each.grasp) for each in placements]
+        self._seats = [hand.seat(each.hold, each.grasp, each.at) for each in placements]
         self._refused: list[InvalidInputError | None] = [None] * len(placements)
         self.best: list[_Found | None] = [None] * len(placements)
 
@@ -159,7 +159,9 @@ class _Search:
         frames = [move.of(self._hand) for _, move in tries]
         outcomes = self._hand.settle_each(
             [
-                self._placements[i]._replace(hold_in_hand=frame.inverse() @ self._seats[i].pose)
+                self._placements[i]._replace(
+                    hold_in_hand=frame.inverse() @ self._seats[i].pose, at=None
+                )
                 for (i, _), frame in zip(tries, frames, strict=True)
             ]
         )

@@ -37,12 +37,16 @@ class Placement(NamedTuple):
     grasp : Grasp
     hold_in_hand : Pose or None
         The hold's frame in H; None if the hand is to be seated.
+    at : Pose or None
+        Where on the hold it is then seated: a frame, in the hold's, that takes that one's place;
+        None for that itself.
     """
 
     hold: Hold
     surface: Surface
     grasp: Grasp
     hold_in_hand: Pose | None
+    at: Pose | None = None
 
 
 class PlacementKey:
@@ -54,11 +58,8 @@ class PlacementKey:
     __slots__ = ("_hash", "_parts")
 
     def __init__(self, placement: Placement) -> None:
-        hold, surface, grasp, pose = placement
-        self._parts: Hashable = hold, surface, grasp
-        if pose is not None:
-            place = np.asarray(pose.position, dtype=float), np.asarray(pose.rotation, dtype=float)
-            self._parts = hold, surface, grasp, place[0].tobytes(), place[1].tobytes()
+        hold, surface, grasp, *poses = placement
+        self._parts: Hashable = hold, surface, grasp, *map(_digits, poses)
         self._hash = hash(self._parts)
 
     def __hash__(self) -> int:
@@ -66,6 +67,12 @@ class PlacementKey:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, PlacementKey) and self._parts == other._parts
+
+
+def _digits(pose: Pose | None) -> Hashable:
+    if pose is None:
+        return None
+    return tuple(np.asarray(part, dtype=float).tobytes() for part in (pose.position, pose.rotation))
 
 
 class PlacedHands:

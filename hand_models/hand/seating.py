@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
@@ -46,6 +46,9 @@ PLACED: Final = 1e-6
 
 LEVEL: Final = 1e-3
 """How far a finger that lies flat may be out of the palm's plane [rad]."""
+
+SPACING: Final = 5e-4
+"""Of the points of outlines that are made of smooth rock [m]."""
 
 LINES: Final = 5
 """Lines along the palm on which the highest rock under it is looked for."""
@@ -102,7 +105,7 @@ CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
 CENTRED.pose.position.setflags(write=False)
 
 
-def seat(hand: HandModel, hold: Hold, grasp: Grasp) -> Seating:
+def seat(hand: HandModel, hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
     """Seat a hand on a hold that was given no place; see the module's text.
 
     Parameters
@@ -110,30 +113,33 @@ def seat(hand: HandModel, hold: Hold, grasp: Grasp) -> Seating:
     hand : HandModel
     hold : Hold
     grasp : Grasp
+    at : Pose, optional
+        A frame, in the hold's, that takes that one's place.
     """
-    seating, meant = propose(hand, hold, grasp)
+    seating, meant = propose(hand, hold, grasp, at)
     return seating if not meant or _holds(hand, hold, seating) else CENTRED
 
 
-def propose(hand: HandModel, hold: Hold, grasp: Grasp) -> tuple[Seating, bool]:
+def propose(
+    hand: HandModel, hold: Hold, grasp: Grasp, at: Pose | None = None
+) -> tuple[Seating, bool]:
     """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
 
     If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
     """
     _, y, z = hand.inner_place
+    if at is not None:
+        there = _on_outline(
+            hand, _Outlines(hand, hold, at), hand.pinch_crest if grasp.pinch else None
+        )
+        return replace(there, pose=there.pose @ at.inverse()), False
     if hold.shape == Plane.shape:
         return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
     pinch = grasp.pinch
     crest = hand.pinch_crest if pinch else None
     circle = hold.crest_circle(y)
     if circle is None and hold.swept is None:
-        under = [
-            section
-            for side in (y, -y)
-            if isinstance(section := _section_at(hold, side), PolylineSection)
-        ]
-        if under:
-            return _on_outline(hand, under, _Top(hand, hold), crest), False
+        return _on_outline(hand, _Outlines(hand, hold, Pose.identity()), crest), False
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
         return CENTRED, False
@@ -210,30 +216,52 @@ def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
 # Rock that is known by its outline only -----------------------------------------------------------
 
 
-def _section_at(hold: Hold, y: float) -> Section | None:
-    """Return the rock in a plane along a palm, y beside the hold's origin."""
-    return hold.section(np.array([0.0, y, 0.0]), *np.eye(3)[[0, 2]])
+class _Outlines:
+    """Rock under a palm and the inner fingers as seen from a frame: outlines along x.
 
+    Attributes
+    ----------
+    under : list of PolylineSection
+        Of the rock under the inner fingers.
+    """
 
-class _Top:
-    """How high the rock stands under a palm, on a few lines along it."""
-
-    def __init__(self, hand: HandModel, hold: Hold) -> None:
+    def __init__(self, hand: HandModel, hold: Hold, at: Pose) -> None:
+        self._hold, self._at = hold, at
         self._half = 0.5 * hand.palm_length
+        self._reach = hand.finger.reach + hand.palm_length
+        y = hand.inner_place[1]
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
-        sections = (_section_at(hold, y) for y in np.linspace(-across, across, LINES).tolist())
-        self._lines = [line for line in sections if isinstance(line, PolylineSection)]
+        self.under = self._cut((y, -y))
+        self._lines = self._cut(np.linspace(-across, across, LINES).tolist()) if self.under else []
 
-    def __call__(self, x: float) -> float | None:
-        """Return z, in the hold's frame, of the highest rock under a palm if the hold is at x."""
+    def _cut(self, offsets: Sequence[float]) -> list[PolylineSection]:
+        """Return the rock in planes along x, each so far beside the frame's origin."""
+        axes = self._at.rotation
+        found = (
+            self._hold.section(self._at.apply([0.0, y, 0.0]), axes[:, 0], axes[:, 2])
+            for y in offsets
+        )
+        lines = [self._outline(section) for section in found if section is not None]
+        return [line for line in lines if line is not None]
+
+    def _outline(self, section: Section) -> PolylineSection | None:
+        if isinstance(section, PolylineSection):
+            return section
+        chains = section.outline(self._reach, SPACING)
+        pieces = [np.column_stack([chain.real, chain.imag]) for chain in chains]
+        return PolylineSection(pieces) if pieces else None
+
+    def top(self, x: float) -> float | None:
+        """Return z of the highest rock under a palm if the frame is at x of the hand."""
         tops = [line.highest(-self._half - x, self._half - x) for line in self._lines]
         return min((top for top in tops if top is not None), default=None)
 
 
-def _on_outline(
-    hand: HandModel, under: Sequence[PolylineSection], top: _Top, crest: float | None
-) -> Seating:
-    """Seat a hand on a hold whose sections under the inner fingers are polylines."""
+def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seating:
+    """Seat a hand on rock that is known by its outlines; centred if there is none under it."""
+    under = rock.under
+    if not under:
+        return CENTRED
     x, _, z = hand.inner_joint.tolist()
     model = hand.finger
     face = model.tile_range[0], model.joint_spacing, model.tile_height
@@ -251,7 +279,7 @@ def _on_outline(
         return sum(along) / len(along) - hand.seated_contact
 
     def resting(along: float, stand_off: float = 0.0) -> Place | None:
-        highest = top(along)
+        highest = rock.top(along)
         return None if highest is None else (along, stand_off - highest)
 
     level = resting(0.0, z + model.tile_height)

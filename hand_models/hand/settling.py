@@ -217,7 +217,7 @@ def _placed(
         if each.hold_in_hand is not None:
             seatings.append(seating_given(each.hold_in_hand))
             continue
-        seating, on_contact = propose(hand, each.hold, each.grasp)
+        seating, on_contact = propose(hand, each.hold, each.grasp, each.at)
         if on_contact and shape is None:
             seating, on_contact = seat(hand, each.hold, each.grasp), False
         seatings.append(seating)

@@ -81,9 +81,9 @@ class SpinyHand(HandModel):
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
         return spiny_hand, (self.table,)
 
-    def seat(self, hold: Hold, grasp: Grasp) -> Seating:
+    def seat(self, hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
         """Seat the hand on a hold that was given no place; see `hand_models.hand.seating`."""
-        return seat(self, hold, grasp)
+        return seat(self, hold, grasp, at)
 
     def settle(
         self,
@@ -91,6 +91,7 @@ class SpinyHand(HandModel):
         surface: Surface,
         grasp: Grasp | None = None,
         hold_in_hand: Pose | None = None,
+        at: Pose | None = None,
     ) -> SettledHand:
         """Close the hand on a hold.
 
@@ -103,6 +104,8 @@ class SpinyHand(HandModel):
         hold_in_hand : Pose, optional
             The hold's frame in H; without it the hand is seated (see `seat`), and backs off rock
             that would stand in its open fingers, as far as ``back_off``.
+        at : Pose, optional
+            Where it is then seated: a frame, in the hold's, that takes that one's place.
 
         Raises
         ------
@@ -110,7 +113,8 @@ class SpinyHand(HandModel):
             If the rock stands deeper in the palm than the spines can retract, or in a finger
             wherever its joints turn.
         """
-        (settled,) = self.settle_each([Placement(hold, surface, grasp or Grasp(), hold_in_hand)])
+        asked = Placement(hold, surface, grasp or Grasp(), hold_in_hand, at)
+        (settled,) = self.settle_each([asked])
         if isinstance(settled, InvalidInputError):
             raise settled
         return settled

@@ -11,7 +11,7 @@ nails meet the raw triangles.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.outlined import OutlinedHold
+from hand_models.rock.triangle_cells import TriangleCells
 from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
 
 __all__ = ["Mesh", "read_mesh"]
@@ -101,7 +102,6 @@ class Mesh(OutlinedHold):
         if not len(welded.faces):
             raise InvalidInputError("no triangle has an area", field="faces")
         self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
-        self._view: _View | None = None
         self._check_place(table.scalar("scan", "near"), table.vector("scan", "view"))
 
     def _check_place(self, near: float, view: tuple[float, ...]) -> None:
@@ -114,9 +114,8 @@ class Mesh(OutlinedHold):
                 f"the rock under the palm; at most {near:g} m is possible",
                 field="vertices",
             )
-        seen = self._facing(np.array([0.0, 0.0, 1.0]))
         met = [
-            seen.first_side((x, y, 0.0))
+            self._first_side((x, y, 0.0), (0.0, 0.0, 1.0))
             for x in np.linspace(-view[0], view[0], RAYS)
             for y in np.linspace(-view[1], view[1], RAYS)
         ]
@@ -131,53 +130,38 @@ class Mesh(OutlinedHold):
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the cut through the triangles, small gaps bridged."""
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
-        return bridge(cut(self.triangles, o, s, t, self._scale.reach), self._scale.bridged_gap)
+        axes, reach = np.array([np.cross(s, t), s, t]), self._scale.reach
+        beside, middle = np.array([0.0, reach, reach]), axes @ o
+        near = self._cells.within(axes, middle - beside, middle + beside)
+        crossed = Triangles(self.triangles.vertices, self.triangles.faces[near])
+        return bridge(cut(crossed, o, s, t, reach), self._scale.bridged_gap)
+
+    @cached_property
+    def _cells(self) -> TriangleCells:
+        return TriangleCells(self.triangles)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
-        return self._facing(np.asarray(direction, dtype=float)).entry(point)
+        """Return how far from a point the rock begins: behind it if it is inside."""
+        where, entering = self._hits(point, direction)
+        behind = np.flatnonzero(where <= 0.0)
+        if len(behind) and entering[behind[-1]]:
+            return float(where[behind[-1]])
+        ahead = np.flatnonzero((where > 0.0) & entering)
+        return float(where[ahead[0]]) if len(ahead) else math.inf
 
-    def _facing(self, direction: Array) -> _View:
-        """Return the triangles as seen along a direction; the last such view is kept."""
-        if self._view is None or not np.array_equal(self._view.direction, direction):
-            self._view = _View.along(self.triangles, direction)
-        return self._view
+    def _first_side(self, point: ArrayLike, direction: ArrayLike) -> int:
+        """Return 1 if the first triangle on a line faces it, −1 if it shows its back, else 0."""
+        _, entering = self._hits(point, direction)
+        return 0 if not len(entering) else 1 if entering[0] else -1
 
-
-@dataclass(frozen=True, eq=False)
-class _View:
-    """Triangles seen along a direction, for rays in that direction.
-
-    Attributes
-    ----------
-    direction : ndarray, shape (3,)
-    axes : ndarray, shape (3, 3)
-        Rows: two across the direction, and the direction.
-    corners : ndarray, shape (m, 3, 3)
-        Of each triangle, in these axes.
-    low, high : ndarray, shape (2, m)
-        Bounds of each triangle across the direction.
-    """
-
-    direction: Array
-    axes: Array
-    corners: Array
-    low: Array
-    high: Array
-
-    @classmethod
-    def along(cls, triangles: Triangles, direction: Array) -> _View:
-        across = np.linalg.svd(direction[None])[2][1:]
-        axes = np.vstack([across, direction])
-        corners = (triangles.vertices @ axes.T)[triangles.faces]
-        flat = np.ascontiguousarray(corners[:, :, :2].transpose(1, 2, 0))
-        return cls(direction, axes, corners, flat.min(axis=0), flat.max(axis=0))
-
-    def _hits(self, point: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    def _hits(self, point: ArrayLike, direction: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Return where a line meets triangles, in order, and which of these it enters."""
-        x, y, z = self.axes @ np.asarray(point, dtype=float)
-        hit = (self.low[0] <= x) & (x <= self.high[0])
-        hit &= (self.low[1] <= y) & (y <= self.high[1])
-        a, b, c = (self.corners[hit] - np.array([x, y, z])).transpose(1, 0, 2)
+        p, along = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
+        across = np.linalg.svd(along[None])[2][1:]
+        axes = np.vstack([across, along])
+        near = self._cells.within(across, across @ p, across @ p)
+        corners = (self.triangles.vertices[self.triangles.faces[near]] - p) @ axes.T
+        a, b, c = corners.transpose(1, 0, 2)
         weights = np.stack([_area(b, c), _area(c, a), _area(a, b)])
         area = weights.sum(axis=0)
         slack = EDGE * np.abs(area)
@@ -186,21 +170,7 @@ class _View:
         where = (weights * depth).sum(axis=0)[met] / area[met]
         order = np.argsort(where, kind="stable")
         # counterclockwise from outside is clockwise for a ray that enters
-        return where[order], (area[met] * np.linalg.det(self.axes) < 0.0)[order]
-
-    def first_side(self, point: ArrayLike) -> int:
-        """Return 1 if the first triangle on a line faces it, −1 if it shows its back, else 0."""
-        _, entering = self._hits(point)
-        return 0 if not len(entering) else 1 if entering[0] else -1
-
-    def entry(self, point: ArrayLike) -> float:
-        """Return how far from a point the rock begins: behind it if it is inside."""
-        where, entering = self._hits(point)
-        behind = np.flatnonzero(where <= 0.0)
-        if len(behind) and entering[behind[-1]]:
-            return float(where[behind[-1]])
-        ahead = np.flatnonzero((where > 0.0) & entering)
-        return float(where[ahead[0]]) if len(ahead) else math.inf
+        return where[order], (area[met] * np.linalg.det(axes) < 0.0)[order]
 
 
 def _area(a: Array, b: Array) -> Array:

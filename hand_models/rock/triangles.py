@@ -140,21 +140,22 @@ def cut(
     """
     vertices, faces = triangles
     normal = np.cross(s_axis, t_axis)
-    heights = vertices @ normal - origin @ normal
+    # each vertex by itself, so that triangles that share it are told the same
+    x, y, z = (vertices[:, i][faces] for i in range(3))
+    heights = x * normal[0] + y * normal[1] + z * normal[2] - origin @ normal
     beyond = heights >= 0.0
-    a, b, c = (beyond[faces[:, i]] for i in range(3))
-    faces = faces[(a != b) | (a != c)]
+    crossed = beyond.any(axis=1) & ~beyond.all(axis=1)
+    faces, heights, sides = faces[crossed], heights[crossed], beyond[crossed]
     flat = (vertices[faces] - origin) @ np.column_stack([s_axis, t_axis])
     near = ((flat.min(axis=1) <= reach) & (flat.max(axis=1) >= -reach)).all(axis=1)
-    faces, flat = faces[near], flat[near]
+    faces, heights, sides, flat = faces[near], heights[near], sides[near], flat[near]
     if not len(faces):
         return []
     # turn each triangle so that its first vertex is alone on its side of the plane
-    sides = beyond[faces]
     alone = np.where(sides.sum(axis=1) == 1, sides.argmax(axis=1), sides.argmin(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
     row = np.arange(len(faces))[:, None]
-    faces, flat, height = faces[row, turn], flat[row, turn], heights[faces[row, turn]]
+    faces, flat, height = faces[row, turn], flat[row, turn], heights[row, turn]
     part = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
     points = flat[:, :1] + part * (flat[:, 1:] - flat[:, :1])
     names = _edge_names(faces[:, :1], faces[:, 1:], len(vertices))

@@ -31,6 +31,7 @@ from .settled_stance import (
     floating_wrist as floating_wrist,
     hand_space as hand_space,
     resting_hand as resting_hand,
+    settle_each as settle_each,
     settle_hand as settle_hand,
 )
 from .stance_constraints import (

@@ -19,6 +19,7 @@ __all__ = [
     "hand_space",
     "resting_hand",
     "settle_at",
+    "settle_each",
     "settle_hand",
     "settle_stance",
     "wrist_at",
@@ -27,7 +28,7 @@ __all__ = [
 
 def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
     """Close one hand of a stance on its hold."""
-    (settled,) = _settled(stance.robot.hand, [hand])
+    (settled,) = settle_each(stance.robot.hand, [hand])
     if isinstance(settled, InvalidInputError):
         raise settled
     return settled
@@ -41,20 +42,23 @@ def settle_stance(stance: Stance) -> list[SettledHand]:
     InvalidInputError
         If a hand cannot be where it is; of the first one, its field relative to the question.
     """
-    outcomes = _settled(stance.robot.hand, stance.hands)
+    outcomes = settle_each(stance.robot.hand, stance.hands)
     return [_or_raise(outcome, i) for i, outcome in enumerate(outcomes)]
 
 
 def settle_at(stance: Stance, index: int) -> SettledHand:
     """Close the hand of that index; an error's field is relative to the question."""
-    (outcome,) = _settled(stance.robot.hand, [stance.hands[index]])
+    (outcome,) = settle_each(stance.robot.hand, [stance.hands[index]])
     return _or_raise(outcome, index)
 
 
-def _settled(kind: SpinyHand, hands: Sequence[HandOnHold]) -> list[SettledHand | InvalidInputError]:
+def settle_each(
+    kind: SpinyHand, hands: Sequence[HandOnHold]
+) -> list[SettledHand | InvalidInputError]:
     """Return hands of one kind closed on their holds; errors in place of those that cannot be."""
     placements = [
-        Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold()) for hand in hands
+        Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold(), hand.at)
+        for hand in hands
     ]
     if all(hand.seat == "rest" for hand in hands):
         return kind.settle_each(placements)

@@ -136,6 +136,8 @@ class HandOnHold:
         there where it holds most (`hand_models.fixed_wrist.seat_search`).
     seat_direction : ndarray, shape (6,), optional
         In which wrench on the rock, in H, the best seat is to hold most; the pull-off by default.
+    at : Pose, optional
+        Where on the hold the hand is seated: a frame, in the hold's, that takes that one's place.
     """
 
     limb: str
@@ -150,6 +152,7 @@ class HandOnHold:
     wrench: tuple[float | None, ...] | None = None
     seat: SeatRule = "rest"
     seat_direction: Array | None = None
+    at: Pose | None = None
 
     def __post_init__(self) -> None:
         if self.wrist not in WRISTS:
@@ -192,6 +195,14 @@ class HandOnHold:
                 "the seat",
                 field="seat",
             )
+        if self.at is not None:
+            if posed:
+                raise InvalidInputError(
+                    "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
+                    "or where it is seated",
+                    field="at",
+                )
+            _possible(self.at, "at")
         if self.seat_direction is not None:
             if self.seat != "best":
                 raise InvalidInputError(

@@ -73,6 +73,7 @@ class WrenchStream:
                 f"must be above 0 and at most {LARGEST:g} N, got {radius:g}", field="radius"
             )
         self.radius = float(radius)
+        self.question = question
         self._stance = StreamStance(question)
         self._following = Prefetch(self._stance, self.radius)
         self._lock = threading.Lock()

@@ -7,19 +7,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
-from hand_models.base import Array, EmptySetError
+from hand_models.base import Array, EmptySetError, Pose
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, TensionLimit
 from hand_models.hand import FINGERS, NearbyClosure, Seating, SettledHand, Tile, closing_sequence
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
+from planner.question import Stance
 from planner.result import HandPlan, LimitName, Plan, Price, TensionPath, WristPlan
 from service import replies
 from service.replies import AXES
 
-__all__ = ["BOTH_WAYS", "limit_reply", "plan_reply", "vector", "wrench_space_reply"]
+__all__ = ["BOTH_WAYS", "limit_reply", "placed_poses", "plan_reply", "vector", "wrench_space_reply"]
 
 SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 """Names of both directions along each axis, in the order of `BOTH_WAYS`."""
@@ -344,10 +345,18 @@ def _both_signs(plane: HalfPlane) -> list[list[float]]:
     ]
 
 
+def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
+    """Return H in W of the hands that were given by a place on a rock; unset if there is none."""
+    poses = {hand.limb: _frame(hand.pose) for hand in stance.hands if hand.at is not None}
+    return poses or UNSET
+
+
+def _frame(pose: Pose) -> replies.PlacedFrame:
+    return replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
+
+
 def _seating(seating: Seating) -> replies.Seating:
-    pose = seating.pose
-    frame = replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
-    return replies.Seating(seating.rule, frame, seating.backed_off)
+    return replies.Seating(seating.rule, _frame(seating.pose), seating.backed_off)
 
 
 def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:

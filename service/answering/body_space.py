@@ -12,7 +12,7 @@ from hand_models.base import Array, InvalidInputError
 from planner.capability import COMPONENTS, BodySection, BodySpace, End
 from planner.result import LimitName
 from service import replies
-from service.answering.answers import limit_reply, vector
+from service.answering.answers import limit_reply, placed_poses, vector
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
@@ -71,6 +71,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
     reply = BodySpaceReply(
+        poses=placed_poses(asked.stance),
         id=request.id,
         robot=asked.stance.robot.name,
         status=space.plan.status,

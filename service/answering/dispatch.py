@@ -19,7 +19,7 @@ from planner import deadline, prepare, solving
 from planner.deadline import DeadlineError
 from planner.question import Question
 from planner.result import Plan, WristPlan
-from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
+from service.answering.answers import BOTH_WAYS, placed_poses, plan_reply, wrench_space_reply
 from service.answering.body_space import explore
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
@@ -107,6 +107,7 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     asked = question(request, robots)
     answer = solving.plan(asked)
     reply = plan_reply(answer, request.id, model="model" in request.want)
+    reply.poses = placed_poses(asked.stance)
     return Planned(asked, answer, reply)
 
 
@@ -126,7 +127,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
             raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
         robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
-    return wrench_space_reply(
+    reply = wrench_space_reply(
         asked.robot.name,
         request.limb,
         hand.settled,
@@ -136,6 +137,8 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         wrist,
         robust,
     )
+    reply.poses = placed_poses(asked)
+    return reply
 
 
 def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceReply:

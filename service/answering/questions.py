@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Final, Literal, cast, get_args, overload
 
@@ -11,16 +13,21 @@ import numpy as np
 
 from hand_models import rock
 from hand_models.base import Array, InvalidInputError, Pose
-from hand_models.hand import Grasp
+from hand_models.fixed_wrist import UP, approach_frame
+from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
 from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
+from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.route import Move, Route
 from service import requests
 from service.answering.own_robot import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]
+
+VERTICAL: Final = (0.0, 0.0, 1.0)
+"""Up in W."""
 
 GRASPS: Final = 64
 """Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
@@ -76,14 +83,13 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         If a part of it is impossible; the field is relative to the file.
     """
     start = stance(request.stance, robots)
-    numbers = start.robot.hand.table
+    kind = start.robot.hand
+    moved = [_hand(move, kind.table, f"moves[{i}]") for i, move in enumerate(request.moves)]
+    bodies = [_pose(move.body, f"moves[{i}].body") for i, move in enumerate(request.moves)]
     return Route(
         name=request.name,
         start=start,
-        moves=tuple(
-            Move(_hand(move, numbers, f"moves[{i}]"), _pose(move.body, f"moves[{i}].body"))
-            for i, move in enumerate(request.moves)
-        ),
+        moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies)),
         load=_load(request.load),
         limits=_limits(request.limits),
         objective=_objective(request.objective),
@@ -104,10 +110,9 @@ def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
             own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
             robot = build(own)
         numbers = robot.hand.table
+        hands = [_hand(hand, numbers, f"hands[{i}]") for i, hand in enumerate(message.hands)]
         return Stance(
-            hands=tuple(
-                _hand(hand, numbers, f"hands[{i}]") for i, hand in enumerate(message.hands)
-            ),
+            hands=tuple(_placed(robot.hand, hands, "hands")),
             body=_pose(message.body, "body"),
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
             robot=robot,
@@ -177,13 +182,24 @@ def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnH
             hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
         except InvalidInputError as error:
             raise error.within("hold") from None
+        pose, at = _pose(message.pose, "pose"), None
+        if message.place is not None:
+            if pose is not None or hold_in_hand is not None:
+                which = "pose" if pose is not None else "hold.pose_in_hand"
+                raise InvalidInputError("give a place or a pose, not both", field=which)
+            # of the rock, until the hand has been seated there
+            pose, hold_pose = hold_pose or Pose.identity(), None
+            at = _frame(message.place, pose)
+        if pose is None:
+            raise InvalidInputError("missing", field="pose")
         return HandOnHold(
             limb=message.limb,
-            pose=_pose(message.pose, "pose"),
+            pose=pose,
             hold=hold,
             surface=surface,
             hold_pose=hold_pose,
             hold_in_hand=hold_in_hand,
+            at=at,
             grasp=grasp,
             wrist=message.wrist,
             tendon_preload=None
@@ -195,6 +211,29 @@ def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnH
             if message.seat_direction is None
             else np.array(message.seat_direction),
         )
+
+
+def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
+    """Return where on a rock a hand is seated, in the rock's frame."""
+    up = place.up
+    if place.frame == "world":
+        from_world = rock_pose.inverse()
+        axes, point, up = from_world.rotation, from_world.apply(place.point), up or VERTICAL
+    else:
+        axes, point, up = np.eye(3), np.array(place.point), up or UP
+    with _within("place"):
+        return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
+
+
+def _placed(kind: SpinyHand, hands: Sequence[HandOnHold], path: str) -> list[HandOnHold]:
+    """Return hands of which those with a place on the rock have the poses that they take there."""
+    placed = [i for i, hand in enumerate(hands) if hand.at is not None]
+    found = list(hands)
+    for i, outcome in zip(placed, settle_each(kind, [hands[i] for i in placed]), strict=True):
+        if isinstance(outcome, InvalidInputError):
+            raise outcome.within(f"{path}[{i}]")
+        found[i] = replace(hands[i], pose=hands[i].pose @ outcome.seating.pose.inverse())
+    return found
 
 
 @overload

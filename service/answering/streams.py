@@ -11,6 +11,7 @@ from typing import Final
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
+from service.answering.answers import placed_poses
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
@@ -70,6 +71,7 @@ class Streams:
         for old in gone:
             old.close()
         return StreamReply(
+            poses=placed_poses(stream.question.stance),
             stream=identifier,
             radius=stream.interpolates,
             status=first.status,

@@ -8,7 +8,6 @@ from .hand import (
     Finger as Finger,
     Hand as Hand,
     Palm as Palm,
-    PlacedFrame as PlacedFrame,
     Seating as Seating,
     Tile as Tile,
     Wrist as Wrist,
@@ -24,7 +23,9 @@ from .reply import (
     AXES as AXES,
     ErrorDetail as ErrorDetail,
     ErrorReply as ErrorReply,
+    PlacedFrame as PlacedFrame,
     Reply as Reply,
+    StanceReply as StanceReply,
     Time as Time,
 )
 from .stream import (

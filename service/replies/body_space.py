@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from service.replies.limits import LimitName
-from service.replies.reply import Reply, Time, Vector
+from service.replies.reply import StanceReply, Time, Vector
 
 __all__ = [
     "Acceleration",
@@ -54,7 +54,7 @@ class Acceleration(Struct, kw_only=True):
     limiting: LimitName | None
 
 
-class BodySpaceReply(Reply, kw_only=True):
+class BodySpaceReply(StanceReply, kw_only=True):
     """What a stance can hold within the utilisation asked for.
 
     ``status``, ``reason``, ``utilisation``: of the plan for the body wrench asked for.

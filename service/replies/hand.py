@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from service.replies.reply import Vector
+from service.replies.reply import PlacedFrame, Vector
 from service.replies.wrench_set import WrenchSet
 
 __all__ = [
     "Finger",
     "Hand",
     "Palm",
-    "PlacedFrame",
     "Seating",
     "Tile",
     "Wrist",
@@ -64,13 +63,6 @@ class Palm(Struct, kw_only=True):
     moment: Vector
     engaged: list[int]
     utilisation: float
-
-
-class PlacedFrame(Struct):
-    """A frame in another, the quaternion as [x, y, z, w]."""
-
-    position: Vector
-    orientation: Vector
 
 
 class Seating(Struct):

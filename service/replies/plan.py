@@ -6,7 +6,7 @@ from msgspec import UNSET, Struct, UnsetType
 
 from service.replies.hand import Hand
 from service.replies.limits import LimitName, Price
-from service.replies.reply import Reply, Time, Vector
+from service.replies.reply import StanceReply, Time, Vector
 from service.replies.wrench_set import WrenchSet
 
 __all__ = [
@@ -71,7 +71,7 @@ class TensionPath(Struct, kw_only=True):
     limiting: list[LimitName] = []
 
 
-class PlanReply(Reply, kw_only=True):
+class PlanReply(StanceReply, kw_only=True):
     """Who carries what, and what margin is left.
 
     ``effort``: the sum of squared relative tendon tensions and joint torques; where it is the

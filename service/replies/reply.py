@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
 
 __all__ = [
     "AXES",
     "ErrorDetail",
     "ErrorReply",
+    "PlacedFrame",
     "Reply",
+    "StanceReply",
     "Time",
     "Vector",
 ]
@@ -30,6 +32,19 @@ class Reply(Struct, kw_only=True):
     """What every reply has."""
 
     v: int = 1
+
+
+class PlacedFrame(Struct):
+    """A frame in another, the quaternion as [x, y, z, w]."""
+
+    position: Vector
+    orientation: Vector
+
+
+class StanceReply(Reply, kw_only=True):
+    """A reply about a stance; ``poses``: H in W of hands that were given by a place on a rock."""
+
+    poses: dict[str, PlacedFrame] | UnsetType = UNSET
 
 
 class Time(Struct):

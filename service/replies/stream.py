@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from service.replies.reply import Reply, Vector
+from service.replies.reply import Reply, StanceReply, Vector
 
 __all__ = ["HandColumns", "HandSetPoints", "SetPointsReply", "StreamReply"]
 
@@ -16,7 +16,7 @@ class HandColumns(Struct, kw_only=True):
     columns: list[str]
 
 
-class StreamReply(Reply, kw_only=True):
+class StreamReply(StanceReply, kw_only=True):
     """A stream that is declared. It is there until many others are, or the service ends.
 
     ``radius``: within which of ``body_wrench``, the first centre, set-points are interpolated, null

@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec import UNSET, Struct, UnsetType
 
 from service.replies.hand import Seating, Wrist
-from service.replies.reply import Reply, Vector
+from service.replies.reply import StanceReply, Vector
 from service.replies.wrench_set import Generator, Row
 
 __all__ = [
@@ -115,7 +115,7 @@ class RobustCapability(Struct, kw_only=True):
     tenth: dict[str, float | None]
 
 
-class WrenchSpaceReply(Reply, kw_only=True):
+class WrenchSpaceReply(StanceReply, kw_only=True):
     """What one hand can carry, at utilisation 1: if nothing, no vertices, and null for the rest."""
 
     robot: str

@@ -29,5 +29,5 @@ from .spaces import (
     BodySpaceRequest as BodySpaceRequest,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
-from .stance import Grasp as Grasp, Hand as Hand, Stance as Stance
+from .stance import Grasp as Grasp, Hand as Hand, Place as Place, Stance as Stance
 from .stream import SetPointsRequest as SetPointsRequest, StreamRequest as StreamRequest

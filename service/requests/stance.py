@@ -10,8 +10,10 @@ from msgspec import Meta
 from service.requests.holds import Hold, Surface
 from service.requests.request import (
     Acceleration,
+    Coordinate,
     Name,
     Pose,
+    Position,
     PreloadEntry,
     Strict,
     Tension,
@@ -21,6 +23,7 @@ from service.requests.request import (
 __all__ = [
     "Grasp",
     "Hand",
+    "Place",
     "Stance",
 ]
 
@@ -33,6 +36,7 @@ Preload = Annotated[
     ),
 ]
 Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="not zero")]
 Angles = Annotated[
     list[Angle],
     Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [rad]"),
@@ -64,11 +68,39 @@ class Grasp(Strict, frozen=True, kw_only=True):
     ] = False
 
 
+class Place(Strict, frozen=True, kw_only=True):
+    """A point of rock that stands still, at which a hand is seated."""
+
+    point: Annotated[Position, Meta(description="on the rock, where the hold's crest would be [m]")]
+    approach: Annotated[Direction, Meta(description="into the rock, of any length: z of the hand")]
+    wrist_angle: Annotated[
+        Angle,
+        Meta(
+            description="by which the hand is turned about its approach from where its x is "
+            "nearest to up [rad]"
+        ),
+    ] = 0.0
+    frame: Annotated[Literal["world", "rock"], Meta(description="of point, approach and up")] = (
+        "world"
+    )
+    up: Annotated[
+        Direction | None,
+        Meta(description="by default z of the world, or x of the rock's frame"),
+    ] = None
+
+
 class Hand(Strict, frozen=True, kw_only=True):
-    """One hand on its hold."""
+    """One hand on its hold, by its pose or by its place."""
 
     limb: Name
-    pose: Annotated[Pose, Meta(description="of H in W")]
+    pose: Annotated[Pose | None, Meta(description="of H in W")] = None
+    place: Annotated[
+        Place | None,
+        Meta(
+            description="in place of a pose: where on the rock, whose frame is `hold.pose`, or W, "
+            "the hand is seated; the reply tells its pose"
+        ),
+    ] = None
     hold: Hold
     surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")]
     grasp: Grasp = Grasp()

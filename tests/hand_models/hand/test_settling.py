@@ -88,7 +88,7 @@ def forget() -> None:
 
 def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAND) -> None:
     """Against the hand put together from sections and fingers closed one by one."""
-    hold, surface, grasp, pose = placement
+    hold, surface, grasp, pose, _ = placement
     assert settled.seating.rule == ("given" if pose is not None else HAND.seat(hold, grasp).rule)
     there = settled.seating.pose
     if pose is not None:
