@@ -64,6 +64,9 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
             answer.solver.name, answer.solver.status, int(answer.solver.iterations)
         ),
         time=replies.Time(answer.time.model, answer.time.solve, answer.time.total),
+        robust=UNSET
+        if answer.robust is None
+        else replies.RobustLoadFactor(**answer.robust._asdict()),
     )
 
 
