@@ -9,7 +9,14 @@ from .row_layout import (
     layout_of as layout_of,
     named_row as named_row,
 )
-from .seat_scatter import Robustness as Robustness, robustness as robustness
+from .seat_scatter import (
+    AT_ONCE as AT_ONCE,
+    DRAWS as DRAWS,
+    TENTH as TENTH,
+    Robustness as Robustness,
+    robustness as robustness,
+    scattered_hands as scattered_hands,
+)
 from .seat_search import BEST as BEST, PULL_OFF as PULL_OFF, best_seats as best_seats
 from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces
 from .tension_box import TensionLimit as TensionLimit, tension_limits as tension_limits

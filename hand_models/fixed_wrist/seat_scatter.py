@@ -1,7 +1,8 @@
-"""What a hand can carry where it is not quite where it was put."""
+"""Hands that are not quite where they were put, and what one can carry there."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,13 +13,16 @@ from hand_models.base import Array, EmptySetError, InvalidInputError, Pose
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
-__all__ = ["Robustness", "robustness"]
+__all__ = ["AT_ONCE", "DRAWS", "TENTH", "Robustness", "robustness", "scattered_hands"]
 
 DRAWS: Final = 50
 """Places of a hand that are drawn, unless another number is asked for."""
 
 TENTH: Final = 10.0
 """Percentile that is told beside the least."""
+
+AT_ONCE: Final = 40
+"""Hands that are closed together, by default: with more, each takes no less."""
 
 
 class Robustness(NamedTuple):
@@ -81,23 +85,8 @@ def robustness(
             f"must be from 0 m, and from 0 to π rad, got {position:g} and {angle:g}",
             field="scatter",
         )
-    drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, 6))
-    frames = [
-        Pose(position * each[:3], Rotation.from_rotvec(angle * each[3:]).as_matrix())
-        for each in drawn
-    ]
-    outcomes = hand.settle_each(
-        [
-            Placement(
-                settled.hold,
-                settled.surface,
-                settled.grasp,
-                frame.inverse() @ settled.seating.pose,
-            )
-            for frame in frames
-        ]
-    )
-    there = [each for each in outcomes if isinstance(each, SettledHand)]
+    places = scattered_hands(hand, [settled], draws, seed, (position, angle))
+    there = [each for (each,) in places if isinstance(each, SettledHand)]
     ways, reaches = np.atleast_2d(np.asarray(directions, dtype=float)), []
     for space in wrench_spaces(there):
         try:
@@ -110,3 +99,48 @@ def robustness(
         return Robustness(draws, without, position, angle, seed, nothing, nothing)
     worst, tenth = np.percentile(reaches, [0.0, TENTH], axis=0)
     return Robustness(draws, without, position, angle, seed, worst, tenth)
+
+
+def scattered_hands(
+    hand: SpinyHand,
+    settled: Sequence[SettledHand],
+    draws: int,
+    seed: int,
+    scatter: tuple[float, float],
+    at_once: int = AT_ONCE,
+) -> Iterator[list[SettledHand | InvalidInputError]]:
+    """Close hands anew at random places about their own, each drawn apart from the others.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+        Which all of them are.
+    settled : sequence of SettledHand
+    draws, seed, scatter
+        As of `robustness`.
+    at_once : int, optional
+        How many are closed together, but all of a draw.
+
+    Yields
+    ------
+    list of SettledHand or InvalidInputError
+        Of each draw, in order; an error in place of a hand that cannot be there.
+    """
+    position, angle = scatter
+    drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, len(settled), 6))
+    step = max(1, at_once // len(settled))
+    for start in range(0, draws, step):
+        placements = [
+            Placement(
+                each.hold,
+                each.surface,
+                each.grasp,
+                Pose(position * by[:3], Rotation.from_rotvec(angle * by[3:]).as_matrix()).inverse()
+                @ each.seating.pose,
+            )
+            for one in drawn[start : start + step]
+            for each, by in zip(settled, one, strict=True)
+        ]
+        outcomes = hand.settle_each(placements)
+        for first in range(0, len(outcomes), len(settled)):
+            yield outcomes[first : first + len(settled)]

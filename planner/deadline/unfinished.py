@@ -16,6 +16,7 @@ Unfinished = Literal[
     "path",
     "certificate",
     "explanation",
+    "robust",
 ]
 
 UNFINISHED: Final[dict[Unfinished, str]] = {
@@ -27,6 +28,7 @@ UNFINISHED: Final[dict[Unfinished, str]] = {
     "path": "it was found whether the way from the present tensions is safe",
     "certificate": "it was found what keeps the hands from a plan within the limits",
     "explanation": "it was found which limits alone leave no balance",
+    "robust": "the load factor was found at all places of the hands",
 }
 """What was not there yet."""
 

@@ -177,7 +177,7 @@ Objective = Literal["max_margin", "min_effort"]
 OBJECTIVES: Final = get_args(Objective)
 """What a plan may be the best in."""
 
-Want = Literal["load_factor", "prices", "model"]
+Want = Literal["load_factor", "prices", "model", "robust"]
 
 WANTS: Final = get_args(Want)
 """What may be wanted beside a plan."""
@@ -194,7 +194,7 @@ class Question:
         In B [N, N·m]; computed from ``load`` if it is not given.
     load : Load
     limits : Limits
-    want : frozenset of {'load_factor', 'prices', 'model'}
+    want : frozenset of {'load_factor', 'prices', 'model', 'robust'}
         Extras.
     objective : {'max_margin', 'min_effort'}
         Least utilisation; or least sum of squared relative tensions and joint torques, at a
@@ -234,6 +234,8 @@ class Question:
         deadline.possible(self.deadline)
         self._check_limits()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
+        if "robust" in self.want and "floating" in wrists.values():
+            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
         present = {}
         for limb, tensions in self.present.items():
             if wrists.get(limb) != "fixed":

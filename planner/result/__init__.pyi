@@ -6,6 +6,7 @@ from .plan import (
     LimitName as LimitName,
     Plan as Plan,
     Price as Price,
+    RobustLoadFactor as RobustLoadFactor,
     SolverInfo as SolverInfo,
     Status as Status,
     TensionPath as TensionPath,

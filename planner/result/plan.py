@@ -18,6 +18,7 @@ __all__ = [
     "LimitName",
     "Plan",
     "Price",
+    "RobustLoadFactor",
     "SolverInfo",
     "Status",
     "TensionPath",
@@ -175,6 +176,37 @@ class TensionPath:
     limiting: tuple[LimitName, ...]
 
 
+class RobustLoadFactor(NamedTuple):
+    """The load factor where the hands are not quite where they were put.
+
+    All hands are closed anew at random places about their own, each drawn apart. H stays in W, so
+    that body and joints stay, too: it is the rock that is elsewhere.
+
+    Attributes
+    ----------
+    draws, without : int
+        Draws, and those of them in which a hand cannot be, or there is no load factor.
+    refused : mapping of str to int
+        In how many draws a hand cannot be, by limb; those that always can are left out.
+    position, angle : float
+        The scatter: to either side along each axis of H [m], and about each [rad].
+    seed : int
+        Of the draws.
+    worst, tenth : float or None
+        The least in the other draws, and what it exceeds in nine in ten of them; None if there are
+        none.
+    """
+
+    draws: int
+    without: int
+    refused: Mapping[str, int]
+    position: float
+    angle: float
+    seed: int
+    worst: float | None
+    tenth: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The answer. A value that does not exist for a status is None.
@@ -223,6 +255,9 @@ class Plan:
     unfinished : tuple of str
         What a deadline has left unfinished, by name: see `planner.deadline.unfinished`. Values that
         are missing for it are None.
+    robust : RobustLoadFactor or None
+        The load factor over a scatter of the hands' places, if it was asked for; None where the
+        body wrench is zero, any multiple of which is the same.
     """
 
     status: Status
@@ -247,6 +282,7 @@ class Plan:
     solver: SolverInfo
     time: Times
     unfinished: tuple[Unfinished, ...] = ()
+    robust: RobustLoadFactor | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

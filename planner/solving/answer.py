@@ -21,6 +21,7 @@ from planner.result import (
     Certificate,
     HandPlan,
     PlanArrays,
+    RobustLoadFactor,
     TensionPath,
     WristPlan,
     load_recovery_of,
@@ -72,6 +73,7 @@ class Answer:
         self.load_factor: float | None = None
         self.least_factor = False
         self.unbounded = False
+        self.robust: RobustLoadFactor | None = None
         self.path: TensionPath | None = None
         self.path_unknown = False
         self.unfinished: list[Unfinished] = []

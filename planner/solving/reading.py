@@ -29,6 +29,7 @@ from planner.programs import SLACK, SOLVER
 from planner.result import HandPlan, LimitName, Plan, Price, SolverInfo, Status, Times
 from planner.solving import dual_bounds
 from planner.solving.answer import Answer
+from planner.solving.load_factor import find_robust_load_factor
 from planner.solving.unique_plan import is_least
 from planner.solving.why_not import overload
 
@@ -77,6 +78,8 @@ def read_plan(answer: Answer, times: Times, start: float) -> Plan:
             reason += f"; {answer.idle_preloads[0]}"
     else:
         reason = f"the solver gave no usable answer ({answer.outcome.status})"
+    # last: it takes the longest
+    find_robust_load_factor(answer)
     return Plan(
         status=status,
         body_wrench=answer.wrench,
@@ -102,6 +105,7 @@ def read_plan(answer: Answer, times: Times, start: float) -> Plan:
         solver=SolverInfo(SOLVER, answer.outcome.status, answer.outcome.iterations),
         time=Times(times.model, times.solve, time.perf_counter() - start),
         unfinished=tuple(answer.unfinished),
+        robust=answer.robust,
     )
 
 

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET
 
-from hand_models.base import Array, EmptySetError, Pose
+from hand_models.base import Array, EmptySetError
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, TensionLimit
-from hand_models.hand import FINGERS, NearbyClosure, Seating, SettledHand, Tile, closing_sequence
-from hand_models.tile import HalfPlane
+from hand_models.hand import FINGERS, NearbyClosure, SettledHand, Tile, closing_sequence
 from hand_models.wrench_spaces import WrenchSpace
-from planner.question import Stance
-from planner.result import HandPlan, LimitName, Plan, Price, TensionPath, WristPlan
+from planner.result import LimitName, Plan, Price, TensionPath, WristPlan
 from service import replies
+from service.answering.hand_answers import (
+    hand_reply,
+    seating_reply,
+    vector,
+    vectors,
+    wrench_set_reply,
+    wrist_reply,
+)
 from service.replies import AXES
 
-__all__ = ["BOTH_WAYS", "limit_reply", "placed_poses", "plan_reply", "vector", "wrench_space_reply"]
+__all__ = ["BOTH_WAYS", "limit_reply", "plan_reply", "wrench_space_reply"]
 
 SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 """Names of both directions along each axis, in the order of `BOTH_WAYS`."""
@@ -51,7 +57,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         load_factor=_number(answer.load_factor),
         load_factor_unbounded=answer.load_factor_unbounded,
         limiting=None if answer.limiting is None else limit_reply(answer.limiting),
-        hands=None if answer.hands is None else [_hand(h, model) for h in answer.hands],
+        hands=None if answer.hands is None else [hand_reply(h, model) for h in answer.hands],
         joints=_by_limb(answer.joints),
         joint_torque=_by_limb(answer.joint_torque),
         joint_torque_limit=_by_limb(answer.joint_torque_limit),
@@ -65,6 +71,9 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
             answer.solver.name, answer.solver.status, int(answer.solver.iterations)
         ),
         time=replies.Time(answer.time.model, answer.time.solve, answer.time.total),
+        robust=UNSET
+        if answer.robust is None
+        else replies.RobustLoadFactor(**answer.robust._asdict()),
     )
 
 
@@ -89,19 +98,19 @@ def wrench_space_reply(
     """
     try:
         views = _Views(
-            vertices=_vectors(space.vertices()),
+            vertices=vectors(space.vertices()),
             half_spaces=_half_spaces(space),
             dimension=space.dimension,
             capability=_capability(space),
         )
     except EmptySetError:
         views = _Views([], None, None, None)
-    parts = _wrench_set(space)
+    parts = wrench_set_reply(space)
     return replies.WrenchSpaceReply(
         robot=robot,
         limb=limb,
-        wrist=_wrist(wrist),
-        seating=_seating(settled.seating),
+        wrist=wrist_reply(wrist),
+        seating=seating_reply(settled.seating),
         contacts=[
             replies.Contact(
                 finger=tile.finger,
@@ -168,21 +177,10 @@ class _Views(NamedTuple):
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
     faces = space.half_spaces()
     return replies.HalfSpaces(
-        _vectors(faces.normals),
+        vectors(faces.normals),
         vector(faces.offsets),
-        replies.HalfSpaceEquations(
-            _vectors(faces.equation_normals), vector(faces.equation_offsets)
-        ),
+        replies.HalfSpaceEquations(vectors(faces.equation_normals), vector(faces.equation_offsets)),
     )
-
-
-def vector(values: Array) -> list[float]:
-    """Return an array as it travels."""
-    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]
-
-
-def _vectors(values: Array) -> list[list[float]]:
-    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]
 
 
 def _number(value: float | None) -> float | None:
@@ -242,7 +240,7 @@ def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
         sufficient=None
         if proof.sufficient is None
         else [limit_reply(name) for name in proof.sufficient],
-        wrench_spaces={limb: _wrench_set(space) for limb, space in proof.spaces.items()}
+        wrench_spaces={limb: wrench_set_reply(space) for limb, space in proof.spaces.items()}
         if model and answer.hands is None
         else UNSET,
     )
@@ -255,138 +253,6 @@ def _path(path: TensionPath) -> replies.TensionPath:
         utilisation_at_present=_number(path.utilisation_at_present),
         largest_change=float(path.largest_change),
         limiting=[limit_reply(name) for name in path.limiting],
-    )
-
-
-def _hand(part: HandPlan, model: bool) -> replies.Hand:
-    palm = part.palm
-    return replies.Hand(
-        limb=part.limb,
-        wrench=vector(part.wrench),
-        fingers=_fingers(part, model),
-        palm=replies.Palm(
-            position=vector(palm.position),
-            force=vector(palm.force),
-            moment=vector(palm.moment),
-            engaged=[int(tile) for tile in palm.engaged],
-            utilisation=float(palm.utilisation),
-        ),
-        utilisation=float(part.utilisation),
-        seating=_seating(part.seating),
-        wrist=_wrist(part.wrist),
-        wrench_space=_wrench_set(part.space) if model else UNSET,
-    )
-
-
-def _fingers(part: HandPlan, model: bool) -> list[replies.Finger]:
-    """Return a hand's fingers, from its arrays as a whole."""
-    numbers = (part.loads, part.positions, part.forces, part.axes, part.tile_utilisations)
-    columns = zip(part.tiles, *(array.tolist() for array in numbers), strict=True)
-    tiles: dict[str, list[replies.Tile]] = {name: [] for name in FINGERS}
-    for (finger, phalanx, contact), load, position, force, axes, used in columns:
-        tiles[finger].append(
-            replies.Tile(
-                phalanx=phalanx,
-                contact=contact,
-                position=position,
-                force=force,
-                shear=load[0],
-                normal=load[1],
-                lateral=load[2],
-                shear_axis=axes[0],
-                normal_axis=axes[1],
-                lateral_axis=axes[2],
-                utilisation=used,
-            )
-        )
-    if model:
-        _add_models(part, [tile for own in tiles.values() for tile in own])
-    drives = zip(FINGERS, part.closures, part.tensions.tolist(), *part.drives.tolist(), strict=True)
-    return [
-        replies.Finger(
-            name=name,
-            closure=closure,
-            tendon_tension=tension,
-            motor_torque=torque,
-            motor_current=current,
-            winch_angle=angle,
-            tiles=tiles[name],
-        )
-        for name, closure, tension, torque, current, angle in drives
-    ]
-
-
-def _add_models(part: HandPlan, tiles: Sequence[replies.Tile]) -> None:
-    """Give tiles, in their hand's order, their load laws and half-planes."""
-    laws = None if part.laws is None else part.laws.transpose(0, 2, 1).tolist()
-    for t, tile in enumerate(tiles):
-        if laws is not None:
-            tile.load_at_zero, tile.load_per_newton = laws[t]
-        tile.half_planes = [row for plane in part.limits_of(t) for row in _both_signs(plane)]
-
-
-def _wrist(wrist: WristPlan | None) -> replies.Wrist:
-    if wrist is None:
-        return replies.Wrist(mode="fixed")
-    return replies.Wrist(
-        mode="floating",
-        twist=vector(wrist.twist),
-        palm=wrist.palm,
-        rounds=wrist.rounds,
-        error=float(wrist.error),
-    )
-
-
-def _both_signs(plane: HalfPlane) -> list[list[float]]:
-    """Return ``a · (shear, normal, lateral) ≤ capacity`` for a lateral load of either sign."""
-    signs = (1.0, -1.0) if plane.a_lateral > 0.0 else (1.0,)
-    return [
-        [plane.a_shear, plane.a_normal, sign * plane.a_lateral, plane.capacity] for sign in signs
-    ]
-
-
-def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
-    """Return H in W of the hands that were given by a place on a rock; unset if there is none."""
-    poses = {hand.limb: _frame(hand.pose) for hand in stance.hands if hand.at is not None}
-    return poses or UNSET
-
-
-def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
-
-
-def _seating(seating: Seating) -> replies.Seating:
-    return replies.Seating(seating.rule, _frame(seating.pose), seating.backed_off)
-
-
-def _wrench_set(space: WrenchSpace) -> replies.WrenchSet:
-    numbers = (
-        np.vstack([space.L, space.H]),
-        np.concatenate([space.l0, np.zeros(len(space.h))]),
-        np.concatenate([space.s, space.h]),
-    )
-    return replies.WrenchSet(
-        origin=vector(space.origin),
-        generators=[
-            replies.Generator(name, column)
-            for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
-        ],
-        rows=[
-            replies.Row(
-                name=row.label,
-                kind=row.kind,
-                finger=row.finger,
-                phalanx=row.phalanx,
-                limit=row.limit,
-                joint=row.joint,
-                coefficients=coefficients,
-                constant=constant,
-                capacity=capacity,
-            )
-            for row, coefficients, constant, capacity in zip(
-                space.rows, *(array.tolist() for array in numbers), strict=True
-            )
-        ],
     )
 
 

@@ -12,7 +12,8 @@ from hand_models.base import Array, InvalidInputError
 from planner.capability import COMPONENTS, BodySection, BodySpace, End
 from planner.result import LimitName
 from service import replies
-from service.answering.answers import limit_reply, placed_poses, vector
+from service.answering.answers import limit_reply
+from service.answering.hand_answers import placed_poses, vector
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply

@@ -19,8 +19,9 @@ from planner import deadline, prepare, solving
 from planner.deadline import DeadlineError
 from planner.question import Question
 from planner.result import Plan, WristPlan
-from service.answering.answers import BOTH_WAYS, placed_poses, plan_reply, wrench_space_reply
+from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
 from service.answering.body_space import explore
+from service.answering.hand_answers import placed_poses
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question, stance

@@ -11,7 +11,7 @@ from typing import Final
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
-from service.answering.answers import placed_poses
+from service.answering.hand_answers import placed_poses
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply

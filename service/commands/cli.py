@@ -48,7 +48,7 @@ from service.commands.terminal import (
     waiting,
 )
 from service.replies import PlanReply
-from service.requests import PlanRequest
+from service.requests import PlanRequest, Want
 from service.wire import REQUEST_KINDS, schema as message_schema
 
 if TYPE_CHECKING:
@@ -119,12 +119,18 @@ def crux() -> None:
 @click.option(
     "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
 )
+@click.option(
+    "--robust",
+    is_flag=True,
+    help="And the least load factor where every hand is a little elsewhere.",
+)
 @hand_option
 @robot_option
 @json_option
 def plan(
     stance: str,
     picture: Path | None,
+    robust: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -134,7 +140,8 @@ def plan(
     from service import answering
     from service.answering import robots_of
 
-    request = with_extras(asked(read_request(stance), hand, robot))
+    extras: list[Want] = ["robust"] if robust else []
+    request = with_extras(asked(read_request(stance), hand, robot), *extras)
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):

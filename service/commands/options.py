@@ -48,9 +48,10 @@ def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R
     return with_robot(request, robot)
 
 
-def with_extras(request: PlanRequest) -> PlanRequest:
-    """Return a request that wants what the command line shows besides the plan, too."""
-    return msgspec.structs.replace(request, want=list(dict.fromkeys([*request.want, *EXTRAS])))
+def with_extras(request: PlanRequest, *further: Want) -> PlanRequest:
+    """Return a request that wants what the command line shows besides the plan, and more, too."""
+    want = dict.fromkeys([*request.want, *EXTRAS, *further])
+    return msgspec.structs.replace(request, want=list(want))
 
 
 def check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:

@@ -30,6 +30,7 @@ from service.commands.terminal import (
     waiting,
     writing,
 )
+from service.replies import RobustCapability
 from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def wrench_space(
     from planner.capability import survey
     from service import answering
     from service.answering import robots_of
-    from service.commands.surveys import print_survey, survey_json
+    from service.commands.surveys import print_robust, print_survey, survey_json
 
     limb, hand = limb_and_hand
     robots = robots_of(robot)
@@ -99,6 +100,8 @@ def wrench_space(
         say(msgspec.to_builtins(reply) | searched)
     else:
         print_wrench_space(reply, console())
+        if isinstance(reply.robust, RobustCapability) and reply.vertices:
+            print_robust(reply.robust, console())
         if found is not None:
             print_survey(found, console())
     return DONE if reply.vertices else OVERLOADED

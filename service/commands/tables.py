@@ -23,7 +23,7 @@ from service.replies import (
     LimitName,
     PlanReply,
     Price,
-    RobustCapability,
+    RobustLoadFactor,
     TensionPath,
     Tile,
     WrenchSpaceReply,
@@ -79,6 +79,8 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         out.print(_path_sentence(reply.path), markup=False)
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
+    if isinstance(reply.robust, RobustLoadFactor):
+        out.print(_robust_sentence(reply.robust), markup=False)
     if reply.hands is not None:
         _show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
@@ -133,8 +135,6 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         f"dimension {reply.dimension}"
     )
     _print_capability(reply.capability, out)
-    if isinstance(reply.robust, RobustCapability):
-        _print_robust(reply.robust, out)
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
@@ -167,29 +167,6 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
     ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
     if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
-
-
-def _print_robust(robust: RobustCapability, out: Console) -> None:
-    """Print what is left of each component where the hand is a little elsewhere."""
-    table = table_of("axis")
-    for name in ("worst least", "worst most", "9 in 10 least", "9 in 10 most"):
-        table.add_column(name, justify="right")
-    for axis in AXES:
-        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
-        cells = [
-            "-" if end is None else _fixed(sign * end, 2)
-            for pair in ends
-            for sign, end in zip((-1.0, 1.0), pair, strict=True)
-        ]
-        table.add_row(f"{axis} {'N' if axis.startswith('f') else 'N·m'}", *cells)
-    _show(
-        f"what is left of that at {robust.draws - robust.without} of {robust.draws} places within "
-        f"{1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad",
-        table,
-        out,
-    )
-    if robust.without:
-        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing")
 
 
 def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console) -> None:
@@ -291,6 +268,19 @@ def _load_factor(reply: PlanReply) -> str:
     if reply.load_factor_unbounded:
         return "unbounded"
     return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
+
+
+def _robust_sentence(robust: RobustLoadFactor) -> str:
+    """Say what is left of the load factor where the hands are a little elsewhere."""
+    said = "there is none in any"
+    if robust.worst is not None and robust.tenth is not None:
+        said = f"nine in ten above {robust.tenth:.3f}, the worst {robust.worst:.3f}"
+        said += f", leaving out {robust.without} draws without any" if robust.without else ""
+    said += "".join(f"; in {n} {limb} cannot be there" for limb, n in robust.refused.items())
+    return (
+        f"load factor with each hand up to {1e3 * robust.position:g} mm and "
+        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
+    )
 
 
 def _fixed(value: float, digits: int) -> str:

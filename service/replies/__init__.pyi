@@ -16,6 +16,7 @@ from .limits import LimitName as LimitName, Price as Price
 from .plan import (
     Certificate as Certificate,
     PlanReply as PlanReply,
+    RobustLoadFactor as RobustLoadFactor,
     Solver as Solver,
     TensionPath as TensionPath,
 )

@@ -12,6 +12,7 @@ from service.replies.wrench_set import WrenchSet
 __all__ = [
     "Certificate",
     "PlanReply",
+    "RobustLoadFactor",
     "Solver",
     "TensionPath",
 ]
@@ -71,6 +72,26 @@ class TensionPath(Struct, kw_only=True):
     limiting: list[LimitName] = []
 
 
+class RobustLoadFactor(Struct, kw_only=True):
+    """The load factor where the hands are not quite where they were put.
+
+    All closed anew in so many ``draws`` of their places, each drawn apart, to either side by at
+    most ``position`` along each axis of H [m] and ``angle`` about each [rad]; body, joints and H
+    stay, so it is the rock that is elsewhere. ``without``: in so many of them a hand cannot be, or
+    there is no load factor; ``refused``: in how many it cannot, by limb, where any. ``worst``: the
+    least in the others; ``tenth``: what it exceeds in nine in ten of them; null if there are none.
+    """
+
+    draws: int
+    without: int
+    refused: dict[str, int]
+    position: float
+    angle: float
+    seed: int
+    worst: float | None
+    tenth: float | None
+
+
 class PlanReply(StanceReply, kw_only=True):
     """Who carries what, and what margin is left.
 
@@ -82,7 +103,8 @@ class PlanReply(StanceReply, kw_only=True):
     would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a
     deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
     proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
-    ``certificate``, ``explanation``.
+    ``certificate``, ``explanation``, ``robust``. ``robust`` comes with ``"want": ["robust"]``, but
+    not for a body wrench of zero.
     """
 
     id: str | None = None
@@ -109,3 +131,4 @@ class PlanReply(StanceReply, kw_only=True):
     time: Time
     warnings: list[str] = []
     unfinished: list[str] = []
+    robust: RobustLoadFactor | UnsetType = UNSET

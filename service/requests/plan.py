@@ -28,7 +28,7 @@ ObjectiveName = Annotated[
         "max_reliability is not supported in this version"
     ),
 ]
-Want = Literal["load_factor", "prices", "model"]
+Want = Literal["load_factor", "prices", "model", "robust"]
 
 
 class PlanRequest(Request, frozen=True, kw_only=True):
@@ -54,4 +54,7 @@ class PlanRequest(Request, frozen=True, kw_only=True):
             "on: then what is verified so far is the answer [s]"
         ),
     ] = None
-    want: list[Want] = []
+    want: Annotated[
+        list[Want],
+        Meta(description="robust: the least load factor over a scatter of the hands' places, too"),
+    ] = []

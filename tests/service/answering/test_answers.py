@@ -16,7 +16,7 @@ from service import answering
 from service.answering import dispatch
 from service.replies import WrenchSpaceReply
 from service.requests import WrenchSpaceRequest
-from tests.suite.helpers.replies import PLAN, refusal, reply_to
+from tests.suite.helpers.replies import PLAN, departures, refusal, reply_to
 from tests.suite.helpers.requests import (
     HEAVY,
     JOINTS,
@@ -306,6 +306,19 @@ def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere(
     assert "robust" not in msgspec.to_builtins(plain)
 
 
+def test_a_plan_tells_its_load_factor_where_the_hands_are_a_little_elsewhere():
+    asked = flat_request() | {"want": ["load_factor", "robust"]}
+    reply = answering.plan(plan_request(asked))
+    robust = reply.robust
+    assert (robust.draws, robust.position, robust.angle, robust.seed) == (50, 0.002, 0.02, 0)
+    assert robust.worst <= robust.tenth < reply.load_factor
+    assert robust.without >= sum(robust.refused.values())
+    assert departures("PlanRequest", asked) == []
+    assert departures("PlanReply", msgspec.to_builtins(reply)) == []
+    plain = answering.plan(plan_request(flat_request()))
+    assert "robust" not in msgspec.to_builtins(plain)
+
+
 def test_robust_is_told_of_fixed_wrists_only():
     request = plan_request(wall_request())
     first, *others = request.stance.hands
@@ -314,4 +327,7 @@ def test_robust_is_told_of_fixed_wrists_only():
     asked = WrenchSpaceRequest(v=1, stance=stance, limb=first.limb, want=["robust"])
     with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
         answering.wrench_space(asked)
+    assert caught.value.field == "want"
+    with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
+        answering.plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
     assert caught.value.field == "want"

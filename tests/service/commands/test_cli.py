@@ -102,6 +102,22 @@ def test_a_plan_says_how_much_hangs_on_the_palms(
         assert hand["limb"] in out
 
 
+def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(
+    stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance_file(flat_request())
+    run(["plan", path, "--robust", "--json"])
+    robust = result(capfd)["robust"]
+    run(["plan", path, "--robust"])
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 50 draws:\n" in out
+    told = f"nine in ten above {robust['tenth']:.3f}, the worst {robust['worst']:.3f}"
+    assert told in out
+    run(["plan", path])
+    assert "off its place" not in capfd.readouterr().out
+
+
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -226,6 +242,18 @@ def test_a_wrench_space(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
     assert f"dimension {reply['dimension']}" in out
     for limit in reply["tension_limits"]:
         assert f"{limit['tension']:.1f}" in out
+
+
+def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(
+    stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["wrench-space", stance_file(flat_request()), "--hand", "front_left", "--robust"]
+    assert run(arguments) == DONE
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "of 50 places within 2 mm and 20 mrad" in out
+    assert run([*arguments, "--json"]) == DONE
+    assert f"{-result(capfd)['robust']['worst']['-fx']:.2f}" in out
 
 
 def test_a_wrench_space_of_a_hand_that_is_not_there(
