@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
@@ -58,6 +57,12 @@ NEAR: Final = 5e-5
 
 TRIES: Final = 24
 """Places tried to bracket a seat."""
+
+PARTS: Final = 17
+"""Places tried at once within a bracket."""
+
+NARROW: Final = 1e-8
+"""How wide a bracket is in the end [m]."""
 
 
 @dataclass(frozen=True)
@@ -251,10 +256,16 @@ class _Outlines:
         pieces = [np.column_stack([chain.real, chain.imag]) for chain in chains]
         return PolylineSection(pieces) if pieces else None
 
-    def top(self, x: float) -> float | None:
-        """Return z of the highest rock under a palm if the frame is at x of the hand."""
+    def top(self, x: Array) -> Array:
+        """Return z of the highest rock under a palm if the frame is at x of the hand; NaN if none.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+        """
         tops = [line.highest(-self._half - x, self._half - x) for line in self._lines]
-        return min((top for top in tops if top is not None), default=None)
+        least = np.min(tops, axis=0)
+        return np.where(np.isfinite(least), least, math.nan)
 
 
 def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seating:
@@ -267,52 +278,57 @@ def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seatin
     face = model.tile_range[0], model.joint_spacing, model.tile_height
     limits = model.joint_lower[0], model.joint_upper[0]
 
-    def miss(place: Place | None) -> float:
+    def miss(places: Array) -> Array:
         """By how much proximal contacts miss c₁; least in rock, most where there is none."""
-        if place is None:
-            return math.nan
-        joint = x - place[0], z - place[1]
-        if any(section.face_clearance(joint, *face, limits[0]) <= 0.0 for section in under):
-            return -hand.seated_contact
-        rests = [section.rest(joint, *face, *limits) for section in under]
-        along = [model.joint_spacing if rest is None else rest.distance for rest in rests]
-        return sum(along) / len(along) - hand.seated_contact
+        missed = np.full(len(places), math.nan)
+        there = np.isfinite(places[:, 1])
+        joints = x - places[there, 0] + 1j * (z - places[there, 1])
+        clear = [section.face_clearances(joints, *face, limits[0]) for section in under]
+        along = [section.rests(joints, *face, *limits)[1] for section in under]
+        mean = np.where(np.isnan(along), model.joint_spacing, along).mean(axis=0)
+        missed[there] = np.where(np.min(clear, axis=0) <= 0.0, 0.0, mean) - hand.seated_contact
+        return missed
 
-    def resting(along: float, stand_off: float = 0.0) -> Place | None:
-        highest = rock.top(along)
-        return None if highest is None else (along, stand_off - highest)
+    def resting(along: Array, stand_off: Array) -> Array:
+        return np.column_stack([along, stand_off - rock.top(along)])
 
-    level = resting(0.0, z + model.tile_height)
-    if level is None:
+    centre = resting(np.zeros(1), np.zeros(1))
+    if np.isnan(centre).any():
         return CENTRED
+    level = centre[0] + [0.0, z + model.tile_height]
     lying = [section.rest((x, z - level[1]), *face, *limits) for section in under]
     if all(rest is not None and rest.flat and abs(rest.angle) < LEVEL for rest in lying):
-        return Seating(_shifted(*level), "flat")
+        return Seating(_shifted(*level.tolist()), "flat")
     if crest is None:
         half = 0.5 * hand.palm_length
-        place, rule = _first(miss, resting, np.linspace(-half, half, TRIES)), "palm_on_rock"
+        tries, rule = np.linspace(-half, half, TRIES), "palm_on_rock"
+        place = _first(miss, lambda along: resting(along, np.zeros(len(along))), tries)
     else:
-        offs = np.linspace(0.0, hand.finger.joint_spacing, TRIES)
-        place, rule = _first(miss, lambda off: resting(crest, off), offs), "pinch"
+        tries, rule = np.linspace(0.0, hand.finger.joint_spacing, TRIES), "pinch"
+        place = _first(miss, lambda off: resting(np.full(len(off), crest), off), tries)
     if place is None:
-        place, rule = resting(0.0), "palm_on_rock_centred"
-    assert place is not None
-    return Seating(_shifted(*place), rule)
+        place, rule = centre[0], "palm_on_rock_centred"
+    return Seating(_shifted(*place.tolist()), rule)
 
 
 def _first(
-    miss: Callable[[Place | None], float],
-    place: Callable[[float], Place | None],
-    tries: Array,
-) -> Place | None:
+    miss: Callable[[Array], Array], places: Callable[[Array], Array], tries: Array
+) -> Array | None:
     """Return the place, nearest zero along its parameter, at which nothing is missed."""
-    misses = [miss(place(value)) for value in tries.tolist()]
-    roots = []
-    for i in np.flatnonzero(np.diff(np.sign(misses)) != 0.0).tolist():
-        if math.isfinite(misses[i] + misses[i + 1]):
-            low, high = float(tries[i]), float(tries[i + 1])
-            with suppress(ValueError):  # where the contact jumps over c₁ there is no root
-                root = float(brentq(lambda p: miss(place(p)), low, high, xtol=1e-9))
-                if abs(miss(place(root))) < NEAR:
-                    roots.append(root)
-    return place(min(roots, key=abs)) if roots else None
+    misses = miss(places(tries))
+    best: tuple[float, Array] | None = None
+    for i in np.flatnonzero(np.abs(np.diff(np.sign(misses))) > 0.0).tolist():
+        ends, off = tries[i : i + 2], misses[i : i + 2]
+        while ends[1] - ends[0] > NARROW:
+            between = np.linspace(ends[0], ends[1], PARTS)
+            missed = miss(places(between))
+            turns = np.flatnonzero(np.abs(np.diff(np.sign(missed))) > 0.0)
+            if not len(turns):
+                break
+            ends, off = (values[turns[0] : turns[0] + 2] for values in (between, missed))
+        root = ends[:1] - off[:1] * (ends[1] - ends[0]) / (off[1] - off[0])
+        there = places(root)
+        # where the contact jumps over c₁ there is no root
+        if abs(miss(there)[0]) < NEAR and (best is None or abs(root[0]) < best[0]):
+            best = abs(root[0]), there[0]
+    return None if best is None else best[1]

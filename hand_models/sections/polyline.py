@@ -15,7 +15,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.sections.boundary import Boundary
 from hand_models.sections.first_contact import TurningFaces
-from hand_models.sections.rows import Span
+from hand_models.sections.rows import Flags, Span
 from hand_models.sections.section import Complexes, Rest, Section, Vector2
 
 __all__ = ["PolylineSection"]
@@ -42,30 +42,46 @@ class PolylineSection(Section):
     def rest(
         self, joint: Vector2, start: float, end: float, height: float, low: float, high: float
     ) -> Rest | None:
+        found = self.rests(np.array([complex(*joint)]), start, end, height, low, high)
+        angle, distance, flat = (values.item() for values in found)
+        return None if math.isnan(angle) else Rest(angle, distance, bool(flat))
+
+    def rests(
+        self, joints: Complexes, start: float, end: float, height: float, low: float, high: float
+    ) -> tuple[Array, Array, Flags]:
+        """Return what `rest` does for joints (n,): angles, distances, and whether faces lie flat.
+
+        NaN where they meet no rock.
+        """
         with np.errstate(invalid="ignore", divide="ignore"):
-            sweep = self._sweep(joint, Span.of(start, end, height), low)
-            found = sweep.contacts(np.array([high]), self.faceted)
-        angle, distance, flat = (value.item() for value in found)
-        if math.isnan(angle):
-            return None
-        return Rest(angle, 0.5 * (start + end) if flat else distance, bool(flat))
+            sweep = self._sweep(joints, Span.of(start, end, height), low)
+            angles, distances, flat = sweep.contacts(np.full(len(joints), high), self.faceted)
+        return angles, np.where(flat, 0.5 * (start + end), distances), flat
 
     def touch(
         self, joint: Vector2, along: float, height: float, low: float, high: float
     ) -> float | None:
         with np.errstate(invalid="ignore", divide="ignore"):
-            touches = self._sweep(joint, Span.of(along, along, height), low).touches()
+            joints = np.array([complex(*joint)])
+            touches = self._sweep(joints, Span.of(along, along, height), low).touches()
         angle = float(touches[0, 0])
         return angle if angle <= high else None
 
     def face_clearance(
         self, joint: Vector2, start: float, end: float, height: float, angle: float
     ) -> float:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return float(self._sweep(joint, Span.of(start, end, height), angle).clearances()[0])
+        joints = np.array([complex(*joint)])
+        return float(self.face_clearances(joints, start, end, height, angle)[0])
 
-    def _sweep(self, joint: Vector2, span: Span, low: float) -> TurningFaces:
-        return TurningFaces(self.boundary, np.array([complex(*joint)]), span, np.array([low]))
+    def face_clearances(
+        self, joints: Complexes, start: float, end: float, height: float, angle: float
+    ) -> Array:
+        """Return what `face_clearance` does for joints (n,)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self._sweep(joints, Span.of(start, end, height), angle).clearances()
+
+    def _sweep(self, joints: Complexes, span: Span, low: float) -> TurningFaces:
+        return TurningFaces(self.boundary, joints, span, np.full(len(joints), low))
 
     def outline(self, reach: float, spacing: float) -> list[Complexes]:
         return [piece[:, 0] + 1j * piece[:, 1] for piece in self.pieces]
@@ -80,15 +96,16 @@ class PolylineSection(Section):
         out = self.boundary.normal(complex(*point))
         return out.real, out.imag
 
-    def highest(self, low: float, high: float) -> float | None:
-        """Return the least t of the rock between two values of s; None if there is none [m]."""
-        least = math.inf
+    def highest(self, low: Array, high: Array) -> Array:
+        """Return the least t of the rock between values of s, (n,); infinite if there is none."""
+        least = np.full(len(low), math.inf)
         for piece in self.pieces:
             s, t = piece[:, 0], piece[:, 1]
-            least = min(least, float(t[(s >= low) & (s <= high)].min(initial=math.inf)))
+            between = (s >= low[:, None]) & (s <= high[:, None])
+            np.minimum(least, np.where(between, t, math.inf).min(axis=1), out=least)
             for bound in (low, high):
-                crossing = np.flatnonzero((s[:-1] < bound) != (s[1:] < bound))
-                part = (bound - s[crossing]) / (s[crossing + 1] - s[crossing])
-                there = t[crossing] + part * (t[crossing + 1] - t[crossing])
-                least = min(least, float(there.min(initial=math.inf)))
-        return least if math.isfinite(least) else None
+                below = s < bound[:, None]
+                window, first = (below[:, :-1] != below[:, 1:]).nonzero()
+                part = (bound[window] - s[first]) / (s[first + 1] - s[first])
+                np.minimum.at(least, window, t[first] + part * (t[first + 1] - t[first]))
+        return least

@@ -156,6 +156,5 @@ def test_where_rock_ends_nothing_is_touched():
 
 def test_the_highest_rock_in_a_strip_counts_places_between_vertices():
     roof = PolylineSection([np.array([[-0.2, 0.2], [0.0, 0.0], [0.2, 0.2]])])
-    assert roof.highest(-0.1, 0.1) == pytest.approx(0.0)
-    assert roof.highest(0.03, 0.05) == pytest.approx(0.03)
-    assert roof.highest(0.3, 0.4) is None
+    windows = np.array([[-0.1, 0.1], [0.03, 0.05], [0.3, 0.4]])
+    assert roof.highest(*windows.T) == pytest.approx([0.0, 0.03, math.inf])
