@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.outlined import OutlinedHold
 from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
@@ -75,6 +75,8 @@ class Mesh(OutlinedHold):
         Vertices of each triangle, counterclockwise from outside the rock.
     hand : ParameterTable, optional
         As of `OutlinedHold`.
+    anywhere : bool, optional
+        Whether its frame may begin anywhere, and not on the rock under a palm; see `check_place`.
 
     Attributes
     ----------
@@ -84,15 +86,19 @@ class Mesh(OutlinedHold):
     Raises
     ------
     InvalidInputError
-        If numbers are not finite, faces name no vertices, nothing is left, nothing is near the
-        frame's origin, the size is that of another unit, or the triangles under the palm face away
-        from it.
+        If numbers are not finite, faces name no vertices, nothing is left, the size is that of
+        another unit, or no palm can be at the frame's origin.
     """
 
     shape = "mesh"
 
     def __init__(
-        self, vertices: ArrayLike, faces: ArrayLike, hand: ParameterTable | None = None
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        hand: ParameterTable | None = None,
+        *,
+        anywhere: bool = False,
     ) -> None:
         super().__init__(hand)
         table = scan_table()
@@ -102,21 +108,36 @@ class Mesh(OutlinedHold):
             raise InvalidInputError("no triangle has an area", field="faces")
         self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
         self._view: _View | None = None
-        self._check_place(table.scalar("scan", "near"), table.vector("scan", "view"))
+        if not anywhere:
+            self.check_place()
 
-    def _check_place(self, near: float, view: tuple[float, ...]) -> None:
-        corners = self.triangles.vertices[self.triangles.faces]
+    def check_place(self, at: Pose | None = None) -> None:
+        """Refuse a frame that a palm is to be at, unless there is rock that faces it.
+
+        Parameters
+        ----------
+        at : Pose, optional
+            In the hold's frame, z into the rock; by default the hold's frame itself.
+
+        Raises
+        ------
+        InvalidInputError
+            If no triangle is near its origin, or those under the palm face away from it.
+        """
+        at, table = at or Pose.identity(), scan_table()
+        near, view = table.scalar("scan", "near"), table.vector("scan", "view")
+        corners = self.triangles.vertices[self.triangles.faces] - at.position
         low, high = corners.min(axis=1), corners.max(axis=1)
         if not ((low <= near) & (high >= -near)).all(axis=1).any():
-            nearest = np.linalg.norm(self.triangles.vertices, axis=1).min()
+            nearest = np.linalg.norm(self.triangles.vertices - at.position, axis=1).min()
             raise InvalidInputError(
                 f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
                 f"the rock under the palm; at most {near:g} m is possible",
                 field="vertices",
             )
-        seen = self._facing(np.array([0.0, 0.0, 1.0]))
+        seen = self._facing(at.rotation[:, 2])
         met = [
-            seen.first_side((x, y, 0.0))
+            seen.first_side(at.apply((x, y, 0.0)))
             for x in np.linspace(-view[0], view[0], RAYS)
             for y in np.linspace(-view[1], view[1], RAYS)
         ]

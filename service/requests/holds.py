@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from service.requests.request import Coordinate, Pose, Position, Strict
+from service.requests.request import Coordinate, Name, Pose, Position, Strict
 
 __all__ = [
     "Cylinder",
@@ -17,6 +17,8 @@ __all__ = [
     "Mesh",
     "Plane",
     "Profile",
+    "Rock",
+    "RockReference",
     "Sphere",
     "Surface",
 ]
@@ -118,7 +120,16 @@ class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
     file: FileName | None = None
 
 
-Hold = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+Rock = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+
+
+class RockReference(Placed, frozen=True, kw_only=True, tag="rock"):
+    """One of the stance's rocks, which hands share; it is at its own pose if none is given here."""
+
+    rock: Annotated[Name, Meta(description="of stance.rocks")]
+
+
+Hold = Rock | RockReference
 
 
 class Surface(Strict, frozen=True, kw_only=True):

@@ -347,6 +347,39 @@ def test_impossible_meshes_are_refused_by_field(vertices, faces, field, words):
     assert caught.value.field == field
 
 
+@given_some(8, 40, seeds)
+def test_a_place_is_refused_as_the_mesh_moved_there_is(seed):
+    rng = np.random.default_rng(seed)
+    hold = random_mesh(rng)
+    size = np.ptp(hold.triangles.vertices, axis=0).max()
+    at = Pose(rng.uniform(-0.7, 0.7, 3) * size, random_axes(rng, 3.0))
+    moved = at.inverse().apply(hold.triangles.vertices)
+
+    def refusal(check):
+        try:
+            check()
+        except InvalidInputError as error:
+            return error.field
+        return None
+
+    # near is a box along the hold's axes, so the hold's own place is left where it is far
+    beyond = np.linalg.norm(moved, axis=1).min() > 0.2
+    there = refusal(lambda: Mesh(moved, hold.triangles.faces))
+    assert beyond or refusal(lambda: hold.check_place(at)) == there
+
+
+def test_a_mesh_may_begin_anywhere():
+    far = VERTICES + np.array([2.0, 0.0, 0.0])
+    hold = Mesh(far, FACES, anywhere=True)
+    with pytest.raises(InvalidInputError, match="from the hold's origin"):
+        hold.check_place()
+    hold.check_place(Pose(np.array([2.0, 0.0, 0.0]), np.eye(3)))
+    with pytest.raises(InvalidInputError, match="face away"):
+        Mesh(far, FACES[:, ::-1], anywhere=True).check_place(
+            Pose(np.array([2.0, 0.0, 0.0]), np.eye(3))
+        )
+
+
 # Files --------------------------------------------------------------------------------------------
 
 
