@@ -41,6 +41,9 @@ class Hold(ABC):
     scanned = False
     """Whether it is known by much data, rather than by a few numbers."""
 
+    nbytes = 0
+    """Of that data, if it may be large."""
+
     @property
     def swept(self) -> Swept | None:
         """The hold as a ball that is swept along faces, if it is one."""

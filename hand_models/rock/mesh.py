@@ -82,6 +82,8 @@ class Mesh(OutlinedHold):
     ----------
     triangles : Triangles
         As they are used.
+    nbytes : int
+        Of these.
 
     Raises
     ------
@@ -108,6 +110,7 @@ class Mesh(OutlinedHold):
             raise InvalidInputError("no triangle has an area", field="faces")
         self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
         self._view: _View | None = None
+        self.nbytes = sum(part.nbytes for part in self.triangles)
         if not anywhere:
             self.check_place()
 
