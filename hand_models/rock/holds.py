@@ -45,6 +45,11 @@ class Hold(ABC):
     """Of that data, if it may be large."""
 
     @property
+    def oddities(self) -> tuple[str, ...]:
+        """What is odd about that data, which is used all the same; each begins with its field."""
+        return ()
+
+    @property
     def swept(self) -> Swept | None:
         """The hold as a ball that is swept along faces, if it is one."""
         return None

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
+from hand_models.rock.filled_cells import filled_cells
 from hand_models.rock.outlined import OutlinedHold
 from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
 
@@ -84,12 +86,15 @@ class Mesh(OutlinedHold):
         As they are used.
     nbytes : int
         Of these.
+    oddities : tuple of str
+        Vertices without numbers that no triangle names, and what looks like cells of a grid that
+        had no height (`filled_cells`).
 
     Raises
     ------
     InvalidInputError
-        If numbers are not finite, faces name no vertices, nothing is left, the size is that of
-        another unit, or no palm can be at the frame's origin.
+        If numbers of triangles are not finite, faces name no vertices, nothing is left, the size is
+        that of another unit, or no palm can be at the frame's origin.
     """
 
     shape = "mesh"
@@ -104,7 +109,7 @@ class Mesh(OutlinedHold):
     ) -> None:
         super().__init__(hand)
         table = scan_table()
-        given = _checked(vertices, faces, table.scalar("scan", "largest"))
+        given, self._left_out = _checked(vertices, faces, table)
         welded = weld(given)
         if not len(welded.faces):
             raise InvalidInputError("no triangle has an area", field="faces")
@@ -113,6 +118,20 @@ class Mesh(OutlinedHold):
         self.nbytes = sum(part.nbytes for part in self.triangles)
         if not anywhere:
             self.check_place()
+
+    @cached_property
+    def oddities(self) -> tuple[str, ...]:
+        found = [
+            f"vertices: {filled.cells} vertices are at exactly {'xyz'[filled.axis]} = "
+            f"{filled.value:g} m, with cliffs around them; leave out cells that have no height"
+            for filled in filled_cells(self.triangles)
+        ]
+        if self._left_out:
+            found.append(
+                f"vertices: {self._left_out} vertices without numbers, which no triangle names, "
+                "were left out"
+            )
+        return tuple(found)
 
     def check_place(self, at: Pose | None = None) -> None:
         """Refuse a frame that a palm is to be at, unless there is rock that faces it.
@@ -231,7 +250,8 @@ def _area(a: Array, b: Array) -> Array:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _checked(vertices: ArrayLike, faces: ArrayLike, largest: float) -> Triangles:
+def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tuple[Triangles, int]:
+    """Return triangles, and how many vertices without numbers were left out that none names."""
     try:
         points, corners = np.asarray(vertices, dtype=float), np.asarray(faces)
     except (TypeError, ValueError):
@@ -247,23 +267,32 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, largest: float) -> Triangles
         )
     if not np.issubdtype(corners.dtype, np.integer):
         raise InvalidInputError(f"whole numbers are needed, got {corners.dtype}", field="faces")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise InvalidInputError(
-            f"every number must be finite, got {points[bad[0]].tolist()}",
-            field=f"vertices[{bad[0]}]",
-        )
     bad = np.flatnonzero(((corners < 0) | (corners >= len(points))).any(axis=1))
     if len(bad):
         raise InvalidInputError(
             f"must name vertices 0 to {len(points) - 1}, got {corners[bad[0]].tolist()}",
             field=f"faces[{bad[0]}]",
         )
-    size = float(np.ptp(points, axis=0).max())
+    finite = np.isfinite(points).all(axis=1)
+    bad = corners[~finite[corners]]
+    if len(bad):
+        raise InvalidInputError(
+            f"every number of a triangle must be finite, got {points[bad.min()].tolist()}",
+            field=f"vertices[{bad.min()}]",
+        )
+    left_out = len(points) - int(finite.sum())
+    if left_out:
+        points, corners = points[finite], (np.cumsum(finite) - 1)[corners]
+    farthest = table.scalar("scan", "farthest")
+    if np.abs(points).max() > farthest:
+        raise InvalidInputError(
+            f"must be within {farthest:g} m of the frame's origin", field="vertices"
+        )
+    largest, size = table.scalar("scan", "largest"), float(np.ptp(points, axis=0).max())
     if size > largest:
         raise InvalidInputError(
             f"{size:.4g} m across; at most {largest:g} m is possible (vertices are in metres: "
             "divide millimetres by 1000)",
             field="vertices",
         )
-    return Triangles(points, corners.astype(np.intp))
+    return Triangles(points, corners.astype(np.intp)), left_out

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from service.requests.request import Coordinate, Name, Pose, Position, Strict
+from service.requests.request import Coordinate, Name, Pose, Strict
 
 __all__ = [
     "Cylinder",
@@ -36,7 +36,8 @@ Outline = Annotated[
 ]
 VertexIndex = Annotated[int, Meta(ge=0, lt=2_000_000)]
 Vertices = Annotated[
-    list[Position], Meta(max_length=2_000_000, description="in the hold's frame [m]")
+    list[tuple[float, float, float]],  # without bounds: those that no face names may be no numbers
+    Meta(max_length=2_000_000, description="in the hold's frame, within 10⁴ [m]"),
 ]
 Faces = Annotated[
     list[tuple[VertexIndex, VertexIndex, VertexIndex]],

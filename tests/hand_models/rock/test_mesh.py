@@ -337,6 +337,7 @@ VERTICES, FACES = cylinder_mesh(0.3, 64)
         (VERTICES, np.zeros((0, 3), int), "faces", "at least one triangle"),
         (VERTICES, FACES * 0, "faces", "no triangle has an area"),
         (1e3 * VERTICES, FACES, "vertices", "divide millimetres by 1000"),
+        (VERTICES + 1e300, FACES, "vertices", "within 10000 m of the frame's origin"),
         (VERTICES + np.array([2.0, 0.0, 0.0]), FACES, "vertices", "from the hold's origin"),
         (VERTICES, FACES[:, ::-1], "faces", "face away from it"),
     ],
@@ -345,6 +346,22 @@ def test_impossible_meshes_are_refused_by_field(vertices, faces, field, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
         Mesh(vertices, faces)
     assert caught.value.field == field
+
+
+def test_vertices_without_numbers_are_left_out_where_no_triangle_names_them():
+    want, at = Mesh(VERTICES, FACES), np.array([0, 5, 5, 128])
+    numbers = np.insert(VERTICES, at, [[np.nan] * 3, [0, np.nan, 0], [np.inf] * 3, [np.nan] * 3], 0)
+    moved = FACES + np.searchsorted(at, FACES, side="right")
+    got = Mesh(numbers, moved)
+    np.testing.assert_array_equal(got.triangles.vertices, want.triangles.vertices)
+    np.testing.assert_array_equal(got.triangles.faces, want.triangles.faces)
+    assert want.oddities == ()
+    assert got.oddities == (
+        "vertices: 4 vertices without numbers, which no triangle names, were left out",
+    )
+    with pytest.raises(InvalidInputError, match="of a triangle must be finite") as caught:
+        Mesh(numbers, np.vstack([moved, [[1, 2, 131]]]))
+    assert caught.value.field == "vertices[131]"
 
 
 @given_some(8, 40, seeds)

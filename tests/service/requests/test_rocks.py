@@ -193,3 +193,21 @@ def test_a_rock_may_be_in_a_file(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no such file") as caught:
         read_request(str(tmp_path / "stance.json"))
     assert caught.value.field == "stance.rocks.wall.file"
+
+
+def test_what_is_odd_about_a_rock_is_told_once_with_the_hand_that_has_it_first() -> None:
+    vertices = np.array(VERTICES)
+    vertices[90 * 45 + 2 : 90 * 45 + 32, 2] = vertices[90 * 46 + 2 : 90 * 46 + 32, 2] = -0.5
+    odd = WALL | {"vertices": [*vertices.tolist(), [0.0, float("nan"), 0.0]]}
+    shared = on_wall(odd | {"pose": IN_WORLD})
+    shared["stance"]["hands"][0]["hold"] = {"shape": "cylinder", "diameter": 0.3}
+    told = [
+        "hands[1].hold.vertices: 60 vertices are at exactly z = -0.5 m, with cliffs around them; "
+        "leave out cells that have no height",
+        "hands[1].hold.vertices: 1 vertices without numbers, which no triangle names, were left "
+        "out",
+    ]
+    assert [w for w in reply_to(shared, MSGPACK).warnings if "vertices" in w] == told
+    assert not [w for w in reply_to(on_wall()).warnings if "vertices" in w]
+    # in JSON there is no NaN
+    assert refusal(shared)[1] == f"stance.rocks.wall.vertices[{len(VERTICES)}][1]"
