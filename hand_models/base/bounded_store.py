@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
 
@@ -30,15 +31,25 @@ class BoundedStore(Generic[K, V]):
     ----------
     most : int
         Answers kept; the one that was asked for longest ago goes first.
+    size : callable, optional
+        Returns how large answers are together; by default their size does not matter.
+    largest : float, optional
+        What that may come to.
     """
 
-    def __init__(self, most: int) -> None:
+    def __init__(
+        self,
+        most: int,
+        size: Callable[[Iterable[V]], float] | None = None,
+        largest: float = math.inf,
+    ) -> None:
         self.most = most
+        self._size, self._largest = size, largest
         self._lock = Lock()
         self.clear()
 
-    def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[int]]:
-        return type(self), (self.most,)
+    def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[object, ...]]:
+        return type(self), (self.most, self._size, self._largest)
 
     def clear(self) -> None:
         """Forget all."""
@@ -71,5 +82,8 @@ class BoundedStore(Generic[K, V]):
         with self._lock:
             for question, answer in answers:
                 self._answers[question] = answer
-            while len(self._answers) > self.most:
+            while len(self._answers) > self.most or self._too_large():
                 self._answers.popitem(last=False)
+
+    def _too_large(self) -> bool:
+        return self._size is not None and self._size(self._answers.values()) > self._largest

@@ -110,6 +110,7 @@ def place(
         If a number is impossible, or the hand cannot be there.
     """
     at = approach_frame(point, approach, wrist_angle, up)
+    rock.check_place(at)
     kind = hand or spiny_hand()
     placement = Placement(rock, surface or Surface.named("rock"), grasp or Grasp(), None, at)
     if seat == BEST:

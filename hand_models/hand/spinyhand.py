@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -24,8 +24,9 @@ __all__ = ["NearbyClosure", "SpinyHand", "nearby_closures", "spiny_hand"]
 KEPT: Final = 256
 """Settled hands that are kept, those used last: sixty-four stances of four hands."""
 
-SCANS: Final = 16
-"""Settled hands on meshes and profiles that are kept, those used last."""
+SCANNED: Final = 150_000_000
+"""Bytes of triangles that hands are kept on: twenty scans of 200,000, or the largest mesh that a
+request may have. A hand itself takes 20 kB."""
 
 NEARBY: Final = 1e-4
 """How far the rock is moved to see whether fingers end otherwise there [m]."""
@@ -75,8 +76,12 @@ class SpinyHand(HandModel):
     def __init__(self, table: ParameterTable | None = None) -> None:
         super().__init__(table)
         self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore(KEPT)
-        self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(SCANS)
-        self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(SCANS)
+        self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(
+            KEPT, _rock_bytes, SCANNED
+        )
+        self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(
+            KEPT, _rock_bytes, SCANNED
+        )
 
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
         return spiny_hand, (self.table,)
@@ -124,8 +129,8 @@ class SpinyHand(HandModel):
 
         Of the hands that were settled last, `KEPT` are kept, and found again where hold, place,
         grasp and surface are the same: holds given by numbers where these are equal, meshes and
-        profiles where they are the same object (of these, whose data may be large, `SCANS`). Their
-        arrays are read-only.
+        profiles where they are the same object (fewer if these have more than `SCANNED` bytes in
+        all). Their arrays are read-only.
 
         Parameters
         ----------
@@ -170,6 +175,11 @@ class SpinyHand(HandModel):
                     known[i] = outcome
             store.keep(kept)
         return [outcome for outcome in known if outcome is not None]
+
+
+def _rock_bytes(hands: Iterable[SettledHand]) -> int:
+    """Return how many bytes the rock has that hands are on, of each hold once."""
+    return sum({id(hand.hold): hand.hold.nbytes for hand in hands}.values())
 
 
 def nearby_closures(settled: SettledHand, distance: float = NEARBY) -> tuple[NearbyClosure, ...]:

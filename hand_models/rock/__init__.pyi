@@ -1,3 +1,4 @@
+from .filled_holes import FilledCells as FilledCells, filled_cells as filled_cells
 from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,

@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, Pose
 from hand_models.sections import (
     PARALLEL,
     FlatSection,
@@ -40,6 +40,14 @@ class Hold(ABC):
 
     scanned = False
     """Whether it is known by much data, rather than by a few numbers."""
+
+    nbytes = 0
+    """Of that data, if it may be large."""
+
+    @property
+    def oddities(self) -> tuple[str, ...]:
+        """What is odd about that data, which is used all the same; each begins with its field."""
+        return ()
 
     @property
     def swept(self) -> Swept | None:
@@ -69,6 +77,20 @@ class Hold(ABC):
         """Return how far from a point, along a unit direction, the rock begins [m].
 
         Negative where the point is inside; infinite where the line misses the rock.
+        """
+
+    def check_place(self, at: Pose | None = None) -> None:  # noqa: B027 (all others may be taken)
+        """Refuse a frame that a palm is to be at, unless there is rock that faces it.
+
+        Parameters
+        ----------
+        at : Pose, optional
+            In the hold's frame, z into the rock; by default the hold's frame itself.
+
+        Raises
+        ------
+        InvalidInputError
+            If a scan has no rock near its origin, or rock that faces away.
         """
 
     def crest_circle(self, offset: float) -> tuple[float, float] | None:

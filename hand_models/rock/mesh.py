@@ -19,8 +19,9 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
+from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.outlined import OutlinedHold
 from hand_models.rock.triangle_cells import TriangleCells
 from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
@@ -76,46 +77,78 @@ class Mesh(OutlinedHold):
         Vertices of each triangle, counterclockwise from outside the rock.
     hand : ParameterTable, optional
         As of `OutlinedHold`.
+    anywhere : bool, optional
+        Whether its frame may begin anywhere, and not on the rock under a palm; see `check_place`.
 
     Attributes
     ----------
     triangles : Triangles
         As they are used.
+    nbytes : int
+        Of these.
+    oddities : tuple of str
+        Vertices without numbers that no triangle names, and what looks like cells of a grid that
+        had no height (`filled_cells`).
 
     Raises
     ------
     InvalidInputError
-        If numbers are not finite, faces name no vertices, nothing is left, nothing is near the
-        frame's origin, the size is that of another unit, or the triangles under the palm face away
-        from it.
+        If numbers of triangles are not finite, faces name no vertices, nothing is left, the size is
+        that of another unit, or no palm can be at the frame's origin.
     """
 
     shape = "mesh"
 
     def __init__(
-        self, vertices: ArrayLike, faces: ArrayLike, hand: ParameterTable | None = None
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        hand: ParameterTable | None = None,
+        *,
+        anywhere: bool = False,
     ) -> None:
         super().__init__(hand)
         table = scan_table()
-        given = _checked(vertices, faces, table.scalar("scan", "largest"))
+        given, self._left_out = _checked(vertices, faces, table)
         welded = weld(given)
         if not len(welded.faces):
             raise InvalidInputError("no triangle has an area", field="faces")
         self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
-        self._check_place(table.scalar("scan", "near"), table.vector("scan", "view"))
+        self.nbytes = sum(part.nbytes for part in self.triangles)
+        if not anywhere:
+            self.check_place()
 
-    def _check_place(self, near: float, view: tuple[float, ...]) -> None:
-        corners = self.triangles.vertices[self.triangles.faces]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        if not ((low <= near) & (high >= -near)).all(axis=1).any():
-            nearest = np.linalg.norm(self.triangles.vertices, axis=1).min()
+    @cached_property
+    def oddities(self) -> tuple[str, ...]:
+        found = [
+            f"vertices: {filled.cells} vertices are at exactly {'xyz'[filled.axis]} = "
+            f"{filled.value:g} m, with cliffs around them; leave out cells that have no height"
+            for filled in filled_cells(self.triangles)
+        ]
+        if self._left_out:
+            found.append(
+                f"vertices: {self._left_out} vertices without numbers, which no triangle names, "
+                "were left out"
+            )
+        return tuple(found)
+
+    def check_place(self, at: Pose | None = None) -> None:
+        there, table = at or Pose.identity(), scan_table()
+        near, view = table.scalar("scan", "near"), table.vector("scan", "view")
+        box = there.position - near, there.position + near
+        found = self.triangles.faces[self._cells.within(np.eye(3), *box)]
+        corners = self.triangles.vertices[found]
+        beside = (corners.min(axis=1) <= box[1]) & (corners.max(axis=1) >= box[0])
+        if not beside.all(axis=1).any():
+            nearest = np.linalg.norm(self.triangles.vertices - there.position, axis=1).min()
+            origin = "the hold's origin" if at is None else "the point"
             raise InvalidInputError(
-                f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
+                f"the nearest vertex is {nearest:.3g} m from {origin}, which is to be on "
                 f"the rock under the palm; at most {near:g} m is possible",
-                field="vertices",
+                field="vertices" if at is None else "place.point",
             )
         met = [
-            self._first_side((x, y, 0.0), (0.0, 0.0, 1.0))
+            self._first_side(there.apply((x, y, 0.0)), there.rotation[:, 2])
             for x in np.linspace(-view[0], view[0], RAYS)
             for y in np.linspace(-view[1], view[1], RAYS)
         ]
@@ -124,7 +157,7 @@ class Mesh(OutlinedHold):
                 "the triangles under the palm face away from it; their vertices must be "
                 "counterclockwise seen from outside the rock: turn every face over, or close the "
                 "hole under the palm if it looks into the rock",
-                field="faces",
+                field="faces" if at is None else "place.approach",
             )
 
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
@@ -177,7 +210,8 @@ def _area(a: Array, b: Array) -> Array:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _checked(vertices: ArrayLike, faces: ArrayLike, largest: float) -> Triangles:
+def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tuple[Triangles, int]:
+    """Return triangles, and how many vertices without numbers were left out that none names."""
     try:
         points, corners = np.asarray(vertices, dtype=float), np.asarray(faces)
     except (TypeError, ValueError):
@@ -193,23 +227,32 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, largest: float) -> Triangles
         )
     if not np.issubdtype(corners.dtype, np.integer):
         raise InvalidInputError(f"whole numbers are needed, got {corners.dtype}", field="faces")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise InvalidInputError(
-            f"every number must be finite, got {points[bad[0]].tolist()}",
-            field=f"vertices[{bad[0]}]",
-        )
     bad = np.flatnonzero(((corners < 0) | (corners >= len(points))).any(axis=1))
     if len(bad):
         raise InvalidInputError(
             f"must name vertices 0 to {len(points) - 1}, got {corners[bad[0]].tolist()}",
             field=f"faces[{bad[0]}]",
         )
-    size = float(np.ptp(points, axis=0).max())
+    finite = np.isfinite(points).all(axis=1)
+    bad = corners[~finite[corners]]
+    if len(bad):
+        raise InvalidInputError(
+            f"every number of a triangle must be finite, got {points[bad.min()].tolist()}",
+            field=f"vertices[{bad.min()}]",
+        )
+    left_out = len(points) - int(finite.sum())
+    if left_out:
+        points, corners = points[finite], (np.cumsum(finite) - 1)[corners]
+    farthest = table.scalar("scan", "farthest")
+    if np.abs(points).max() > farthest:
+        raise InvalidInputError(
+            f"must be within {farthest:g} m of the frame's origin", field="vertices"
+        )
+    largest, size = table.scalar("scan", "largest"), float(np.ptp(points, axis=0).max())
     if size > largest:
         raise InvalidInputError(
             f"{size:.4g} m across; at most {largest:g} m is possible (vertices are in metres: "
             "divide millimetres by 1000)",
             field="vertices",
         )
-    return Triangles(points, corners.astype(np.intp))
+    return Triangles(points, corners.astype(np.intp)), left_out

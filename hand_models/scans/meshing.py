@@ -19,6 +19,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, Progress
 from hand_models.parameters import scan_table
+from hand_models.rock import FilledCells, Triangles, filled_cells
 from hand_models.scans.rock import Hole, ScannedRock
 from hand_models.scans.scan import Scan
 
@@ -100,6 +101,7 @@ def mesh_scan(
             f"{1e3 * hole:.3g} mm stay open: no triangle is left; is the unit right?",
             field="hole",
         )
+    filled = filled_cells(Triangles(points, corners))
     holes = _holes(points[corners], beside, width, open_)
     used, faces = np.unique(faces, return_inverse=True)
     points, faces = points[used], faces.reshape(-1, 3)
@@ -114,7 +116,15 @@ def mesh_scan(
         read=scan.read,
         dropped=scan.dropped,
         spacing=_spacing(points),
+        filled=tuple(_in_scan(cells, middle, axes) for cells in filled),
     )
+
+
+def _in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
+    """Return cells in the scan's axes: where any are found, the rock's axes are along them."""
+    axis = int(np.abs(axes[:, cells.axis]).argmax())
+    value = float(middle[axis] + axes[axis, cells.axis] * cells.value)
+    return FilledCells(axis, value, cells.cells)
 
 
 def _length(value: float, field: str) -> float:

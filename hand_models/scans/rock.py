@@ -10,6 +10,7 @@ import trimesh
 from trimesh.exchange.ply import export_ply
 
 from hand_models.base import Array, Indices, Pose
+from hand_models.rock import FilledCells
 
 __all__ = ["Hole", "ScannedRock", "write_rock"]
 
@@ -50,6 +51,8 @@ class ScannedRock:
         Points of the file, and how many of them are not finite.
     spacing : float
         Median distance between neighbours [m].
+    filled : tuple of FilledCells
+        Points that look like cells of a grid that had no height, in the scan's axes.
     """
 
     vertices: Array
@@ -59,6 +62,7 @@ class ScannedRock:
     read: int
     dropped: int
     spacing: float
+    filled: tuple[FilledCells, ...] = ()
 
     @property
     def extent(self) -> Array:

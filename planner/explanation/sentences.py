@@ -312,6 +312,9 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
         by_finger = holding[count * h : count * (h + 1)]
         if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
             found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
+    first = {id(place.hold): i for i, place in reversed([*enumerate(stance.hands)])}
+    for i in sorted(first.values()):
+        found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
     return tuple(found)
 
 

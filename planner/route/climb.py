@@ -248,11 +248,14 @@ def _in_processes(
 ) -> None:
     """Plan stages in processes; those of a process that dies are left to the caller."""
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(todo)), mp_context=context) as pool:
+    # sent to each process once, so that there, too, hands share their rock
+    with ProcessPoolExecutor(
+        min(workers, len(todo)), mp_context=context, initializer=_begin, initargs=(todo,)
+    ) as pool:
         futures: dict[Future[Plan | OutOfReach], RouteStage] = {}
         try:
             for stage in todo:
-                futures[pool.submit(_plan_stage, stage)] = stage
+                futures[pool.submit(_plan_known, stage.index)] = stage
             for future in as_completed(futures):
                 done(futures[future], future.result())
         except BrokenProcessPool:
@@ -260,6 +263,18 @@ def _in_processes(
         except InvalidInputError:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+_todo: list[RouteStage] = []
+"""What a process may be asked to plan."""
+
+
+def _begin(todo: Sequence[RouteStage]) -> None:
+    _todo[:] = todo
+
+
+def _plan_known(index: int) -> Plan | OutOfReach:
+    return _plan_stage(_todo[index])
 
 
 def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:

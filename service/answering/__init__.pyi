@@ -7,6 +7,7 @@ from .dispatch import (
     planned as planned,
     wrench_space as wrench_space,
 )
+from .mesh_files import MeshFiles as MeshFiles
 from .own_hand import read_hand as read_hand, with_hand as with_hand
 from .own_robot import (
     Robots as Robots,

@@ -22,6 +22,7 @@ from planner.result import Plan, WristPlan
 from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
 from service.answering.body_space import explore
 from service.answering.hand_answers import placed_poses
+from service.answering.mesh_files import MeshFiles
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question, stance
@@ -218,6 +219,7 @@ def handle(
     started: float | None = None,
     turn: threading.Lock | None = None,
     streams: Streams = STREAMS,
+    files: MeshFiles | None = None,
 ) -> Answer:
     """Answer a query.
 
@@ -239,6 +241,8 @@ def handle(
         Held while the request is answered; it is waited for no longer than the deadline.
     streams : Streams, optional
         Those that may be asked; by default those of this process that belong to no service.
+    files : MeshFiles, optional
+        Those that a plan request may name; none by default.
 
     Returns
     -------
@@ -250,6 +254,8 @@ def handle(
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
         request = decode_request(payload, service.request, form)
+        if files is not None:
+            request = files.whole(request)
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
         seconds = request.deadline if isinstance(request, PlanRequest) else None

@@ -6,22 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, Literal, cast, get_args, overload
+from typing import Final, Literal, cast, get_args
 
 import msgspec
 import numpy as np
 
-from hand_models import rock
 from hand_models.base import Array, InvalidInputError, Pose
 from hand_models.fixed_wrist import UP, approach_frame
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
-from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
 from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.route import Move, Route
 from service import requests
+from service.answering.holds import Rocks, placed, pose_of, rocks_of
 from service.answering.own_robot import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]
@@ -82,10 +81,10 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     InvalidInputError
         If a part of it is impossible; the field is relative to the file.
     """
-    start = stance(request.stance, robots)
+    start, rocks = _stance(request.stance, robots)
     kind = start.robot.hand
-    moved = [_hand(move, kind.table, f"moves[{i}]") for i, move in enumerate(request.moves)]
-    bodies = [_pose(move.body, f"moves[{i}].body") for i, move in enumerate(request.moves)]
+    moved = [_hand(move, kind.table, rocks, f"moves[{i}]") for i, move in enumerate(request.moves)]
+    bodies = [pose_of(move.body, f"moves[{i}].body") for i, move in enumerate(request.moves)]
     return Route(
         name=request.name,
         start=start,
@@ -104,20 +103,26 @@ def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
     InvalidInputError
         If a part of it is impossible; the field begins with ``stance``.
     """
+    return _stance(message, robots)[0]
+
+
+def _stance(message: requests.Stance, robots: Robots) -> tuple[Stance, Rocks]:
     with _within("stance"):
         build = builder_of(message.robot, robots)
         with _within("hand"):
             own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
             robot = build(own)
         numbers = robot.hand.table
-        hands = [_hand(hand, numbers, f"hands[{i}]") for i, hand in enumerate(message.hands)]
-        return Stance(
+        rocks = rocks_of(message, numbers)
+        hands = [_hand(hand, numbers, rocks, f"hands[{i}]") for i, hand in enumerate(message.hands)]
+        found = Stance(
             hands=tuple(_placed(robot.hand, hands, "hands")),
-            body=_pose(message.body, "body"),
+            body=pose_of(message.body, "body"),
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
             robot=robot,
             joints=_joints(message.joints),
         )
+        return found, rocks
 
 
 def _joints(
@@ -173,16 +178,13 @@ def _range(axis: requests.AxisForce) -> tuple[float, float]:
     return (axis[0], axis[1]) if isinstance(axis, list) else (-axis, axis)
 
 
-def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnHold:
+def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: str) -> HandOnHold:
     with _within(path):
         grasp, surface = _grasp(message.grasp), _surface(message.surface)
-        try:
-            hold = _hold(message.hold, numbers)
-            hold_pose = _pose(message.hold.pose, "pose")
-            hold_in_hand = _pose(message.hold.pose_in_hand, "pose_in_hand")
-        except InvalidInputError as error:
-            raise error.within("hold") from None
-        pose, at = _pose(message.pose, "pose"), None
+        hold, hold_pose, hold_in_hand = placed(
+            message.hold, numbers, rocks, anywhere=message.place is not None
+        )
+        pose, at = pose_of(message.pose, "pose"), None
         if message.place is not None:
             if pose is not None or hold_in_hand is not None:
                 which = "pose" if pose is not None else "hold.pose_in_hand"
@@ -190,6 +192,7 @@ def _hand(message: requests.Hand, numbers: ParameterTable, path: str) -> HandOnH
             # of the rock, until the hand has been seated there
             pose, hold_pose = hold_pose or Pose.identity(), None
             at = _frame(message.place, pose)
+            hold.check_place(at)
         if pose is None:
             raise InvalidInputError("missing", field="pose")
         return HandOnHold(
@@ -236,19 +239,6 @@ def _placed(kind: SpinyHand, hands: Sequence[HandOnHold], path: str) -> list[Han
     return found
 
 
-@overload
-def _pose(message: requests.Pose, field: str) -> Pose: ...
-@overload
-def _pose(message: requests.Pose | None, field: str) -> Pose | None: ...
-def _pose(message: requests.Pose | None, field: str) -> Pose | None:
-    if message is None:
-        return None
-    try:
-        return Pose.from_quaternion(message.position, message.orientation)
-    except InvalidInputError as error:
-        raise error.within(field) from None
-
-
 @lru_cache(maxsize=GRASPS)
 def _grasp(message: requests.Grasp) -> Grasp:
     try:
@@ -265,40 +255,3 @@ def _surface(message: str | requests.Surface) -> Surface:
         return Surface.from_values({name: v for name, v in given.items() if v is not None})
     except InvalidInputError as error:
         raise error.within("surface") from None
-
-
-def _hold(message: requests.Hold, numbers: ParameterTable) -> rock.Hold:
-    match message:
-        case requests.Plane():
-            return rock.Plane()
-        case requests.Cylinder():
-            return rock.Cylinder(message.diameter)
-        case requests.Sphere():
-            return rock.Sphere(message.diameter)
-        case requests.Ellipsoid():
-            return rock.Ellipsoid(message.semi_axes)
-        case requests.Edge():
-            return rock.Edge(message.fillet_radius, message.angle)
-        case requests.Profile():
-            return _profile(message, numbers)
-        case requests.Mesh():
-            return _mesh(message, numbers)
-
-
-def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
-    if message.points is not None and message.profiles is None:
-        return Profile(message.points, numbers)
-    if message.profiles is not None and message.points is None:
-        return Profile(msgspec.structs.asdict(message.profiles), numbers)
-    raise InvalidInputError("give points or profiles, one of them", field="points")
-
-
-def _mesh(message: requests.Mesh, numbers: ParameterTable) -> Mesh:
-    if message.file is not None:
-        raise InvalidInputError(
-            "only the command line reads files; send vertices and faces", field="file"
-        )
-    if message.vertices is None or message.faces is None:
-        missing = "vertices" if message.vertices is None else "faces"
-        raise InvalidInputError("missing", field=missing)
-    return Mesh(message.vertices, message.faces, numbers)

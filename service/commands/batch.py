@@ -83,19 +83,21 @@ def batch(
     """Answer many plan requests: one a line in, one reply or error a line out, in order.
 
     REQUESTS is the path of a file of JSON lines, or - for standard input; blank lines are skipped.
-    Lines are as the service takes them: meshes travel whole, extras are those that a request wants
-    itself, and the numbers of --hand are those that it leaves open. With --json the replies are
+    Lines are as the service takes them: extras are those that a request wants itself, and the
+    numbers of --hand are those that it leaves open. Only meshes may be in files, relative to that
+    of the lines; one that many lines name is read once. With --json the replies are
     written on standard output, or with -o a summary is.
 
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
     numbers, lines = _lines(requests)
+    folder = Path() if requests == "-" else Path(requests).parent
     told: list[_Told] = []
     begun = perf_counter()
     with (
         _written(file, as_json) as out,
-        Planners(worth(len(lines), workers), robot=robot, hand=hand) as many,
+        Planners(worth(len(lines), workers), robot=robot, hand=hand, folder=folder) as many,
         progress(f"planning {requests}") as tell,
     ):
         for answer in _in_order(many.answers(lines)):

@@ -163,6 +163,10 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
         "spacing": made.spacing,
         "extent": made.extent.tolist(),
         "holes": [{"width": hole.width, "place": hole.place.tolist()} for hole in made.holes],
+        "filled": [
+            {"axis": "xyz"[each.axis], "value": each.value, "points": each.cells}
+            for each in made.filled
+        ],
         "pose": {
             "position": made.pose.position.tolist(),
             "orientation": made.pose.quaternion().tolist(),
@@ -187,6 +191,12 @@ def _print_rock(made: ScannedRock, hole: float, output: Path, out: Console) -> N
     table.add_row("holes", str(len(made.holes)), told)
     out.print(table)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
+    for each in made.filled:
+        out.print(
+            f"warning: {each.cells:,} points are at exactly {each.value:g} m, with cliffs around "
+            "them; leave out cells that have no height",
+            markup=False,
+        )
     largest = scan_table().scalar("scan", "largest")
     if made.extent.max() > largest:
         out.print(

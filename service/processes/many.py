@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
@@ -49,6 +50,9 @@ class Planners:
         The only robot that is planned for; those that are bundled by default.
     hand : ParameterTable, optional
         Entries in which hands are not the bundled one; a request's own go on top.
+    folder : Path, optional
+        That names of mesh files in requests are relative to; each process reads a file once. By
+        default requests name none.
 
     Raises
     ------
@@ -62,9 +66,10 @@ class Planners:
         *,
         robot: RobotFile | None = None,
         hand: ParameterTable | None = None,
+        folder: Path | None = None,
     ) -> None:
         count = cores() if workers is None else _whole(workers)
-        self._make = partial(_answering, robot, hand)
+        self._make = partial(_answering, robot, hand, folder)
         self._closed = False
         self._workers: Workers[tuple[bytes, Format], Answered] | None = None
         if count > 1:
@@ -192,16 +197,17 @@ def _whole(workers: object) -> int:
 
 
 def _answering(
-    robot: RobotFile | None, hand: ParameterTable | None
+    robot: RobotFile | None, hand: ParameterTable | None, folder: Path | None
 ) -> Callable[[tuple[bytes, Format]], Answered]:
     """Return what answers an encoded request. Here the planner is imported, in each process."""
-    from service.answering import handle, robots_of
+    from service.answering import MeshFiles, handle, robots_of
 
     robots = robots_of(robot)
+    files = None if folder is None else MeshFiles(folder)
 
     def answer(asked: tuple[bytes, Format]) -> Answered:
         payload, form = asked
-        found = handle(PLAN, payload, form.value, hand, robots)
+        found = handle(PLAN, payload, form.value, hand, robots, files=files)
         return Answered(found.payload, found.good)
 
     return answer

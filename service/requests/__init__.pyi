@@ -6,6 +6,8 @@ from .holds import (
     Mesh as Mesh,
     Plane as Plane,
     Profile as Profile,
+    Rock as Rock,
+    RockReference as RockReference,
     Sphere as Sphere,
     Surface as Surface,
 )

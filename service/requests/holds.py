@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from service.requests.request import Coordinate, Pose, Position, Strict
+from service.requests.request import Coordinate, Name, Pose, Strict
 
 __all__ = [
     "Cylinder",
@@ -17,6 +17,8 @@ __all__ = [
     "Mesh",
     "Plane",
     "Profile",
+    "Rock",
+    "RockReference",
     "Sphere",
     "Surface",
 ]
@@ -34,7 +36,8 @@ Outline = Annotated[
 ]
 VertexIndex = Annotated[int, Meta(ge=0, lt=2_000_000)]
 Vertices = Annotated[
-    list[Position], Meta(max_length=2_000_000, description="in the hold's frame [m]")
+    list[tuple[float, float, float]],  # without bounds: those that no face names may be no numbers
+    Meta(max_length=2_000_000, description="in the hold's frame, within 10⁴ [m]"),
 ]
 Faces = Annotated[
     list[tuple[VertexIndex, VertexIndex, VertexIndex]],
@@ -118,7 +121,16 @@ class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
     file: FileName | None = None
 
 
-Hold = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+Rock = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+
+
+class RockReference(Placed, frozen=True, kw_only=True, tag="rock"):
+    """One of the stance's rocks, which hands share; it is at its own pose if none is given here."""
+
+    rock: Annotated[Name, Meta(description="of stance.rocks")]
+
+
+Hold = Rock | RockReference
 
 
 class Surface(Strict, frozen=True, kw_only=True):

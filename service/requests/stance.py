@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from service.requests.holds import Hold, Surface
+from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import (
     Acceleration,
     Coordinate,
@@ -157,4 +157,11 @@ class Stance(Strict, frozen=True, kw_only=True):
             "with joints their torques count"
         ),
     ] = None
+    rocks: Annotated[
+        dict[Name, Rock],
+        Meta(
+            max_length=64,
+            description="by name, for hands that refer to them; a mesh's frame may begin anywhere",
+        ),
+    ] = {}
     hands: Annotated[list[Hand], Meta(max_length=16)]

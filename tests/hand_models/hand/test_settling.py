@@ -15,11 +15,13 @@ from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Pla
 from hand_models.base import BoundedStore
 from hand_models.finger import ClosedFinger, OpenFinger, close_all, settle_finger
 from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
+from hand_models.hand.spinyhand import _rock_bytes
 from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
 from planner.prepare.settled_stance import settle_stance
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand
 from tests.suite.helpers.rocks import (
+    cylinder_mesh,
     random_axes,
     random_ellipsoid,
     random_hold,
@@ -348,18 +350,33 @@ def test_only_so_many_hands_are_kept_the_last_ones():
     assert kept == [False] * (300 - hand.settled.most) + [True] * hand.settled.most
 
 
-def test_fewer_hands_on_scans_are_kept_than_on_holds_given_by_numbers():
+def test_hands_on_scans_are_kept_as_long_as_these_are_not_too_large():
     hand = SpinyHand()
-    holds = [Profile([[-0.3, 0.0], [0.01 * i, 0.0], [0.3, 0.01]]) for i in range(20)]
+    hand.settled_scans = BoundedStore(256, _rock_bytes, 20_000)
+    holds = [Profile([[-0.3, 0.0], [0.0, 0.0], [0.3, 0.01]]), *(_log(0.3) for _ in range(3))]
+    assert [hold.nbytes for hold in holds] == [0, 7_104, 7_104, 7_104]
     placements = [Placement(hold, ROCK, Grasp(), None) for hold in holds]
-    placements.insert(7, Placement(Plane(), ROCK, Grasp(), None))
+    placements.insert(2, Placement(Plane(), ROCK, Grasp(), None))
     settled = hand.settle_each(placements)
     assert [each.hold for each in settled] == [each.hold for each in placements]
     assert hand.settled.info() == (0, 1, 1)
-    assert hand.settled_scans.info() == (0, 20, 16)
-    assert hand.settle_each(placements[7:8]) == settled[7:8]
-    assert hand.settle_each(placements[-1:]) == settled[-1:]
-    assert hand.settle(holds[0], ROCK) is not settled[0]
+    assert hand.settled_scans.info() == (0, 4, 2)
+    assert hand.settle_each(placements[2:]) == settled[2:]
+    assert hand.settle(holds[1], ROCK) is not settled[1]
+
+
+def test_a_route_on_one_scan_is_found_again():
+    hand, hold = SpinyHand(), _log(0.3)
+    places = [Pose(np.array([0.032, 1e-3 * i, 0.003]), np.eye(3)) for i in range(40)]
+    placements = [Placement(hold, ROCK, Grasp(math.pi), place) for place in places]
+    settled = hand.settle_each(placements)
+    assert hand.settled_scans.info() == (0, 40, 40)
+    again = hand.settle_each(placements)
+    assert all(one is other for one, other in zip(again, settled, strict=True))
+
+
+def _log(diameter):
+    return Mesh(*cylinder_mesh(diameter, around=74))
 
 
 def test_threads_share_what_is_kept():

@@ -337,6 +337,7 @@ VERTICES, FACES = cylinder_mesh(0.3, 64)
         (VERTICES, np.zeros((0, 3), int), "faces", "at least one triangle"),
         (VERTICES, FACES * 0, "faces", "no triangle has an area"),
         (1e3 * VERTICES, FACES, "vertices", "divide millimetres by 1000"),
+        (VERTICES + 1e300, FACES, "vertices", "within 10000 m of the frame's origin"),
         (VERTICES + np.array([2.0, 0.0, 0.0]), FACES, "vertices", "from the hold's origin"),
         (VERTICES, FACES[:, ::-1], "faces", "face away from it"),
     ],
@@ -345,6 +346,55 @@ def test_impossible_meshes_are_refused_by_field(vertices, faces, field, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
         Mesh(vertices, faces)
     assert caught.value.field == field
+
+
+def test_vertices_without_numbers_are_left_out_where_no_triangle_names_them():
+    want, at = Mesh(VERTICES, FACES), np.array([0, 5, 5, 128])
+    numbers = np.insert(VERTICES, at, [[np.nan] * 3, [0, np.nan, 0], [np.inf] * 3, [np.nan] * 3], 0)
+    moved = FACES + np.searchsorted(at, FACES, side="right")
+    got = Mesh(numbers, moved)
+    np.testing.assert_array_equal(got.triangles.vertices, want.triangles.vertices)
+    np.testing.assert_array_equal(got.triangles.faces, want.triangles.faces)
+    assert want.oddities == ()
+    assert got.oddities == (
+        "vertices: 4 vertices without numbers, which no triangle names, were left out",
+    )
+    with pytest.raises(InvalidInputError, match="of a triangle must be finite") as caught:
+        Mesh(numbers, np.vstack([moved, [[1, 2, 131]]]))
+    assert caught.value.field == "vertices[131]"
+
+
+@given_some(8, 40, seeds)
+def test_a_place_is_refused_as_the_mesh_moved_there_is(seed):
+    rng = np.random.default_rng(seed)
+    hold = random_mesh(rng)
+    size = np.ptp(hold.triangles.vertices, axis=0).max()
+    at = Pose(rng.uniform(-0.7, 0.7, 3) * size, random_axes(rng, 3.0))
+    moved = at.inverse().apply(hold.triangles.vertices)
+
+    def refusal(check):
+        try:
+            check()
+        except InvalidInputError as error:
+            return error.field
+        return None
+
+    # near is a box along the hold's axes, so the hold's own place is left where it is far
+    beyond = np.linalg.norm(moved, axis=1).min() > 0.2
+    there = refusal(lambda: Mesh(moved, hold.triangles.faces))
+    assert beyond or refusal(lambda: hold.check_place(at)) == there
+
+
+def test_a_mesh_may_begin_anywhere():
+    far = VERTICES + np.array([2.0, 0.0, 0.0])
+    hold = Mesh(far, FACES, anywhere=True)
+    with pytest.raises(InvalidInputError, match="from the hold's origin"):
+        hold.check_place()
+    hold.check_place(Pose(np.array([2.0, 0.0, 0.0]), np.eye(3)))
+    with pytest.raises(InvalidInputError, match="face away"):
+        Mesh(far, FACES[:, ::-1], anywhere=True).check_place(
+            Pose(np.array([2.0, 0.0, 0.0]), np.eye(3))
+        )
 
 
 # Files --------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import trimesh
 from service.commands.cli import run
 from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
 from tests.suite.helpers.requests import put, wall_request
-from tests.suite.helpers.scans import wall, write_cloud
+from tests.suite.helpers.scans import relief, wall, write_cloud
 
 TERRAIN = Path(mpl.get_data_path()) / "sample_data" / "jacksboro_fault_dem.npz"
 
@@ -62,7 +62,9 @@ def test_a_plan_is_made_on_scanned_terrain(
 ) -> None:
     options = ["--cell", "90", "--width", "1", "--up", "y", "--spacing", "0.005", "--json"]
     assert run(["rock", str(TERRAIN), "-o", str(tmp_path / "rock.ply"), *options]) == DONE
-    assert result(capfd)["extent"][1] == pytest.approx(1.0, abs=0.01)
+    told = result(capfd)
+    assert told["extent"][1] == pytest.approx(1.0, abs=0.01)
+    assert told["filled"] == []
     request = wall_request(20.0)
     for i in range(len(request["stance"]["hands"])):
         request = put(
@@ -111,3 +113,21 @@ def test_a_file_in_the_wrong_unit_is_warned_of(
     file = write_cloud(tmp_path / "wall.xyz", 100.0 * wall(0.01))
     assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"]) == DONE
     assert "m across, and a hold may be 10 m" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
+    up: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    line = 2e-3 * np.arange(200)
+    heights = 0.5 + relief(*np.meshgrid(line, line))
+    options = [str(tmp_path / "heights.npy"), "-o", str(tmp_path / "rock.ply"), "--cell", "2e-3"]
+    for holes, told in ((0, []), (20, [{"axis": up, "value": 0.0, "points": 400}])):
+        heights[50 : 50 + holes, 70 : 70 + holes] = 0.0
+        np.save(tmp_path / "heights.npy", heights)
+        assert run(["rock", *options, "--up", up, "--json"]) == DONE
+        found = result(capfd)["filled"]
+        assert found == told
+        assert run(["rock", *options, "--up", up]) == DONE
+        said = "400 points are at exactly 0 m" in " ".join(capfd.readouterr().out.split())
+        assert said == bool(holes)

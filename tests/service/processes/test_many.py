@@ -14,9 +14,11 @@ from pathlib import Path
 
 import msgspec
 import pytest
+import trimesh
 
 from hand_models.base import InvalidInputError
-from service.answering import dispatch
+from hand_models.rock import read_mesh
+from service.answering import dispatch, mesh_files
 from service.commands.cli import run
 from service.processes import Planners, plan_many, worth
 from service.processes.many import WORTH_A_PROCESS
@@ -27,6 +29,7 @@ from service.wire import decode_request, schema
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import HEAVY, flat_request, plan_request, put, wall_request
+from tests.suite.helpers.rocks import cylinder_mesh
 
 MASSES = [40.0, HEAVY, 60.0, 80.0, 100.0, 55.0]
 
@@ -311,3 +314,52 @@ def test_files_that_cannot_be_read_or_written_are_bad_input(more, batch_file, ca
 
 def test_what_a_deadline_leaves_unfinished_is_in_the_schema():
     assert "unfinished" in schema()["$defs"]["PlanReply"]["properties"]
+
+
+def on_file(name: str = "log.ply", **more: object) -> dict:
+    request = wall_request() | more
+    for hand in request["stance"]["hands"]:
+        hand["hold"] = {"shape": "mesh", "file": name}
+    return request
+
+
+@pytest.fixture
+def log_file(tmp_path: Path) -> Path:
+    path = tmp_path / "log.ply"
+    trimesh.Trimesh(*cylinder_mesh(0.3), process=False).export(path)
+    return path
+
+
+def test_lines_name_mesh_files_which_are_read_once(batch_file, log_file, capfd, monkeypatch):
+    read = []
+    monkeypatch.setattr(mesh_files, "read_mesh", lambda path: read.append(path) or read_mesh(path))
+    rocks = on_file()
+    rocks["stance"]["rocks"] = {"log": {"shape": "mesh", "file": "log.ply"}}
+    for hand in rocks["stance"]["hands"]:
+        hand["hold"] = {"shape": "rock", "rock": "log"}
+    path = batch_file(on_file(), rocks, *[on_file()] * 5, on_file("no.ply"))
+    assert run(["batch", path, "--workers", "1", "--json"]) == 2
+    out, err = capfd.readouterr()
+    *replies, refused = (json.loads(line) for line in out.splitlines())
+    assert len({reply["utilisation"] for reply in replies}) == 1
+    assert refused["error"]["field"] == "stance.hands[0].hold.file"
+    assert err.startswith("crux: line 8: stance.hands[0].hold.file: no such file")
+    assert read == [log_file, log_file.with_name("no.ply")]
+
+
+def test_a_mesh_file_that_changes_is_read_again(log_file):
+    files = mesh_files.MeshFiles(log_file.parent)
+    first, again = (files.whole(plan_request(on_file())).stance.hands for _ in range(2))
+    assert first[0].hold.vertices is first[3].hold.vertices is again[0].hold.vertices
+    trimesh.Trimesh(*cylinder_mesh(0.4), process=False).export(log_file)
+    os.utime(log_file, ns=(0, log_file.stat().st_mtime_ns + 1))
+    (other, *_) = files.whole(plan_request(on_file())).stance.hands
+    assert other.hold.vertices != first[0].hold.vertices
+
+
+def test_only_with_a_folder_requests_name_files(log_file):
+    asked = [plan_request(on_file())]
+    with Planners(1) as without, Planners(1, folder=log_file.parent) as within:
+        (refused,), (reply,) = without.plan_many(asked), within.plan_many(asked)
+    assert refused.error.field == "stance.hands[0].hold.file"
+    assert reply.status == "optimal"

@@ -184,3 +184,21 @@ def random_axes(rng: np.random.Generator, tilt: float = 0.5) -> np.ndarray:
     lean = Rotation.from_rotvec([*(across / np.hypot(*across) * rng.uniform(0.0, tilt)), 0.0])
     turn = Rotation.from_rotvec([0.0, 0.0, rng.uniform(-math.pi, math.pi)])
     return (lean * turn).as_matrix()
+
+
+def height_map(heights: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a grid of depths z over x and y, about the origin, seen from −z [m]."""
+    rows, columns = heights.shape
+    x, y = (spacing * (np.arange(n) - (n - 1) / 2.0) for n in (rows, columns))
+    i = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (v.ravel() for v in (i[:-1, :-1], i[1:, :-1], i[:-1, 1:], i[1:, 1:]))
+    faces = np.vstack([np.column_stack([a, c, b]), np.column_stack([b, c, d])])
+    xy = np.meshgrid(x, y, indexing="ij")
+    return np.column_stack([*(v.ravel() for v in xy), heights.ravel()]), faces
+
+
+def rough_wall(seed: int = 0, count: int = 90, spacing: float = 0.02) -> tuple[list, list]:
+    """Vertices and faces of a wall, open, as a request has them; its frame begins on it."""
+    depths = np.random.default_rng(seed).uniform(0.0, 2e-3, (count, count))
+    vertices, faces = height_map(depths, spacing)
+    return vertices.tolist(), faces.tolist()

@@ -1,0 +1,81 @@
+"""Cells without a height that a grid of heights has filled with one number, told by their cliffs.
+
+Where a grid has no height, some write a zero. As triangles that is a floor at exactly one value of
+one coordinate, seen from the side from which the rock is, and joined to it by cliffs alone.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, Indices
+from hand_models.parameters import scan_table
+from hand_models.rock.triangles import Triangles
+
+__all__ = ["FilledCells", "filled_cells"]
+
+FEW: Final = 2
+"""Levels that cliffs of a drawn shape end at; those of rough rock end at more."""
+
+
+class FilledCells(NamedTuple):
+    """Vertices that are taken for cells without a height.
+
+    Attributes
+    ----------
+    axis : int
+        Of the coordinate that is the same.
+    value : float
+        Of it [m].
+    cells : int
+        How many.
+    """
+
+    axis: int
+    value: float
+    cells: int
+
+
+def filled_cells(triangles: Triangles) -> list[FilledCells]:
+    """Return what looks like cells without a height in triangles, those of each value together.
+
+    Thresholds are in ``scan.toml``.
+    """
+    table = scan_table()
+    least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))
+    vertices, faces = triangles
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    steps = np.abs(vertices[edges[:, 0]] - vertices[edges[:, 1]])
+    cliff = steps > steep * np.median(np.linalg.norm(steps, axis=1))
+    found: list[FilledCells] = []
+    for axis in range(3):
+        values, level, counts = np.unique(
+            vertices[:, axis], return_inverse=True, return_counts=True
+        )
+        if counts.max() < least:
+            continue
+        ends = level[edges]
+        leaves = ends[:, 0] != ends[:, 1]
+        ways, cliffs = (
+            np.bincount(ends[which].ravel(), minlength=len(values))
+            for which in (leaves, leaves & cliff[:, axis])
+        )
+        for k in np.flatnonzero((counts >= least) & (ways > 0) & (cliffs >= share * ways)):
+            beyond = np.unique(ends[leaves & (ends == k).any(axis=1)])
+            floor = (level[faces] == k).all(axis=1)
+            if len(beyond) - 1 > FEW and _seen_alike(vertices, faces, axis, floor):
+                found.append(FilledCells(axis, float(values[k]), int(counts[k])))
+    return found
+
+
+def _seen_alike(vertices: Array, faces: Indices, axis: int, floor: NDArray[np.bool_]) -> bool:
+    """Whether a floor faces the way along an axis that all other triangles do together.
+
+    In a closed surface it never does: its areas add up to nothing.
+    """
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    area = np.cross(b - a, c - a)[:, axis]
+    return bool(area[floor].sum() * area[~floor].sum() > 0.0)

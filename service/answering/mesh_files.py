@@ -1,0 +1,88 @@
+"""Mesh files that requests name, read where the request is, so that what travels is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, TypeVar
+
+import msgspec
+
+from hand_models.base import BoundedStore, InvalidInputError
+from hand_models.rock import read_mesh
+from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
+
+__all__ = ["MeshFiles"]
+
+H = TypeVar("H", bound=Hand)
+K = TypeVar("K", bound=Hold)
+R = TypeVar("R", bound=Request)
+
+KEPT: Final = 8
+"""Files whose triangles are kept, those asked for last."""
+
+
+class MeshFiles:
+    """Mesh files, each read once as long as it does not change.
+
+    Parameters
+    ----------
+    folder : Path
+        That their names are relative to.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._read: BoundedStore[Hashable, Mesh] = BoundedStore(KEPT)
+
+    def whole(self, request: R) -> R:
+        """Return a request with vertices and faces in place of the files that it names.
+
+        Raises
+        ------
+        InvalidInputError
+            If one cannot be read; the field is relative to the request.
+        """
+        replace = msgspec.structs.replace
+        if isinstance(request, (PlanRequest, RouteRequest)):
+            stance = request.stance
+            rocks = {
+                name: self._filled(rock, f"stance.rocks.{name}")
+                for name, rock in stance.rocks.items()
+            }
+            hands = self._hands(stance.hands, "stance.hands")
+            request = replace(request, stance=replace(stance, rocks=rocks, hands=hands))
+        if isinstance(request, RouteRequest):
+            request = replace(request, moves=self._hands(request.moves, "moves"))
+        return request
+
+    def _hands(self, hands: list[H], path: str) -> list[H]:
+        return [
+            msgspec.structs.replace(hand, hold=self._filled(hand.hold, f"{path}[{i}].hold"))
+            for i, hand in enumerate(hands)
+        ]
+
+    def _filled(self, hold: K, path: str) -> K:
+        if not isinstance(hold, Mesh) or hold.file is None:
+            return hold
+        try:
+            if hold.vertices is not None or hold.faces is not None:
+                raise InvalidInputError(
+                    "give a file, or vertices and faces, not both", field="file"
+                )
+            known = self._mesh(self._folder / hold.file)
+        except InvalidInputError as error:
+            raise error.within(path) from None
+        return msgspec.structs.replace(hold, vertices=known.vertices, faces=known.faces, file=None)
+
+    def _mesh(self, path: Path) -> Mesh:
+        changed = None
+        with suppress(OSError):  # of what is no file, reading tells
+            changed = path.stat().st_mtime_ns
+        (known,) = self._read.find([(path, changed)])
+        if known is None:
+            vertices, faces = read_mesh(path)
+            known = Mesh(vertices=vertices.tolist(), faces=faces.tolist())
+            self._read.keep([((path, changed), known)])
+        return known
