@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -247,6 +248,22 @@ class SettledHand:
     def holding(self) -> Array:
         """Which tiles and nails are on rock that they hold, bool of shape (n,)."""
         return np.logical_or(self.touching, self.nails)
+
+    @cached_property
+    def rock_ends(self) -> tuple[float, ...]:
+        """How far from each finger's joint rock ends in its plane, infinite if it does not [m]."""
+        border = self.hold.border
+        if not len(border):
+            return (math.inf,) * len(FINGERS)
+        ends = self.seating.pose.apply(border)
+        found = []
+        for frame in self.hand.frames(self.grasp.outer_rotation):
+            off = (ends - frame.joint) @ frame.across
+            cut = (off[:, 0] < 0.0) != (off[:, 1] < 0.0)
+            (p, q), (a, b) = off[cut].T, (ends[cut] - frame.joint).transpose(1, 0, 2)
+            points = (p[:, None] * b - q[:, None] * a) / (p - q)[:, None]
+            found.append(float(np.linalg.norm(points, axis=1).min(initial=math.inf)))
+        return tuple(found)
 
     def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
         """Return the limits of a nail's force, toward its finger's base and into the rock."""

@@ -45,6 +45,11 @@ class Hold(ABC):
     """Of that data, if it may be large."""
 
     @property
+    def border(self) -> Array:
+        """Edges where what is known of the rock ends, shape (n, 2, 3), in the hold's frame [m]."""
+        return np.zeros((0, 2, 3))
+
+    @property
     def oddities(self) -> tuple[str, ...]:
         """What is odd about that data, which is used all the same; each begins with its field."""
         return ()

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
+from hand_models.rock.borders import borders
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.outlined import OutlinedHold
 from hand_models.rock.triangle_cells import TriangleCells
@@ -86,6 +87,8 @@ class Mesh(OutlinedHold):
         As they are used.
     nbytes : int
         Of these.
+    border : ndarray, shape (n, 2, 3)
+        Edges of only one triangle, but for holes that are bridged [m].
     oddities : tuple of str
         Vertices without numbers that no triangle names, and what looks like cells of a grid that
         had no height (`filled_cells`).
@@ -117,6 +120,10 @@ class Mesh(OutlinedHold):
         self.nbytes = sum(part.nbytes for part in self.triangles)
         if not anywhere:
             self.check_place()
+
+    @cached_property
+    def border(self) -> Array:
+        return borders(self.triangles, self._scale.bridged_gap)
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:

@@ -312,6 +312,12 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
         by_finger = holding[count * h : count * (h + 1)]
         if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
             found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
+        end, reach = min(hand.rock_ends), hand.hand.finger.reach
+        if end < reach:
+            found.append(
+                f"{place.limb}: its rock ends {end:.2g} m from the base of a finger, which reaches "
+                f"{reach:.2g} m; the plan may depend on rock that is not given"
+            )
     first = {id(place.hold): i for i, place in reversed([*enumerate(stance.hands)])}
     for i in sorted(first.values()):
         found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
