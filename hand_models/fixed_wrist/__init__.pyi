@@ -1,3 +1,10 @@
+from .hold_trials import (
+    WAYS as WAYS,
+    FoundHold as FoundHold,
+    Trial as Trial,
+    grid_of_trials as grid_of_trials,
+    try_holds as try_holds,
+)
 from .placing import UP as UP, approach_frame as approach_frame, place as place
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,

@@ -1,5 +1,5 @@
 from .meshing import mesh_scan as mesh_scan
-from .pictures import plot_rock as plot_rock
+from .pictures import plot_holds as plot_holds, plot_rock as plot_rock
 from .reading import ENDINGS as ENDINGS, read_scan as read_scan
 from .rock import Hole as Hole, ScannedRock as ScannedRock, write_rock as write_rock
 from .scan import UNITS as UNITS, UPS as UPS, Scan as Scan, Unit as Unit, Up as Up

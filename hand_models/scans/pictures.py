@@ -6,15 +6,17 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
+from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
-__all__ = ["plot_rock"]
+__all__ = ["plot_holds", "plot_rock"]
 
 LIGHT: Final = np.array([0.5, -0.5, -0.7]) / np.linalg.norm([0.5, -0.5, -0.7])
 """Toward the light, in the rock's frame."""
@@ -40,32 +42,8 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     """
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     axes = figure.add_subplot()
-    corners = rock.vertices[rock.faces]
-    heights = -1e3 * corners[:, :, 2].mean(axis=1)
-    scale = Normalize(*np.percentile(heights, [0.5, 99.5]))
-    colours = ScalarMappable(scale, COLOURS)
-    painted = np.array(colours.to_rgba(heights))
-    painted[:, :3] *= _brightness(corners)[:, None]
-    axes.add_collection(
-        PolyCollection(
-            list(corners[:, :, [1, 0]]),
-            facecolors=painted,
-            edgecolors="face",
-            linewidths=0.2,
-            rasterized=True,
-        ),
-        autolim=False,
-    )
-    low, high = rock.vertices.min(axis=0), rock.vertices.max(axis=0)
-    margin = 0.03 * (high - low)[:2].max()
-    axes.set(
-        xlim=(low[1] - margin, high[1] + margin),
-        ylim=(low[0] - margin, high[0] + margin),
-        aspect="equal",
-        xlabel="y of the rock's frame [m]",
-        ylabel="x of the rock's frame [m]",
-        title=title,
-    )
+    colours = _paint(axes, rock.vertices, rock.faces, COLOURS)
+    axes.set_title(title)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
     for hole in rock.holes[:NAMED]:
         axes.annotate(
@@ -79,6 +57,75 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     axes.legend(loc="upper right")
     figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
     figure.savefig(path, dpi=150)
+
+
+def plot_holds(
+    rock: Triangles, points: Array, values: Array, refused: Array, path: Path, title: str
+) -> None:
+    """Draw rock, and on it how much a hand holds at points.
+
+    Parameters
+    ----------
+    rock : Triangles
+    points : ndarray, shape (n, 3)
+        In the rock's frame [m].
+    values : ndarray, shape (n,)
+        [N]
+    refused : ndarray, shape (m, 3)
+        Points where no hand can be, or where it holds nothing [m].
+    path : Path
+    title : str
+    """
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    axes = figure.add_subplot()
+    _paint(axes, *rock, "gray")
+    axes.set_title(title)
+    shown = axes.scatter(
+        points[:, 1],
+        points[:, 0],
+        c=values,
+        s=36,
+        cmap="plasma",
+        edgecolors="white",
+        linewidths=0.5,
+    )
+    if len(refused):
+        axes.plot(
+            refused[:, 1], refused[:, 0], "x", color="tab:cyan", markersize=5, label="no hold"
+        )
+        axes.legend(loc="upper right")
+    figure.colorbar(shown, ax=axes, shrink=0.7, label="largest pull-off of any hand there [N]")
+    figure.savefig(path, dpi=150)
+
+
+def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarMappable:
+    """Draw triangles as the scanner saw them, and return what their colours mean: heights [mm]."""
+    corners = vertices[faces]
+    heights = -1e3 * corners[:, :, 2].mean(axis=1)
+    scale = Normalize(*np.percentile(heights, [0.5, 99.5]))
+    colours = ScalarMappable(scale, palette)
+    painted = np.array(colours.to_rgba(heights))
+    painted[:, :3] *= _brightness(corners)[:, None]
+    axes.add_collection(
+        PolyCollection(
+            list(corners[:, :, [1, 0]]),
+            facecolors=painted,
+            edgecolors="face",
+            linewidths=0.2,
+            rasterized=True,
+        ),
+        autolim=False,
+    )
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    margin = 0.03 * (high - low)[:2].max()
+    axes.set(
+        xlim=(low[1] - margin, high[1] + margin),
+        ylim=(low[0] - margin, high[0] + margin),
+        aspect="equal",
+        xlabel="y of the rock's frame [m]",
+        ylabel="x of the rock's frame [m]",
+    )
+    return colours
 
 
 def _brightness(corners: Array) -> Array:

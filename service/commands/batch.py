@@ -17,7 +17,6 @@ import msgspec
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from service.commands.options import hand_option, json_option, robot_option
-from service.commands.tables import console, table_of
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -30,6 +29,7 @@ from service.commands.terminal import (
 )
 from service.processes import Answered, Planners, worth
 from service.replies import ErrorDetail, Time
+from service.tables import console, table_of
 from service.wire import REQUEST_KINDS
 
 if TYPE_CHECKING:

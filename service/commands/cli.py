@@ -19,6 +19,7 @@ from hand_models import studies
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable, own_hand
 from service.commands.batch import batch
+from service.commands.holds import holds
 from service.commands.network import demo, query, serve
 from service.commands.options import (
     asked,
@@ -33,7 +34,6 @@ from service.commands.spaces import body_space, wrench_space
 from service.commands.stances import read_request, read_route
 from service.commands.stream import stream
 from service.commands.studies import chosen_study, print_study, sweep_options
-from service.commands.tables import console, print_plan
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -49,6 +49,7 @@ from service.commands.terminal import (
 )
 from service.replies import PlanReply
 from service.requests import PlanRequest, Want
+from service.tables import console, print_plan
 from service.wire import REQUEST_KINDS, schema as message_schema
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def route(
     from planner.route import evaluate
     from service import answering
     from service.answering import robots_of
-    from service.commands.route_table import print_route
+    from service.tables import print_route
 
     climb = answering.route(asked(read_route(route), hand, robot), robots_of(robot))
     with progress(f"planning {climb.name}") as tell:
@@ -245,7 +246,7 @@ def schema(as_json: bool) -> None:
     click.echo(text if as_json else msgspec.json.format(text))
 
 
-for command in (batch, stream, rock, wrench_space, body_space, serve, query, demo):
+for command in (batch, stream, rock, holds, wrench_space, body_space, serve, query, demo):
     crux.add_command(command)
 
 

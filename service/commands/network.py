@@ -23,7 +23,6 @@ from service.commands.options import (
     with_extras,
 )
 from service.commands.stances import read_request
-from service.commands.tables import console
 from service.commands.terminal import draw_plan, note, say, show
 from service.serving import (
     CruxClient,
@@ -33,6 +32,7 @@ from service.serving import (
     zenoh_config,
     zenoh_options,
 )
+from service.tables import console
 from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import scan_table
 from hand_models.scans import ENDINGS, UNITS, UPS
 from service.commands.options import json_option, plot_option
-from service.commands.tables import console, table_of
 from service.commands.terminal import progress, say, writing
+from service.tables import console, table_of
 
 if TYPE_CHECKING:
     from hand_models.scans import ScannedRock

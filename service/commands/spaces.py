@@ -9,7 +9,6 @@ import click
 import msgspec
 
 from hand_models.parameters import ParameterTable
-from service.commands.body_space_table import print_body_space
 from service.commands.options import (
     asked,
     hand_option,
@@ -19,7 +18,6 @@ from service.commands.options import (
     robot_option,
 )
 from service.commands.stances import read_request
-from service.commands.tables import console, print_wrench_space
 from service.commands.terminal import (
     DONE,
     EXIT_STATUS,
@@ -32,6 +30,7 @@ from service.commands.terminal import (
 )
 from service.replies import RobustCapability
 from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest
+from service.tables import console, print_body_space, print_wrench_space
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -69,7 +68,8 @@ def wrench_space(
     from planner.capability import survey
     from service import answering
     from service.answering import robots_of
-    from service.commands.surveys import print_robust, print_survey, survey_json
+    from service.commands.surveys import print_survey, survey_json
+    from service.tables import print_robust
 
     limb, hand = limb_and_hand
     robots = robots_of(robot)

@@ -15,7 +15,7 @@ from hand_models.base import InvalidInputError
 from hand_models.experiments import Claim, StudyResult
 from hand_models.studies import Study, load_study
 from hand_models.tile import surface_names
-from service.commands.tables import table_of
+from service.tables import table_of
 
 __all__ = ["chosen_study", "print_study", "sweep_options"]
 

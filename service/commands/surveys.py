@@ -13,10 +13,10 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
 from planner.capability import Survey
-from service.commands.tables import table_of
-from service.replies import AXES, RobustCapability
+from service.replies import AXES
+from service.tables import table_of
 
-__all__ = ["print_robust", "print_survey", "survey_json"]
+__all__ = ["print_survey", "survey_json"]
 
 DRAGGED: Final = "a tile dragged backwards"
 """What ends the way where no limit does: a part that can only push or only pull is about to do the
@@ -122,25 +122,3 @@ def _place(row: Row) -> tuple[str | None, str]:
     if row.finger is None:
         return None, row.limit.replace("_", " ")
     return row.finger, row.phalanx or WHOLE
-
-
-def print_robust(robust: RobustCapability, out: Console) -> None:
-    """Print what is left of each component where the hand is a little elsewhere."""
-    table = table_of("axis")
-    for name in ("worst least", "worst most", "9 in 10 least", "9 in 10 most"):
-        table.add_column(name, justify="right")
-    for axis in AXES:
-        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
-        cells = [
-            "-" if end is None else f"{sign * end:z.2f}"
-            for pair in ends
-            for sign, end in zip((-1.0, 1.0), pair, strict=True)
-        ]
-        table.add_row(f"{axis} {'N' if axis.startswith('f') else 'N·m'}", *cells)
-    out.print(
-        f"\n[bold]what is left of that at {robust.draws - robust.without} of {robust.draws} places "
-        f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad[/bold]"
-    )
-    out.print(table)
-    if robust.without:
-        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing")

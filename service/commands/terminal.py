@@ -11,9 +11,9 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError
-from service.commands.tables import console, print_plan
 from service.replies import PlanReply
 from service.requests import PlanRequest
+from service.tables import console, print_plan
 
 if TYPE_CHECKING:
     from service.answering import Planned

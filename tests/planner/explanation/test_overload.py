@@ -19,9 +19,9 @@ from planner.robots import robosimian
 from planner.solving import plan
 from service.answering import questions
 from service.answering.answers import plan_reply
-from service.commands.tables import print_plan
 from service.replies import Certificate, PlanReply
 from service.requests import PlanRequest
+from service.tables import print_plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.named_rows import distance, have_loads, miss, most_given, named_rows
 from tests.suite.helpers.random_questions import explained, few_and_all

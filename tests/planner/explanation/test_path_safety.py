@@ -15,7 +15,7 @@ from planner.question import Limits, Question
 from planner.result import LimitName, Plan, TensionPath
 from planner.solving import plan
 from service.answering.answers import plan_reply
-from service.commands.tables import print_plan
+from service.tables import print_plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import ask, on_wall, random_question
 from tests.suite.helpers.stances_with_joints import random_question_with_joints

@@ -19,8 +19,8 @@ from service import answering
 from service.answering import dispatch
 from service.commands.cli import crux, run
 from service.commands.stances import bundled
-from service.commands.tables import print_plan
 from service.requests import PlanRequest
+from service.tables import print_plan
 from service.wire import decode_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import (

@@ -10,8 +10,8 @@ from rich.markup import escape
 
 from planner.capability import COMPONENTS
 from service import replies
-from service.commands.tables import table_of
 from service.replies import BodySpaceReply
+from service.tables.plans import table_of
 
 __all__ = ["print_body_space"]
 

@@ -1,0 +1,204 @@
+"""Where on a scan a hand can hold, and how much: many places, each with its hand closed there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from hand_models.base import Array, EmptySetError, InvalidInputError, Pose
+from hand_models.fixed_wrist.placing import UP, approach_frame
+from hand_models.fixed_wrist.seat_scatter import robustness
+from hand_models.fixed_wrist.seat_search import BEST, best_seats
+from hand_models.fixed_wrist.space import wrench_spaces
+from hand_models.hand import Grasp, Placement, SettledHand, SpinyHand
+from hand_models.rock import Mesh
+from hand_models.tile import Surface
+
+__all__ = ["WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+
+WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
+"""Wrenches on the rock, in H: the pull-off, and shear to all sides; and their axes."""
+
+DIRECTIONS: Final = np.array(
+    [np.eye(6)[axis] * (1.0 if way[0] == "+" else -1.0) for way, axis in WAYS.items()]
+)
+
+
+GRAZING: Final = 0.1
+"""Least cosine of the angle between an approach and z of the rock's frame."""
+
+
+class Trial(NamedTuple):
+    """A hand that may be at a point of a rock; all in the rock's frame.
+
+    Attributes
+    ----------
+    point, approach : tuple of float
+        On the rock [m], and into it.
+    wrist_angle, outer_rotation : float
+        As of `approach_frame` and `Grasp` [rad].
+    """
+
+    point: tuple[float, float, float]
+    approach: tuple[float, float, float]
+    wrist_angle: float
+    outer_rotation: float
+
+
+class FoundHold(NamedTuple):
+    """What a hand can hold at a place.
+
+    Attributes
+    ----------
+    pose : Pose
+        H in the rock's frame.
+    rule : str
+    backed_off : float
+        Of its seating; [m].
+    support : ndarray, shape (5,)
+        How far it reaches in each of `WAYS`, with whatever else [N]; NaN if it holds nothing.
+    pure : float
+        How far in the pull-off with every other component zero [N]; NaN if nowhere.
+    worst, tenth : ndarray, shape (5,), or None
+        As of `Robustness`.
+    """
+
+    pose: Pose
+    rule: str
+    backed_off: float
+    support: Array
+    pure: float
+    worst: Array | None = None
+    tenth: Array | None = None
+
+
+def grid_of_trials(
+    rock: Mesh,
+    spacing: float,
+    angles: int,
+    rotations: Sequence[float] = (0.0,),
+    approach: tuple[float, float, float] | None = None,
+    *,
+    radius: float,
+) -> list[Trial]:
+    """Return places on a grid across z of a rock's frame.
+
+    Parameters
+    ----------
+    rock : Mesh
+    spacing : float
+        Of the grid [m].
+    angles : int
+        Of the wrist, evenly over a whole turn.
+    rotations : sequence of float, optional
+        Of the outer fingers [rad].
+    approach : tuple of float, optional
+        Of all hands; by default against the mean normal of the rock within the radius.
+    radius : float
+        About a point [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is impossible.
+    """
+    if not 1e-3 <= spacing < math.inf:
+        raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
+    if angles < 1:
+        raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")
+    vertices, faces = rock.triangles
+    normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
+    tree = cKDTree(vertices)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    # in the middle of what is left over
+    sides = [
+        a + 0.5 * ((b - a) % spacing) + spacing * np.arange(math.floor((b - a) / spacing) + 1)
+        for a, b in zip(low[:2], high[:2], strict=True)
+    ]
+    found: list[Trial] = []
+    for x, y in np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist():
+        above = float(low[2]) - spacing
+        depth = rock.entry((x, y, above), (0.0, 0.0, 1.0))
+        if not math.isfinite(depth):
+            continue
+        point = x, y, above + depth
+        toward = approach
+        if toward is None:
+            near = tree.query_ball_point(point, radius)
+            mean = -normals[near].sum(axis=0) if near else np.zeros(3)
+            # rock that the scanner hardly saw
+            if mean[2] <= GRAZING * np.linalg.norm(mean):
+                continue
+            x_in, y_in, z_in = (mean / np.linalg.norm(mean)).tolist()
+            toward = x_in, y_in, z_in
+        found += [
+            Trial(point, toward, math.tau * k / angles, rotation)
+            for k in range(angles)
+            for rotation in rotations
+        ]
+    return found
+
+
+def try_holds(
+    hand: SpinyHand,
+    rock: Mesh,
+    surface: Surface,
+    trials: Sequence[Trial],
+    seat: str = "rest",
+    *,
+    robust: bool = False,
+) -> list[FoundHold | InvalidInputError]:
+    """Close hands at places, all at once, and tell what they hold.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+    rock : Mesh
+    surface : Surface
+    trials : sequence of Trial
+    seat : {'rest', 'best'}, optional
+    robust : bool, optional
+        Whether also what is left of it over a scatter of each place.
+
+    Returns
+    -------
+    list of FoundHold or InvalidInputError
+        In order; why a hand cannot be there in place of one that cannot.
+    """
+    placements = [
+        Placement(
+            rock,
+            surface,
+            Grasp(each.outer_rotation),
+            None,
+            approach_frame(each.point, each.approach, each.wrist_angle, UP),
+        )
+        for each in trials
+    ]
+    outcomes = best_seats(hand, placements) if seat == BEST else hand.settle_each(placements)
+    spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
+    found: list[FoundHold | InvalidInputError] = []
+    for outcome in outcomes:
+        if isinstance(outcome, InvalidInputError):
+            found.append(outcome)
+            continue
+        space = next(spaces)
+        support, pure = np.full(len(WAYS), math.nan), math.nan
+        try:
+            support = np.array([space.support(way) for way in DIRECTIONS])
+            ends = space.capability(DIRECTIONS[0])
+            pure = math.nan if ends is None else ends[1]
+        except EmptySetError:
+            pass
+        seating = outcome.seating
+        made = FoundHold(seating.pose.inverse(), seating.rule, seating.backed_off, support, pure)
+        if robust:
+            left = robustness(hand, outcome, DIRECTIONS)
+            made = made._replace(worst=left.worst, tenth=left.tenth)
+        found.append(made)
+    return found

@@ -1,0 +1,250 @@
+"""Holds on a scan: a hand tried all over a rock, and what it holds where."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import click
+import msgspec
+import numpy as np
+from rich.console import Console
+
+from hand_models.base import InvalidInputError
+from hand_models.parameters import ParameterTable
+from service.commands.options import hand_option, json_option, plot_option
+from service.commands.terminal import progress, say, writing
+from service.tables import console, table_of
+
+if TYPE_CHECKING:
+    from hand_models.fixed_wrist import FoundHold, Trial
+
+    Pair = tuple[Trial, FoundHold]
+
+__all__ = ["holds"]
+
+SHOWN: Final = 10
+"""Holds that are printed."""
+
+REASONS: Final = 3
+"""Reasons that are printed why hands cannot be at places."""
+
+OUTPUT: Final = ".json"
+
+
+def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
+    if path.suffix.lower() != OUTPUT:
+        raise click.BadParameter(f"{path}: must end in {OUTPUT}")
+    if not path.parent.is_dir():
+        raise click.BadParameter(f"{path}: no such folder")
+    return path
+
+
+@click.command()
+@click.argument("rock", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    callback=_check_output,
+    metavar="JSON",
+    help="Where the holds go, the best first.",
+)
+@click.option(
+    "--spacing",
+    type=float,
+    default=0.05,
+    show_default=True,
+    help="Of the grid of points across z of the rock's frame [m].",
+)
+@click.option(
+    "--angles",
+    type=click.IntRange(1, 360),
+    default=4,
+    show_default=True,
+    help="Angles of the wrist at each point, evenly over a whole turn.",
+)
+@click.option(
+    "--outer-rotation",
+    "rotations",
+    type=click.FloatRange(0.0, math.pi + 1e-6),
+    multiple=True,
+    default=(0.0, math.pi),
+    show_default="0 and π",
+    metavar="RAD",
+    help="Of the outer fingers; may be given more than once, and each is tried.",
+)
+@click.option("--surface", default="rock", show_default=True, help="A preset's name.")
+@click.option(
+    "--seat",
+    type=click.Choice(["rest", "best"]),
+    default="rest",
+    show_default=True,
+    help="How a hand is seated at a point; best takes some forty times as long.",
+)
+@click.option(
+    "--robust",
+    type=click.IntRange(0),
+    default=SHOWN,
+    show_default=True,
+    metavar="N",
+    help="Of the best N tell also what is left where the hand is a little elsewhere.",
+)
+@click.option("--workers", type=click.IntRange(1), help="Processes; by default one a core.")
+@hand_option
+@plot_option("Draw the rock there, and on it the largest pull-off at each point.")
+@json_option
+def holds(
+    rock: Path,
+    output: Path,
+    spacing: float,
+    angles: int,
+    rotations: tuple[float, ...],
+    surface: str,
+    seat: Literal["rest", "best"],
+    robust: int,
+    workers: int | None,
+    hand: ParameterTable | None,
+    picture: Path | None,
+    as_json: bool,
+) -> None:
+    """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
+
+    A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
+    the mean normal of the rock under its palm. Holds are sorted by how far they reach in the
+    pull-off. Each has a `place` for a request's hand whose hold is this rock.
+    """
+    from hand_models.fixed_wrist import grid_of_trials
+    from hand_models.parameters import hand_table, own_hand
+    from hand_models.rock import Mesh, read_mesh
+    from hand_models.tile import Surface
+    from service.processes import RockTrials, try_everywhere
+
+    Surface.named(surface)
+    numbers = hand_table() if hand is None else own_hand(hand)
+    mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
+    radius = 0.5 * numbers.scalar("palm", "length")
+    trials = grid_of_trials(mesh, spacing, angles, rotations, radius=radius)
+    if not trials:
+        raise InvalidInputError("no point of the grid is on the rock", field="--spacing")
+    how = RockTrials(mesh, surface, seat, hand=numbers)
+    with progress(f"trying {len(trials):,} places") as tell:
+        outcomes = try_everywhere(how, trials, tell, workers)
+    found = _sorted(trials, outcomes)
+    best = [trial for trial, _ in found[:robust]]
+    if best:
+        with progress(f"scattering the best {len(best)}") as tell:
+            again = try_everywhere(how._replace(robust=True), best, tell, workers)
+        found[:robust] = _sorted(best, again)
+    refused = Counter(_reason(each) for each in outcomes if isinstance(each, InvalidInputError))
+    result = {
+        "v": 1,
+        "rock": str(rock),
+        "trials": len(trials),
+        "refused": refused.total(),
+        "holds": [_entry(trial, each) for trial, each in found],
+    }
+    try:
+        output.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {output}", field="--output") from None
+    if picture is not None:
+        _draw(mesh, trials, found, picture, rock.name)
+    if as_json:
+        say({**result, "holds": len(found), "file": str(output)})
+    else:
+        _print(trials, found, refused, output, console())
+
+
+def _sorted(trials: list[Trial], outcomes: list[FoundHold | InvalidInputError]) -> list[Pair]:
+    """Return the trials whose hands hold something, the largest pull-off first."""
+    pairs = [
+        (trial, each)
+        for trial, each in zip(trials, outcomes, strict=True)
+        if not isinstance(each, InvalidInputError) and math.isfinite(each.support[0])
+    ]
+    return sorted(pairs, key=lambda pair: -pair[1].support[0])
+
+
+def _reason(error: InvalidInputError) -> str:
+    """Return why a hand cannot be, without its numbers."""
+    words = str(error).split(":")[-1] if error.field is None else error.message
+    return " ".join("…" if any(map(str.isdigit, word)) else word for word in words.split())
+
+
+def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:
+    """Return a hold as JSON has it."""
+    from hand_models.fixed_wrist import WAYS
+
+    def by_way(values: np.ndarray | None) -> dict[str, float | None] | None:
+        if values is None:
+            return None
+        return {
+            way: value if math.isfinite(value) else None
+            for way, value in zip(WAYS, values.tolist(), strict=True)
+        }
+
+    return {
+        "place": {
+            "point": trial.point,
+            "approach": trial.approach,
+            "wrist_angle": trial.wrist_angle,
+            "frame": "rock",
+        },
+        "grasp": {"outer_rotation": trial.outer_rotation},
+        "pose": {
+            "position": found.pose.position.tolist(),
+            "orientation": found.pose.quaternion().tolist(),
+        },
+        "seating": {"rule": found.rule, "backed_off": found.backed_off},
+        "support": by_way(found.support),
+        "pure_pull_off": found.pure if math.isfinite(found.pure) else None,
+        "worst": by_way(found.worst),
+        "tenth": by_way(found.tenth),
+    }
+
+
+def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: str) -> None:
+    from hand_models.scans import plot_holds
+
+    most: dict[tuple[float, float, float], float] = {}
+    for trial, each in found:
+        most.setdefault(trial.point, each.support[0])
+    none = np.array(
+        [point for point in dict.fromkeys(t.point for t in trials) if point not in most]
+    )
+    points, values = np.array(list(most)).reshape(-1, 3), np.array(list(most.values()))
+    with writing(path):
+        plot_holds(mesh.triangles, points, values, none.reshape(-1, 3), path, f"holds on {name}")
+
+
+def _print(
+    trials: list[Trial], found: list[Pair], refused: Counter[str], output: Path, out: Console
+) -> None:
+    """Print the best holds, and why hands cannot be at other places."""
+    table = table_of("x, y, z [mm]")
+    for title in ("wrist °", "outer °", "pull-off N", "alone", "least shear N", "9 in 10", "worst"):
+        table.add_column(title, justify="right")
+    for trial, each in found[:SHOWN]:
+        left = [
+            "-" if values is None or not math.isfinite(values[0]) else f"{values[0]:.1f}"
+            for values in (each.tenth, each.worst)
+        ]
+        table.add_row(
+            ", ".join(f"{1e3 * value:.0f}" for value in trial.point),
+            f"{math.degrees(trial.wrist_angle):.0f}",
+            f"{math.degrees(trial.outer_rotation):.0f}",
+            f"{each.support[0]:.1f}",
+            f"{each.pure:.1f}" if math.isfinite(each.pure) else "-",
+            f"{each.support[1:].min():.1f}",
+            *left,
+        )
+    out.print(table)
+    points = len({trial.point for trial in trials})
+    out.print(f"{len(trials):,} trials at {points:,} points: {len(found):,} hold something")
+    for reason, count in refused.most_common(REASONS):
+        out.print(f"{count:,} refused: {reason}", markup=False)
+    out.print(str(output), markup=False, soft_wrap=True)

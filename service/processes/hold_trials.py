@@ -1,0 +1,94 @@
+"""Hands tried at many places of one rock, in processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from functools import partial
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+from hand_models.base import InvalidInputError
+from hand_models.parameters import ParameterTable
+from service.processes.workers import Lost, Workers, cores
+
+if TYPE_CHECKING:
+    from hand_models.fixed_wrist import FoundHold, Trial
+    from hand_models.rock import Mesh
+
+__all__ = ["RockTrials", "try_everywhere"]
+
+TOGETHER: Final = 8
+"""Trials that are closed in one batch."""
+
+Found = list["FoundHold | InvalidInputError"]
+
+
+class RockTrials(NamedTuple):
+    """How hands are tried on a rock.
+
+    Attributes
+    ----------
+    rock : Mesh
+    surface : str
+        A preset's name.
+    seat : {'rest', 'best'}
+    robust : bool
+        As of `hand_models.fixed_wrist.try_holds`.
+    hand : ParameterTable or None
+        The hand; the bundled one if None.
+    """
+
+    rock: Mesh
+    surface: str
+    seat: Literal["rest", "best"] = "rest"
+    robust: bool = False
+    hand: ParameterTable | None = None
+
+    def trying(self) -> Callable[[Sequence[Trial]], Found]:
+        """Return what tries a few places; called once in each process."""
+        from hand_models.fixed_wrist import try_holds
+        from hand_models.hand import spiny_hand
+        from hand_models.tile import Surface
+
+        hand, surface = spiny_hand(self.hand), Surface.named(self.surface)
+        return partial(try_holds, hand, self.rock, surface, seat=self.seat, robust=self.robust)
+
+
+def try_everywhere(
+    how: RockTrials,
+    trials: Sequence[Trial],
+    tell: Callable[[int, int], None],
+    workers: int | None = None,
+) -> Found:
+    """Try all places, on all cores unless told otherwise.
+
+    Parameters
+    ----------
+    how : RockTrials
+    trials : sequence of Trial
+    tell : callable
+        Called with (places done, places in all).
+    workers : int, optional
+        Processes, this one among them.
+
+    Returns
+    -------
+    list of FoundHold or InvalidInputError
+        In order; an error in place of a hand that cannot be there, or whose process died.
+    """
+    # one that is searched for, or scattered, is many already
+    size = TOGETHER if how.seat == "rest" and not how.robust else 1
+    chunks = [list(trials[i : i + size]) for i in range(0, len(trials), size)]
+    found: list[Found] = [[] for _ in chunks]
+    count, done = cores() if workers is None else workers, 0
+    tell(0, len(trials))
+    here, processes = how.trying(), min(count, len(chunks)) - 1
+    with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
+        pairs = enumerate(map(here, chunks)) if others is None else others.each(chunks, here)
+        for i, results in pairs:
+            if isinstance(results, Lost):
+                results = [InvalidInputError(results.reason) for _ in chunks[i]]
+            found[i] = results
+            done += len(results)
+            tell(done, len(trials))
+    return [each for results in found for each in results]
