@@ -98,16 +98,18 @@ STIFF: Final = 10.0
 MOST_DAMPING: Final = 1e3
 """Of damping, in the same parts."""
 
+SLOW, PATIENCE = 0.1, 100
+"""After so many increments in a row with more than this part of the most damping there is no rest;
+those that come to rest had 28 at most on 2,000 rough surfaces."""
+
 DEEPEST: Final = 1.0 / 120.0
 """By how much more a phalanx may be in rock after an increment, in parts of its tile's length."""
 
 LIFTED: Final = 1.0 / 240.0
-"""How far a tile goes from where its spines were pulled off before they may catch again, in parts
-of its length."""
+"""How far, in parts of its length, a tile goes from where it was pulled off to catch again."""
 
 BALANCED: Final = 1e-8, 5e-7
-"""Torque left by damping at the end of the path, in the same parts: as a rule, and where a finger
-is long in coming to rest."""
+"""Torque left by damping at the end, in the same parts: as a rule, and where rest takes long."""
 
 SOFT: Final = 1e-11
 """Of contacts, so that those that coincide have forces [m/N]."""
@@ -148,19 +150,19 @@ class Path:
         """Follow the paths to the closing tension."""
         going = np.arange(len(self.rests))
         rock, drive, state, around = self._rock, self._drive, self.end, self.around
+        slow = np.zeros(len(going), dtype=np.intp)
         for step in range(MOST_STEPS):
             balanced = BALANCED[step > MOST_STEPS // 4]
             after, rests = self._increment(drive, state, around, balanced)
-            if rests.any():
+            slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)
+            ends = rests | (slow > PATIENCE)
+            if ends.any():
                 self.rests[going[rests]] = True
-                put(self.end, going[rests], take(after, rests))
-                put(self.around, going[rests], take(around, rests))
-                going, rock, drive = going[~rests], take(rock, ~rests), take(drive, ~rests)
-                state, after, around = (
-                    take(state, ~rests),
-                    take(after, ~rests),
-                    take(around, ~rests),
-                )
+                put(self.end, going[ends], take(after, ends))
+                put(self.around, going[ends], take(around, ends))
+                going, slow = going[~ends], slow[~ends]
+                rock, drive, around = take(rock, ~ends), take(drive, ~ends), take(around, ~ends)
+                state, after = take(state, ~ends), take(after, ~ends)
                 if not len(going):
                     return
             there = Around.of(rock, self._shape, drive, after.q)
@@ -234,9 +236,11 @@ class Path:
             balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
             frees = held & (stop * balance < -ROUNDING * drive.torque[:, None])
             there = state.q + part * turn[..., 0]
-            high = ~held & (there > drive.upper + RESTS)
-            low = ~held & (there < drive.lower - RESTS)
-            switches = (over > 0.0) | pushes | closes | grows | frees | high | low
+            high, low = there > drive.upper + RESTS, there < drive.lower - RESTS
+            high, low = ~held & high, ~held & low
+            # contacts that joints cannot bring to the rock, as others or stops are in the way
+            cannot = np.where(active & (mode == ON), SOFT * normals[..., 0] - gives, 0.0)
+            switches = (over > 0.0) | pushes | closes | grows | frees | high | low | (cannot > 0.0)
             settled = ~switches.any(axis=1)
             if settled.all():
                 break
@@ -244,6 +248,7 @@ class Path:
             one = largest(over)
             spines = np.where(one & caught, PULLED, spines).astype(np.int8)
             mode = np.where((one & ~caught) | (one & (mode == HELD)) | pushes, OFF, mode)
+            mode = np.where(largest(cannot), OFF, mode)
             one = largest(np.where(closes, -gap, np.where(grows, gap - least, 0.0)))
             mode = np.where(one, np.where(closes, ON, HELD), mode).astype(np.int8)
             spines = np.where(one & closes & (spines == LOST), CAUGHT, spines).astype(np.int8)
@@ -254,8 +259,8 @@ class Path:
         least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
         lost = (spines == PULLED) & (around.gap > least + LIFTED * self._length)
         spines = np.where(lost, LOST, spines).astype(np.int8)
-        curved = np.einsum("ni,nij,nj->n", move, damped, move) < 0.0
-        waits = (curved & (size > RESTS_DAMPED)) | ~settled
+        curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
+        waits = curved | ~settled
         waits &= state.damping < MOST_DAMPING * drive.torque
         turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
         turns_back &= (size > 100.0 * RESTS) & ~waits
@@ -289,6 +294,8 @@ class Path:
         rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
         rests &= state.damping * size < balanced * drive.torque
         s = state.s + more
+        first = (mode == ON) & np.isnan(state.touches)
+        touches = np.where(first, state.s[:, None], state.touches)
         after = State(
             q=state.q + np.where(rests[:, None], 0.0, step),
             s=np.where(np.abs(target - s) < ROUNDING, target, s),
@@ -298,9 +305,7 @@ class Path:
             been=(state.been | (mode == ON)) & (spines == CAUGHT),
             least=least,
             normals=normals,
-            touches=np.where(
-                (mode == ON) & np.isnan(state.touches), state.s[:, None], state.touches
-            ),
+            touches=touches,
             damping=np.where(waits | turns_back, tougher, damping),
             stride=stride,
             step=step,
@@ -372,21 +377,16 @@ class Path:
         too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
         too_far |= deeper.max(axis=1) > DEEPEST * self._length
         too_far &= moved > 2.0 * LEAST_STRIDE
-        exact = wrong < EXACT * drive.torque
-        stride = np.minimum(np.where(exact, 2.0, 1.3) * after.stride, MOST_STRIDE)
+        stride = np.where(wrong < EXACT * drive.torque, 2.0, 1.3) * after.stride
         # a damped increment that was as foreseen may be damped less
         falls = (wrong <= 0.05 * damped + ROUNDING * drive.torque) & (moved > 0.0)
         falls &= (after.s >= drive.end) & (after.damping <= state.damping)
-        floor = LEAST_DAMPING * drive.torque
-        good = after._replace(
-            stride=stride,
-            damping=np.where(falls, _falls(after.damping, floor), after.damping),
-        )
+        less = _falls(after.damping, LEAST_DAMPING * drive.torque)
+        damping = np.where(falls, less, after.damping)
+        good = after._replace(stride=np.minimum(stride, MOST_STRIDE), damping=damping)
         tougher = _grows(after.damping, 0.5 * DAMPING, drive)
-        back = state._replace(
-            stride=np.maximum(0.3 * moved, LEAST_STRIDE),
-            damping=np.where(after.s > state.s, after.damping, tougher),
-        )
+        damping = np.where(after.s > state.s, after.damping, tougher)
+        back = state._replace(stride=np.maximum(0.3 * moved, LEAST_STRIDE), damping=damping)
         return choose(too_far, back, good), choose(too_far, around, there)
 
 
