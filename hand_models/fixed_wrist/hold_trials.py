@@ -168,7 +168,8 @@ def try_holds(
     Returns
     -------
     list of FoundHold or InvalidInputError
-        In order; why a hand cannot be there in place of one that cannot.
+        In order; why a hand cannot be there in place of one that cannot. Where the scan ends within
+        a finger's reach that is one, too: the finger would take the scan's border for an edge.
     """
     placements = [
         Placement(
@@ -188,6 +189,11 @@ def try_holds(
             found.append(outcome)
             continue
         space = next(spaces)
+        if min(outcome.rock_ends) < hand.finger.reach:
+            found.append(
+                InvalidInputError("the scan ends within a finger's reach", field="place.point")
+            )
+            continue
         support, pure = np.full(len(WAYS), math.nan), math.nan
         try:
             support = np.array([space.support(way) for way in DIRECTIONS])

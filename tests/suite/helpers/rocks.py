@@ -202,3 +202,20 @@ def rough_wall(seed: int = 0, count: int = 90, spacing: float = 0.02) -> tuple[l
     depths = np.random.default_rng(seed).uniform(0.0, 2e-3, (count, count))
     vertices, faces = height_map(depths, spacing)
     return vertices.tolist(), faces.tolist()
+
+
+def fractal_wall(
+    seed: int, *, size: float = 0.7, count: int = 141, height: float = 0.006, hurst: float = 0.8
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a square wall of rough rock, by its spectrum.
+
+    ``size``: of its side [m]; ``count``: vertices along it; ``height``: its root mean square [m];
+    ``hurst``: the exponent by which steps grow with their length. Its middle is the origin.
+    """
+    rng = np.random.default_rng(seed)
+    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(count), np.fft.fftfreq(count)))
+    waves[0, 0] = 1.0
+    z = np.fft.ifft2(np.fft.fft2(rng.normal(size=(count, count))) * waves ** -(1.0 + hurst)).real
+    z *= height / z.std()
+    vertices, faces = height_map(z, size / (count - 1))
+    return vertices - vertices[(count * count) // 2], faces

@@ -1,0 +1,101 @@
+"""Holds that are proposed on a rock are those of hands that are placed there one by one."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hand_models import Grasp, InvalidInputError, place
+from hand_models.fixed_wrist import (
+    WAYS,
+    FoundHold,
+    Trial,
+    approach_frame,
+    grid_of_trials,
+    robustness,
+    try_holds,
+    wrench_space,
+)
+from hand_models.rock import Mesh
+from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.rocks import fractal_wall
+
+RADIUS = 0.055
+DIRECTIONS = {
+    "-fz": (2, -1.0),
+    "-fx": (0, -1.0),
+    "+fx": (0, 1.0),
+    "-fy": (1, -1.0),
+    "+fy": (1, 1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def wall():
+    return Mesh(*fractal_wall(3), anywhere=True)
+
+
+def test_a_grid_covers_the_rock_and_hands_come_against_its_normal(wall):
+    trials = grid_of_trials(wall, 0.2, 3, (0.0, 1.0), radius=RADIUS)
+    points = np.array([trial.point for trial in trials[::6]])
+    assert len(trials) == 6 * len(points) == 6 * 16
+    sides = np.unique(points[:, 0])
+    np.testing.assert_allclose(sides, [-0.3, -0.1, 0.1, 0.3], atol=1e-12)
+    angles = {(trial.wrist_angle, trial.outer_rotation) for trial in trials}
+    assert angles == {(k * math.tau / 3, r) for k in range(3) for r in (0.0, 1.0)}
+    for trial in trials[::6]:
+        toward = np.array(trial.approach)
+        assert np.linalg.norm(toward) == pytest.approx(1.0)
+        assert wall.entry(np.array(trial.point) - 0.05 * toward, toward) == pytest.approx(
+            0.05, abs=0.02
+        )
+        near = np.linalg.norm(wall.triangles.vertices - trial.point, axis=1) < RADIUS
+        # across the mean plane of what is under the palm
+        spread = np.linalg.svd(
+            wall.triangles.vertices[near] - wall.triangles.vertices[near].mean(axis=0)
+        )[2]
+        assert abs(spread[2] @ toward) > 0.97
+
+
+def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
+    trials = grid_of_trials(wall, 0.2, 1, radius=RADIUS)
+    found = try_holds(HAND, wall, ROCK, trials)
+    held = 0
+    for trial, each in zip(trials, found, strict=True):
+        if isinstance(each, InvalidInputError) or np.isnan(each.support).any():
+            continue
+        held += 1
+        hand = place(wall, trial.point, trial.approach, trial.wrist_angle, Grasp(), ROCK)
+        np.testing.assert_allclose(hand.seating.pose.inverse().position, each.pose.position)
+        space = wrench_space(hand)
+        for way, reach in zip(WAYS, each.support, strict=True):
+            axis, sign = DIRECTIONS[way]
+            assert space.support(sign * np.eye(6)[axis]) == pytest.approx(reach, rel=1e-9)
+    # where fingers point outward at the border they are too near it
+    assert 4 <= held < len(trials)
+
+
+def test_the_border_of_a_scan_is_no_edge_to_hold(wall):
+    (found,) = try_holds(HAND, wall, ROCK, [Trial((0.2, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0)])
+    assert isinstance(found, InvalidInputError)
+    assert "the scan ends" in str(found)
+
+
+def test_robust_is_that_of_the_hand(wall):
+    trial = Trial((0.1, 0.1, 0.0), (0.0, 0.0, 1.0), 0.3, 0.0)
+    (found,) = try_holds(HAND, wall, ROCK, [trial], robust=True)
+    assert isinstance(found, FoundHold)
+    at = approach_frame(trial.point, trial.approach, trial.wrist_angle)
+    hand = HAND.settle(wall, ROCK, Grasp(), at=at)
+    ways = [sign * np.eye(6)[axis] for axis, sign in DIRECTIONS.values()]
+    left = robustness(HAND, hand, ways)
+    np.testing.assert_allclose(found.worst, left.worst)
+    np.testing.assert_allclose(found.tenth, left.tenth)
+    assert (left.worst <= left.tenth + 1e-9).all()
+
+
+@pytest.mark.parametrize(("spacing", "angles", "field"), [(0.0, 1, "spacing"), (0.1, 0, "angles")])
+def test_grids_that_cannot_be_are_refused(wall, spacing, angles, field):
+    with pytest.raises(InvalidInputError) as caught:
+        grid_of_trials(wall, spacing, angles, radius=RADIUS)
+    assert caught.value.field == field
