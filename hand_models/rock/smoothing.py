@@ -37,6 +37,9 @@ STANDS_OUT: Final = 1e-5
 RAISES: Final = 4
 """How often a curve is raised at most; each time far less is left."""
 
+STRAIGHT: Final = 1e-7
+"""Sine of a turn that is none."""
+
 FEWEST: Final = 5
 """Points that a smoothed piece has at least."""
 
@@ -104,7 +107,7 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     ndarray, shape (m, 2), or None
         None if the polyline is debris.
     """
-    points = _distinct(points)
+    points = _corners(_distinct(points))
     lengths = np.hypot(*np.diff(points, axis=0).T)
     total = float(lengths.sum())
     if total < scale.bridged_gap:
@@ -188,6 +191,15 @@ def raw_outline(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None
 def _distinct(points: Array) -> Array:
     """Return a polyline without points that are as the one before."""
     return np.asarray(points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))])
+
+
+def _corners(points: Array) -> Array:
+    """Return a polyline without points at which it goes straight on, in however many parts."""
+    steps = np.diff(points, axis=0)
+    steps = steps / np.hypot(*steps.T)[:, None]
+    turns = np.abs(steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0])
+    onward = np.einsum("ni,ni->n", steps[:-1], steps[1:]) > 0.0
+    return np.asarray(points[np.concatenate([[True], (turns > STRAIGHT) | ~onward, [True]])])
 
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:

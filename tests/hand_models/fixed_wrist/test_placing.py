@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -20,8 +21,8 @@ from hand_models import (
 from hand_models.fixed_wrist import BEST, approach_frame
 from hand_models.hand import Placement
 from tests.suite.helpers.hands import HAND, ROCK
-from tests.suite.helpers.rocks import random_mesh, random_profile
-from tests.suite.helpers.shares import given_some
+from tests.suite.helpers.rocks import fractal_wall, random_mesh, random_profile
+from tests.suite.helpers.shares import given_some, some_and_all
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -119,3 +120,35 @@ def test_along_the_approach_the_point_may_be_anywhere_near(depth):
     on, off = (place(rock, k * depth * toward, toward, 0.1) for k in (0.0, 1.0))
     np.testing.assert_allclose(on.seating.pose.position, off.seating.pose.position, atol=1e-6)
     np.testing.assert_allclose(on.loads, off.loads, atol=1e-3)
+
+
+def cropped(vertices, faces, middle, half):
+    """Triangles of which every vertex is within a square about a point, across z."""
+    inside = (np.abs(vertices[:, :2] - middle[:2]) <= half).all(axis=1)
+    return vertices, faces[inside[faces].all(axis=1)]
+
+
+@some_and_all("seeds", range(12), 6)
+def test_rock_told_finer_or_with_less_around_it_is_the_same_rock(seeds):
+    vertices, faces = fractal_wall(5, size=1.6, count=201, height=0.01)
+    wall = Mesh(vertices, faces, anywhere=True)
+    finer = Mesh(*trimesh.remesh.subdivide(vertices, faces), anywhere=True)
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        x, y = rng.uniform(-0.1, 0.1, 2)
+        point = [x, y, wall.entry([x, y, -1.0], [0.0, 0.0, 1.0]) - 1.0]
+        at = approach_frame(point, [*rng.uniform(-0.1, 0.1, 2), 1.0], rng.uniform(0.0, math.tau))
+        rocks = [wall, finer]
+        rocks += [
+            Mesh(*cropped(vertices, faces, point, half), anywhere=True) for half in (0.35, 0.5)
+        ]
+        grasp = Grasp(math.pi * (seed % 2))
+        whole, fine, *less = HAND.settle_each(
+            [Placement(rock, ROCK, grasp, None, at) for rock in rocks]
+        )
+        if isinstance(whole, InvalidInputError):
+            assert {str(whole)} == {str(each) for each in (fine, *less)}
+            continue
+        np.testing.assert_allclose(fine.loads, whole.loads, atol=1e-6)
+        for each in less:
+            np.testing.assert_array_equal(each.loads, whole.loads)
