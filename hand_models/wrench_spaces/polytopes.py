@@ -184,7 +184,8 @@ def hull_facets(points: Array) -> tuple[Array, Array]:
 def _planes(points: Array, found: ConvexHull) -> Array:
     """Return the facets' equations of points of which a hull was found joggled.
 
-    Each by the points themselves; slivers, whose corners span no plane of their own, are left out.
+    Each by the points themselves; slivers, whose corners span no plane of their own or one that
+    cuts the hull, are left out.
     """
     corners = points[found.simplices]
     _, sizes, axes = np.linalg.svd(corners[:, 1:] - corners[:, :1])
@@ -194,4 +195,6 @@ def _planes(points: Array, found: ConvexHull) -> Array:
     normals[inside] *= -1.0
     offsets[inside] *= -1.0
     spans = sizes[:, -1] > SLIVER * sizes[:, 0]
+    beyond = np.max(normals @ points.T, axis=1) - offsets
+    spans &= beyond <= TOLERANCE * np.abs(points).max()
     return np.column_stack([normals, -offsets])[spans]
