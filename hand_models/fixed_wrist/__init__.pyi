@@ -5,7 +5,13 @@ from .hold_trials import (
     grid_of_trials as grid_of_trials,
     try_holds as try_holds,
 )
-from .placing import UP as UP, approach_frame as approach_frame, place as place
+from .placing import (
+    SEATS as SEATS,
+    UP as UP,
+    SeatRule as SeatRule,
+    approach_frame as approach_frame,
+    place as place,
+)
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,
     KEPT as KEPT,

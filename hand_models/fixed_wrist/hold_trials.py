@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import trimesh
-from scipy.spatial import cKDTree
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, Pose
+from hand_models.finger import NONE
 from hand_models.fixed_wrist.placing import UP, approach_frame
 from hand_models.fixed_wrist.seat_scatter import robustness
 from hand_models.fixed_wrist.seat_search import BEST, best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
-from hand_models.hand import Grasp, Placement, SettledHand, SpinyHand
+from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
@@ -29,8 +28,11 @@ DIRECTIONS: Final = np.array(
 )
 
 
-GRAZING: Final = 0.1
-"""Least cosine of the angle between an approach and z of the rock's frame."""
+INTO: Final = (0.0, 0.0, 1.0)
+"""z of a rock\'s frame."""
+
+RAYS: Final = 5
+"""Along each side of the square in which the plane of the rock about a point is found."""
 
 
 class Trial(NamedTuple):
@@ -98,9 +100,9 @@ def grid_of_trials(
     rotations : sequence of float, optional
         Of the outer fingers [rad].
     approach : tuple of float, optional
-        Of all hands; by default against the mean normal of the rock within the radius.
+        Of all hands; by default across the mean plane of the rock about the point.
     radius : float
-        About a point [m].
+        Half the side of the square about a point in which that is found [m].
 
     Raises
     ------
@@ -109,12 +111,13 @@ def grid_of_trials(
     """
     if not 1e-3 <= spacing < math.inf:
         raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
+    if not (0.0 < radius < math.inf):
+        raise InvalidInputError(f"must be above 0 m, got {radius:g}", field="radius")
     if angles < 1:
         raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")
-    vertices, faces = rock.triangles
-    normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
-    tree = cKDTree(vertices)
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = (end(rock.triangles.vertices, axis=0) for end in (np.min, np.max))
+    above = float(low[2]) - spacing
+    beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, RAYS)] * 2), axis=-1)
     # in the middle of what is left over
     sides = [
         a + 0.5 * ((b - a) % spacing) + spacing * np.arange(math.floor((b - a) / spacing) + 1)
@@ -122,26 +125,36 @@ def grid_of_trials(
     ]
     found: list[Trial] = []
     for x, y in np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist():
-        above = float(low[2]) - spacing
-        depth = rock.entry((x, y, above), (0.0, 0.0, 1.0))
+        depth = rock.entry((x, y, above), INTO)
         if not math.isfinite(depth):
             continue
         point = x, y, above + depth
         toward = approach
         if toward is None:
-            near = tree.query_ball_point(point, radius)
-            mean = -normals[near].sum(axis=0) if near else np.zeros(3)
-            # rock that the scanner hardly saw
-            if mean[2] <= GRAZING * np.linalg.norm(mean):
-                continue
-            x_in, y_in, z_in = (mean / np.linalg.norm(mean)).tolist()
-            toward = x_in, y_in, z_in
+            around = beside.reshape(-1, 2) + np.array([x, y])
+            depths = np.array([rock.entry((*each, above), INTO) for each in around.tolist()])
+            met = np.isfinite(depths)
+            plane = np.column_stack([around[met], np.ones(met.sum())])
+            slope = np.linalg.lstsq(plane, depths[met])[0]
+            size = math.hypot(slope[0], slope[1], 1.0)
+            toward = -float(slope[0]) / size, -float(slope[1]) / size, 1.0 / size
         found += [
             Trial(point, toward, math.tau * k / angles, rotation)
             for k in range(angles)
             for rotation in rotations
         ]
     return found
+
+
+def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
+    """Whether a scan ends within a finger's reach, or has no rock at all for one."""
+    if min(settled.rock_ends) < hand.finger.reach:
+        return True
+    off = (settled.postures.kinds == NONE).all(axis=1)
+    at = settled.hold, settled.grasp, settled.seating.pose
+    return bool(len(settled.hold.border)) and any(
+        hand.section(name, *at) is None for name in np.array(FINGERS)[off].tolist()
+    )
 
 
 def try_holds(
@@ -189,7 +202,7 @@ def try_holds(
             found.append(outcome)
             continue
         space = next(spaces)
-        if min(outcome.rock_ends) < hand.finger.reach:
+        if _at_border(hand, outcome):
             found.append(
                 InvalidInputError("the scan ends within a finger's reach", field="place.point")
             )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+import math
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +15,15 @@ from hand_models.hand import Grasp, Placement, SettledHand, SpinyHand, spiny_han
 from hand_models.rock import Hold
 from hand_models.tile import Surface
 
-__all__ = ["UP", "approach_frame", "place"]
+__all__ = ["SEATS", "UP", "SeatRule", "approach_frame", "place"]
 
 UP: Final = (1.0, 0.0, 0.0)
 """In a rock's frame: along the fingers of a hand that is seated at its origin."""
+
+SeatRule = Literal["rest", "best"]
+
+SEATS: Final = get_args(SeatRule)
+"""How a hand is seated: as its grasp would have it, or near there where it holds most."""
 
 APART: Final = 1e-6
 """Least sine of the angle between approach and up."""
@@ -52,6 +58,7 @@ def approach_frame(
             raise InvalidInputError("must not be zero", field=field)
     if not np.isfinite(wrist_angle):
         raise InvalidInputError(f"must be finite, got {wrist_angle}", field="wrist_angle")
+    z, above = (value / np.abs(value).max() for value in (z, above))
     z, above = z / np.linalg.norm(z), above / np.linalg.norm(above)
     across = np.cross(z, above)
     if np.linalg.norm(across) < APART:
@@ -61,7 +68,7 @@ def approach_frame(
         )
     y = across / np.linalg.norm(across)
     axes = np.column_stack([np.cross(y, z), y, z])
-    turn = Rotation.from_rotvec([0.0, 0.0, wrist_angle]).as_matrix()
+    turn = Rotation.from_rotvec([0.0, 0.0, math.remainder(wrist_angle, math.tau)]).as_matrix()
     return Pose(finite_vector(point, 3, "point"), axes @ turn)
 
 
@@ -74,7 +81,7 @@ def place(
     surface: Surface | None = None,
     *,
     up: ArrayLike = UP,
-    seat: Literal["rest", "best"] = "rest",
+    seat: SeatRule = "rest",
     direction: ArrayLike = PULL_OFF,
     hand: SpinyHand | None = None,
 ) -> SettledHand:
@@ -109,6 +116,10 @@ def place(
     InvalidInputError
         If a number is impossible, or the hand cannot be there.
     """
+    if seat not in SEATS:
+        raise InvalidInputError(
+            f"unknown seat {seat!r}; known are {', '.join(SEATS)}", field="seat"
+        )
     at = approach_frame(point, approach, wrist_angle, up)
     rock.check_place(at)
     kind = hand or spiny_hand()

@@ -106,6 +106,9 @@ def best_seats(
         If the direction is not six finite numbers, or a placement has a pose.
     """
     d = finite_vector(direction, 6, "direction")
+    if not d.any():
+        raise InvalidInputError("must not be zero", field="direction")
+    d = d / np.abs(d).max()
     for each in placements:
         if each.hold_in_hand is not None:
             raise InvalidInputError(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.parameters import scan_table
 from hand_models.sections import (
     PARALLEL,
     FlatSection,
@@ -84,7 +85,7 @@ class Hold(ABC):
         Negative where the point is inside; infinite where the line misses the rock.
         """
 
-    def check_place(self, at: Pose | None = None) -> None:  # noqa: B027 (all others may be taken)
+    def check_place(self, at: Pose | None = None) -> None:
         """Refuse a frame that a palm is to be at, unless there is rock that faces it.
 
         Parameters
@@ -95,8 +96,19 @@ class Hold(ABC):
         Raises
         ------
         InvalidInputError
-            If a scan has no rock near its origin, or rock that faces away.
+            If no rock is near its origin, or what is there faces away.
         """
+        if at is None:
+            return
+        near = scan_table().scalar("scan", "place")
+        depth = self.entry(at.position, at.rotation[:, 2])
+        if not abs(depth) <= near:
+            where = f"begins {depth:.3g} m from it" if math.isfinite(depth) else "is not there"
+            raise InvalidInputError(
+                f"along the approach the rock {where}; at most {near:g} m is possible: is the "
+                "point in the frame that is named, and the approach into the rock?",
+                field="place.point",
+            )
 
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
         """Return depth of the centre [m] and radius [m] of the crest's circle at y = ``offset``.

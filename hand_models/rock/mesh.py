@@ -146,13 +146,12 @@ class Mesh(OutlinedHold):
         found = self.triangles.faces[self._cells.within(np.eye(3), *box)]
         corners = self.triangles.vertices[found]
         beside = (corners.min(axis=1) <= box[1]) & (corners.max(axis=1) >= box[0])
-        if not beside.all(axis=1).any():
+        if at is None and not beside.all(axis=1).any():
             nearest = np.linalg.norm(self.triangles.vertices - there.position, axis=1).min()
-            origin = "the hold's origin" if at is None else "the point"
             raise InvalidInputError(
-                f"the nearest vertex is {nearest:.3g} m from {origin}, which is to be on "
+                f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
                 f"the rock under the palm; at most {near:g} m is possible",
-                field="vertices" if at is None else "place.point",
+                field="vertices",
             )
         met = [
             self._first_side(there.apply((x, y, 0.0)), there.rotation[:, 2])
@@ -161,11 +160,12 @@ class Mesh(OutlinedHold):
         ]
         if sum(met) < 0:
             raise InvalidInputError(
-                "the triangles under the palm face away from it; their vertices must be "
-                "counterclockwise seen from outside the rock: turn every face over, or close the "
-                "hole under the palm if it looks into the rock",
+                "the triangles under the palm face away from it: is the approach into the rock? "
+                "their vertices must be counterclockwise seen from outside the rock: turn every "
+                "face over, or close the hole under the palm if it looks into the rock",
                 field="faces" if at is None else "place.approach",
             )
+        super().check_place(at)
 
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the cut through the triangles, small gaps bridged."""

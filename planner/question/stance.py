@@ -10,6 +10,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
+from hand_models.fixed_wrist import SEATS, SeatRule
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Hold
 from hand_models.tile import Surface
@@ -27,11 +28,6 @@ __all__ = [
 ]
 
 WristMode = Literal["fixed", "floating"]
-
-SeatRule = Literal["rest", "best"]
-
-SEATS: Final = get_args(SeatRule)
-"""How a hand without a pose of its hold is seated."""
 
 WRISTS: Final = get_args(WristMode)
 """How a wrist may be."""

@@ -54,10 +54,14 @@ def find_robust_load_factor(answer: Answer) -> None:
     hand = answer.question.stance.robot.hand
     # with a deadline draw by draw, since closing hands is not cut short
     at_once = AT_ONCE if deadline.seconds() is None else 1
-    places = scattered_hands(hand, answer.settled, DRAWS, SEED, hand.seat_scatter, at_once)
+    # drawn in the order of their names, whatever the order of the question
+    order = np.argsort(answer.limbs)
+    settled = [answer.settled[i] for i in order.tolist()]
+    places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter, at_once)
     factors: list[float] = []
     refused: Counter[str] = Counter()
-    while not deadline.expired() and (draw := next(places, None)) is not None:
+    while not deadline.expired() and (drawn := next(places, None)) is not None:
+        draw = [drawn[i] for i in np.argsort(order).tolist()]
         there = [each for each in draw if isinstance(each, SettledHand)]
         pairs = zip(answer.limbs, draw, strict=True)
         refused.update(limb for limb, each in pairs if not isinstance(each, SettledHand))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -40,6 +42,15 @@ def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     if not path.parent.is_dir():
         raise click.BadParameter(f"{path}: no such folder")
     return path
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Turn what goes wrong in writing into one line about the option."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {path}", field="--output") from None
 
 
 @click.command()
@@ -129,7 +140,14 @@ def holds(
     radius = 0.5 * numbers.scalar("palm", "length")
     trials = grid_of_trials(mesh, spacing, angles, rotations, radius=radius)
     if not trials:
-        raise InvalidInputError("no point of the grid is on the rock", field="--spacing")
+        raise InvalidInputError(
+            "no point of the grid is on rock that faces −z of its frame; is it turned over, or "
+            "smaller than the grid?",
+            field="--spacing",
+        )
+    part = output.with_name(output.name + ".part")
+    with _writing(output):
+        part.touch()
     how = RockTrials(mesh, surface, seat, hand=numbers)
     with progress(f"trying {len(trials):,} places") as tell:
         outcomes = try_everywhere(how, trials, tell, workers)
@@ -145,18 +163,18 @@ def holds(
         "rock": str(rock),
         "trials": len(trials),
         "refused": refused.total(),
+        "warnings": list(mesh.oddities),
         "holds": [_entry(trial, each) for trial, each in found],
     }
-    try:
-        output.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {output}", field="--output") from None
+    with _writing(output):
+        part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
+        part.replace(output)
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:
         say({**result, "holds": len(found), "file": str(output)})
     else:
-        _print(trials, found, refused, output, console())
+        _print(trials, found, refused, mesh.oddities, output, console())
 
 
 def _sorted(trials: list[Trial], outcomes: list[FoundHold | InvalidInputError]) -> list[Pair]:
@@ -222,11 +240,16 @@ def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: s
 
 
 def _print(
-    trials: list[Trial], found: list[Pair], refused: Counter[str], output: Path, out: Console
+    trials: list[Trial],
+    found: list[Pair],
+    refused: Counter[str],
+    oddities: Sequence[str],
+    output: Path,
+    out: Console,
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
-    table = table_of("x, y, z [mm]")
-    for title in ("wrist °", "outer °", "pull-off N", "alone", "least shear N", "9 in 10", "worst"):
+    table = table_of("x, y, z mm")
+    for title in ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst"):
         table.add_column(title, justify="right")
     for trial, each in found[:SHOWN]:
         left = [
@@ -244,7 +267,13 @@ def _print(
         )
     out.print(table)
     points = len({trial.point for trial in trials})
-    out.print(f"{len(trials):,} trials at {points:,} points: {len(found):,} hold something")
+    pulled = sum(each.support[0] > 0.0 for _, each in found)
+    out.print(
+        f"{len(trials):,} trials at {points:,} points: {len(found):,} hold something, {pulled:,} "
+        "of them also where they are pulled off (pull; shear is the least to any side)"
+    )
+    for words in oddities:
+        out.print(f"warning: {words}", markup=False)
     for reason, count in refused.most_common(REASONS):
         out.print(f"{count:,} refused: {reason}", markup=False)
     out.print(str(output), markup=False, soft_wrap=True)

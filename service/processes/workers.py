@@ -213,11 +213,14 @@ class Worker(Generic[T, R]):
     def __init__(self, make: Callable[[], Callable[[T], R]]) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
-        self.process = context.Process(target=_work, args=(other, make), daemon=True)
+        self.process = context.Process(target=_work, args=(other,), daemon=True)
         with _one_thread():
             self.process.start()
         # the process has the other end alone, so that its death ends the pipe
         other.close()
+        # what it is to make may be large: by this pipe, of which a death is told
+        with suppress(OSError):
+            self.pipe.send(make)
         self.ready = False
         self.hand: set[int] = set()
         self._last: set[int] = set()
@@ -259,18 +262,22 @@ class Worker(Generic[T, R]):
             self.process.join()
 
 
-def _work(pipe: Connection, make: Callable[[], Callable[[T], R]]) -> None:
+def _work(pipe: Connection) -> None:
     """Do chunks of work until nobody sends any more; what a process of `Workers` runs."""
     # Ctrl-C is the caller's to answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        make: Callable[[], Callable[[Any], Any]] = pipe.recv()
+    except (EOFError, OSError):
+        return
     turn = make()
-    chunks: SimpleQueue[list[tuple[int, T]] | None] = SimpleQueue()
+    chunks: SimpleQueue[list[tuple[int, Any]] | None] = SimpleQueue()
     # who sends must not wait for the chunk before to be done, nor for its results to be taken
     threading.Thread(target=_receive, args=(pipe, chunks), daemon=True).start()
     with suppress(OSError):
         pipe.send([])
         while (chunk := chunks.get()) is not None:
-            done: list[tuple[int, R]] = []
+            done: list[tuple[int, Any]] = []
             flushed = time.monotonic()
             for i, item in chunk:
                 done.append((i, turn(item)))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
 from hand_models import Grasp, InvalidInputError, place
 from hand_models.fixed_wrist import (
@@ -79,6 +80,24 @@ def test_the_border_of_a_scan_is_no_edge_to_hold(wall):
     (found,) = try_holds(HAND, wall, ROCK, [Trial((0.2, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0)])
     assert isinstance(found, InvalidInputError)
     assert "the scan ends" in str(found)
+
+
+def test_a_finger_beyond_the_scan_holds_nothing_of_it(wall):
+    trials = [Trial((0.0, y, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0) for y in (0.33, 0.35, 0.4)]
+    for found in try_holds(HAND, wall, ROCK, trials):
+        assert isinstance(found, InvalidInputError)
+
+
+def test_the_grid_does_not_depend_on_how_finely_triangles_tell_the_rock():
+    corners = np.array([[-0.5, -0.5, 0.1], [0.5, -0.5, 0.1], [0.5, 0.5, -0.1], [-0.5, 0.5, -0.1]])
+    rock = corners, np.array([[0, 2, 1], [0, 3, 2]])
+    coarse = grid_of_trials(Mesh(*rock, anywhere=True), 0.3, 1, radius=RADIUS)
+    for _ in range(3):
+        rock = trimesh.remesh.subdivide(*rock)
+    fine = grid_of_trials(Mesh(*rock, anywhere=True), 0.3, 1, radius=RADIUS)
+    assert len(coarse) == 16
+    for one, other in zip(coarse, fine, strict=True):
+        np.testing.assert_allclose(np.hstack(one), np.hstack(other), atol=1e-12)
 
 
 def test_robust_is_that_of_the_hand(wall):

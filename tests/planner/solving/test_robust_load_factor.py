@@ -26,6 +26,7 @@ def drawn_factors(asked: Question, draws: int) -> list[float | None]:
     stance = asked.stance
     seats = [settle_hand(hand, stance).seating.pose for hand in stance.hands]
     factors = []
+    by_name = np.argsort(np.argsort([hand.limb for hand in stance.hands]))
     for each in np.random.default_rng(0).uniform(-1.0, 1.0, (draws, len(seats), 6)):
         hands = tuple(
             replace(
@@ -37,7 +38,7 @@ def drawn_factors(asked: Question, draws: int) -> list[float | None]:
                 @ seat,
                 seat="rest",
             )
-            for hand, seat, by in zip(stance.hands, seats, each, strict=True)
+            for hand, seat, by in zip(stance.hands, seats, each[by_name], strict=True)
         )
         there = replace(asked, stance=replace(stance, hands=hands), want=frozenset(["load_factor"]))
         try:
@@ -45,6 +46,15 @@ def drawn_factors(asked: Question, draws: int) -> list[float | None]:
         except InvalidInputError:
             factors.append(None)
     return factors
+
+
+def test_the_order_of_hands_does_not_matter(monkeypatch):
+    monkeypatch.setattr(load_factor, "DRAWS", 4)
+    asked = asked_of("wall-300")
+    turned = replace(asked, stance=replace(asked.stance, hands=asked.stance.hands[::-1]))
+    one, other = plan(asked).robust, plan(turned).robust
+    assert other.worst == pytest.approx(one.worst, rel=1e-6)
+    assert other.tenth == pytest.approx(one.tenth, rel=1e-6)
 
 
 def asked_of(name: str, **kwargs) -> Question:

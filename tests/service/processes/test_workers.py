@@ -103,6 +103,20 @@ def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
     assert {result.reason for result in found.values()} == {NO_START}
 
 
+def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monkeypatch):
+    start = multiprocessing.context.SpawnProcess.start
+
+    def killed(process):
+        start(process)
+        process.kill()
+        process.join(PATIENCE)
+
+    monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", killed)
+    with Workers(partial(workshop.squares, "x" * 5_000_000), 2) as workers:
+        found = done(workers, [1, 2, 3])
+    assert {result.reason for result in found.values()} == {NO_START}
+
+
 def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
     monkeypatch.setattr("service.processes.workers.PATIENCE", 1e5)
     with Workers(workshop.sleepers, 2) as workers:

@@ -159,6 +159,7 @@ def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
     def opened(request: StreamRequest, robots: object) -> SimpleNamespace:
         number = next(count)
         return SimpleNamespace(
+            question=SimpleNamespace(stance=SimpleNamespace(hands=())),
             first=np.array(WRENCH),
             limbs=(),
             columns=(),
