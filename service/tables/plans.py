@@ -75,6 +75,10 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     out.print(reply.reason, markup=False)
     for warning in reply.warnings:
         out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    for limb, pose in (reply.poses or {}).items():
+        where = ", ".join(f"{value:.4f}" for value in pose.position)
+        turned = ", ".join(f"{value:.4f}" for value in pose.orientation)
+        out.print(f"{limb} is at ({where}) m, ({turned}) [x, y, z, w]", markup=False)
     if reply.path is not None:
         out.print(_path_sentence(reply.path), markup=False)
     if without_palm is not None:

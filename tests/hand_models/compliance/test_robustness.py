@@ -44,7 +44,10 @@ def floating(name: str) -> FloatingWrist:
     return FloatingWrist(CompliantHand(HAND.settle(hold, ROCK, grasp, pose)))
 
 
-@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if i % 3 else ()) for i, name in enumerate(HOLDS)],
+)
 def test_motions_that_load_nothing_do_not_stop_the_search(name: str) -> None:
     wrist = floating(name)
     found = boundary(wrist, search_box(wrist), 40)

@@ -126,6 +126,7 @@ def test_a_hand_of_ones_own_is_where_the_sweep_begins():
     assert data["limits"]["normal"][1][1] == pytest.approx(data["current"]["limits"]["normal"])
 
 
+@pytest.mark.slow
 def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
     arguments = ["study", "sweep", "-o", str(tmp_path), "--json", "--diameter", "0.3"]
     arguments += ["--tension", "37", "--surface", "sandpaper-36"]

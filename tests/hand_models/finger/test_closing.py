@@ -103,8 +103,8 @@ def test_on_rough_rock_fingers_close_slow():
     on_rough_rock(10_000, 2000)
 
 
-@pytest.mark.parametrize("slope", [30.0, 45.0, 60.0])
-@pytest.mark.parametrize("height", [0.04, 0.06, 0.08, 0.12])
+@pytest.mark.parametrize("slope", [30.0, pytest.param(45.0, marks=pytest.mark.slow), 60.0])
+@pytest.mark.parametrize("height", [0.04, 0.06, pytest.param(0.08, marks=pytest.mark.slow), 0.12])
 def test_a_hand_closes_around_a_knob(height, slope):
     foot = 0.04 + height / math.tan(math.radians(slope))
     x = [-0.5 - foot, -foot, -0.04, 0.04, foot, foot + 0.5]

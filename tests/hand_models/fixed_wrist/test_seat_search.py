@@ -86,6 +86,7 @@ def test_a_hand_put_where_its_best_seat_is_is_the_same(hold, rotation):
     assert reach(best) == reach(there) >= reach(HAND.settle(*each))
 
 
+@pytest.mark.slow
 def test_a_direction_may_be_given_in_which_to_hold():
     each = placement(random_rock(1))
     (pulled,), (down,) = best_seats(HAND, [each]), best_seats(HAND, [each], DOWN)

@@ -388,6 +388,7 @@ def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixtu
         assert "one LIMB and at most one FILE that ends in .toml" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_route_is_climbed_with_the_hand(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -240,8 +240,8 @@ GIVEN = {
     ("limb", "name"),
     [
         pytest.param("rear_right", "one force", marks=pytest.mark.slow),
-        ("rear_right", "three forces"),
-        ("rear_right", "a moment"),
+        pytest.param("rear_right", "three forces", marks=pytest.mark.slow),
+        pytest.param("rear_right", "a moment", marks=pytest.mark.slow),
         ("front_right", "one force"),
     ],
 )

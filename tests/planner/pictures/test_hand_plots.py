@@ -28,7 +28,17 @@ HOLDS = {
 }
 
 
-@pytest.mark.parametrize(("hold", "rotation"), HOLDS.values(), ids=HOLDS.keys())
+SHOWN = ("cylinder", "mesh", "too small to hold")
+"""At all times; the others with the slow tests."""
+
+
+@pytest.mark.parametrize(
+    ("hold", "rotation"),
+    [
+        pytest.param(*own, id=name, marks=() if name in SHOWN else pytest.mark.slow)
+        for name, own in HOLDS.items()
+    ],
+)
 def test_every_hold_has_a_picture(hold, rotation, tmp_path):
     settled = HAND.settle(hold, ROCK, Grasp(rotation, lateral=False))
     path = tmp_path / "hand.png"

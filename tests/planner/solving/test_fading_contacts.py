@@ -60,14 +60,14 @@ LIGHT = replace(CALIBRATION_LOAD, mass=5.0)
 
 CASES = [
     *((name, "fixed", CALIBRATION_LOAD) for name in FADING),
-    pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=LIMITING),
+    pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]),
     pytest.param(
         "base tiles of pinches",
         "floating",
         CALIBRATION_LOAD,
         marks=[LIMITING, pytest.mark.slow],
     ),
-    ("base tiles of pinches", "floating", LIGHT),
+    pytest.param("base tiles of pinches", "floating", LIGHT, marks=pytest.mark.slow),
     ("two rows of the palm", "floating", CALIBRATION_LOAD),
 ]
 

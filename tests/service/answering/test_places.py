@@ -13,6 +13,7 @@ from hand_models.base import InvalidInputError
 from service.answering import questions
 from service.answering.dispatch import plan, wrench_space
 from service.requests import WrenchSpaceRequest
+from service.tables import console, print_plan
 from service.wire import decode_request
 from tests.suite.helpers.requests import plan_request, put, wall_request
 from tests.suite.helpers.rocks import random_mesh
@@ -117,3 +118,10 @@ def test_a_place_that_cannot_be_is_refused_by_name(
     with pytest.raises(InvalidInputError) as caught:
         questions.question(plan_request(request))
     assert caught.value.field == f"stance.hands[0].{field}"
+
+
+def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture[str]) -> None:
+    reply = plan(plan_request(placed()))
+    print_plan(reply, console())
+    x, *_ = reply.poses[reply.hands[0].limb].position
+    assert f"front_right is at ({x:.4f}, " in capsys.readouterr().out
