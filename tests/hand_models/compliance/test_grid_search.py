@@ -327,6 +327,7 @@ def test_newton_finds_the_pose_of_a_thousand_wrenches(name, capsys):
     assert all(pose.converged for pose in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GRASPS)
 def test_newton_finds_the_pose_of_every_wrench_inside(name):
     hold, rotation, palm = GRASPS[name]

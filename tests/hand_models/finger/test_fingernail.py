@@ -528,6 +528,7 @@ def test_the_schema_tells_of_the_nail():
     assert "clinging with their nails alone" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [step(0.02), Plane(), Cylinder(0.2)])
 def test_a_clinging_hand_is_drawn_whether_its_nails_hook_or_not(hold, tmp_path):
     settled = cling(hold, 0.195 if isinstance(hold, Profile) else 0.0, 0.006)

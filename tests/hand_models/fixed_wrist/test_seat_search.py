@@ -105,6 +105,7 @@ def test_together_hands_are_seated_as_alone_and_searched_for_once():
     assert best_seats(HAND, group[:1])[0] is together[0]
 
 
+@pytest.mark.slow
 def test_on_mirrored_rock_the_best_seat_holds_as_much():
     hold = random_mesh(np.random.default_rng(3))
     other = Mesh(hold.triangles.vertices @ MIRROR, hold.triangles.faces[:, ::-1])

@@ -178,6 +178,7 @@ def test_left_and_right_mirror_each_other(hold, rotation):
     np.testing.assert_allclose(settled.palm.gaps[::2], settled.palm.gaps[1::2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [Cylinder(0.3), Cylinder(8.0), Sphere(0.6)])
 def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     pose = HAND.seat(hold, PINCH).pose

@@ -104,6 +104,7 @@ def test_a_seated_hand_touches_at_c1_with_its_palm_where_the_grasp_wants_it(semi
         assert finger.contacts[0].along <= 0.0247 + 1e-6
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(axes, st.floats(0.0, math.pi))
 def test_faces_are_on_the_rock_and_edges_within_the_spines_reach(semi_axes, rotation):

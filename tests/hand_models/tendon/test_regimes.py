@@ -20,6 +20,7 @@ def random_tendon(rng, friction, entry):
     return tendon, tendon.closed(37.0, rng.uniform(2.0, 9.0, n))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", MOTOR_SCHEMES)
 @pytest.mark.parametrize(("friction", "entry"), [(0.34, 0.34), (0.34, 0.0), (0.1, 0.0), (0.0, 0.0)])
 @given(seed=st.integers(0, 10**6), size=st.sampled_from([1e-5, 3e-4, 3e-3]))

@@ -82,6 +82,7 @@ def slopes(question, name) -> tuple[float, float]:
     return (here - changed(step)) / step, (changed(-step) - here) / step
 
 
+@pytest.mark.slow
 def test_price_is_the_derivative_where_the_optimum_is_not_degenerate():
     smooth = 0
     for seed in RANDOM_SEEDS:

@@ -104,6 +104,7 @@ class Model:
         return (found[1:] - found[0]).T / self.STEP
 
 
+@pytest.mark.slow
 def test_another_solver_finds_nothing_less_on_the_model_itself():
     """Poses of the wrists are the unknowns of a nonlinear program for scipy's SLSQP."""
     question, margin, answer = both("pair")

@@ -72,6 +72,7 @@ def all_float() -> tuple[Question, Plan]:
     return asked, answer
 
 
+@pytest.mark.slow
 def test_load_factor_is_no_less_than_a_smaller_load_proves():
     asked, whole = all_float()
     wrench = 0.75 * whole.body_wrench

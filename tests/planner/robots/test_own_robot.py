@@ -278,6 +278,7 @@ def test_a_lighter_robot_takes_the_bundled_stances(
     assert light["load_factor"] > heavy["load_factor"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_route_is_climbed_by_the_robot_in_other_processes_too(
     workers: int, file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]

@@ -20,6 +20,7 @@ def searched(*arguments):
     return result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_axis", [4, pytest.param(5, marks=pytest.mark.slow)])
 def test_the_search_tells_wrenches_poses_and_what_lets_go(per_axis):
     reply = json.loads(searched("--hand", "rear_left", "--search", str(per_axis), "--json"))
