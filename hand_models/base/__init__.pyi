@@ -3,6 +3,7 @@ from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
     InvalidInputError as InvalidInputError,
+    LimitError as LimitError,
     SolverError as SolverError,
     UnsupportedError as UnsupportedError,
 )

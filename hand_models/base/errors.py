@@ -8,6 +8,7 @@ __all__ = [
     "CruxError",
     "EmptySetError",
     "InvalidInputError",
+    "LimitError",
     "SolverError",
     "UnsupportedError",
 ]
@@ -59,6 +60,12 @@ class UnsupportedError(InvalidInputError):
     """A value that is meaningful, but that this version does not implement."""
 
     kind = "unsupported"
+
+
+class LimitError(InvalidInputError):
+    """A question that is meaningful, but would cost more than is allowed; it names the limit."""
+
+    kind = "limit"
 
 
 class EmptySetError(CruxError):

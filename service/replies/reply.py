@@ -56,11 +56,12 @@ class Time(Struct):
 
 
 class ErrorDetail(Struct):
-    """What is wrong, and with which field."""
+    """What is wrong, and with which field; ``retry_after``: when to ask again [s]."""
 
     kind: str
     field: str | None
     message: str
+    retry_after: float | UnsetType = UNSET
 
 
 class ErrorReply(Reply, kw_only=True):

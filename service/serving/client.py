@@ -8,6 +8,7 @@ from typing import Final, Self, TypeVar
 
 import msgspec
 import zenoh
+from msgspec import UNSET
 
 from service.replies import (
     BodySpaceReply,
@@ -152,7 +153,12 @@ class CruxClient:
                 "another question: allow it longer (--timeout)"
             )
         detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
-        raise ServiceError(detail.kind, detail.message, field=detail.field)
+        raise ServiceError(
+            detail.kind,
+            detail.message,
+            field=detail.field,
+            retry_after=None if detail.retry_after is UNSET else detail.retry_after,
+        )
 
     def _get(self, key: str, request: Request) -> zenoh.Reply | None:
         """Return the first reply, or None where there is none."""

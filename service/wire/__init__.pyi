@@ -7,6 +7,7 @@ from .codec import (
 from .errors import (
     REQUEST_KINDS as REQUEST_KINDS,
     UNREACHABLE as UNREACHABLE,
+    BusyError as BusyError,
     LostError as LostError,
     MalformedError as MalformedError,
     NoServiceError as NoServiceError,

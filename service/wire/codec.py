@@ -12,7 +12,7 @@ from hand_models.base import CruxError, InvalidInputError
 from service.replies import ErrorDetail, ErrorReply
 from service.requests import Identifier
 from service.wire.checks import check
-from service.wire.errors import MalformedError
+from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import leaves_open, validation_error
 
 __all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error", "identifier"]
@@ -141,5 +141,8 @@ def encode_error(
     kind: str, error: CruxError, form: Format, name: str | None = None
 ) -> tuple[bytes, str]:
     """Return an error reply's bytes and encoding; ``name`` is the request's ``id``."""
-    reply = ErrorReply(id=name, error=ErrorDetail(kind, error.field, error.message))
+    detail = ErrorDetail(kind, error.field, error.message)
+    if isinstance(error, BusyError):
+        detail.retry_after = error.retry_after
+    reply = ErrorReply(id=name, error=detail)
     return form.encode(reply), form.label(reply)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
 from hand_models.base import CruxError, InvalidInputError
 
 __all__ = [
     "REQUEST_KINDS",
     "UNREACHABLE",
+    "BusyError",
     "LostError",
     "MalformedError",
     "NoServiceError",
@@ -19,8 +21,32 @@ __all__ = [
 UNREACHABLE: Final = "unreachable"
 """Kind of error where limbs do not reach their holds."""
 
-REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", UNREACHABLE})
+REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit", UNREACHABLE})
 """Kinds of error that are the request's fault, so that asking again is of no use."""
+
+
+class BusyError(CruxError):
+    """A question that a service has no room for now.
+
+    Parameters
+    ----------
+    message : str
+    retry_after : float
+        When to ask again [s].
+
+    Attributes
+    ----------
+    retry_after
+    """
+
+    kind = "busy"
+
+    def __init__(self, message: str, retry_after: float) -> None:
+        super().__init__(message)
+        self.retry_after = retry_after
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BusyError, (self.message, self.retry_after)
 
 
 class MalformedError(InvalidInputError):
@@ -38,15 +64,35 @@ class ServiceError(CruxError):
         As in the reply.
     message : str
     field : str, optional
+    retry_after : float, optional
+        When to ask again, of a service that is busy [s].
+
+    Attributes
+    ----------
+    kind, message, field, retry_after
     """
 
-    def __init__(self, kind: str, message: str, *, field: str | None = None) -> None:
+    def __init__(
+        self,
+        kind: str,
+        message: str,
+        *,
+        field: str | None = None,
+        retry_after: float | None = None,
+    ) -> None:
         super().__init__(message, field=field)
         self.kind = kind
+        self.retry_after = retry_after
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        again = partial(
+            ServiceError, self.kind, self.message, field=self.field, retry_after=self.retry_after
+        )
+        return again, ()
 
 
 class LostError(CruxError):
-    """A request of many that no process lived to answer."""
+    """A request that no process lived to answer."""
 
     kind = "lost"
 
