@@ -72,11 +72,14 @@ class Answer(NamedTuple):
         Of the payload, with its schema.
     good : bool
         Whether it is a reply, and not an error.
+    status : str
+        Of a reply that has one; the kind of an error.
     """
 
     payload: bytes
     encoding: str
     good: bool
+    status: str = "done"
 
 
 def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply:
@@ -247,7 +250,7 @@ def handle(
     Returns
     -------
     Answer
-        A reply, or a structured error; nothing is raised.
+        A reply, or a structured error; nothing is raised but a lack of memory.
     """
     form = Format.JSON
     try:
@@ -262,16 +265,22 @@ def handle(
         about = (request, robots, streams) if service.streams else (request, robots)
         with deadline.within(seconds, started=started), _taking(turn if service.waits else None):
             reply = service.answer(*about)
-        return Answer(form.encode(reply), form.label(reply), True)
+        status: str = getattr(reply, "status", "done")
+        return Answer(form.encode(reply), form.label(reply), True, status)
     except InvalidInputError as error:
         kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        return Answer(*encode_error(kind, error, form, identifier(payload, form)), False)
+        return Answer(*encode_error(kind, error, form, identifier(payload, form)), False, kind)
     except DeadlineError as error:
-        return Answer(*encode_error(error.kind, error, form, identifier(payload, form)), False)
+        coded = encode_error(error.kind, error, form, identifier(payload, form))
+        return Answer(*coded, False, error.kind)
+    except MemoryError:
+        # of a process, not of a question: who runs the process has to know
+        raise
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        return Answer(*encode_error("internal", excuse, form, identifier(payload, form)), False)
+        coded = encode_error("internal", excuse, form, identifier(payload, form))
+        return Answer(*coded, False, "internal")
 
 
 @contextmanager

@@ -43,6 +43,9 @@ __all__ = ["demo", "query", "serve"]
 PATIENCE: Final = 120.0
 """How long the demo waits for its own service, however busy the machine [s]."""
 
+LONGEST: Final = 600.0
+"""The longest deadline of a service's own [s]."""
+
 DEMO_STANCE: Final = "wall-300-joints"
 
 
@@ -50,24 +53,59 @@ DEMO_STANCE: Final = "wall-300-joints"
 @zenoh_options
 @hand_option
 @robot_option
+@click.option(
+    "--workers",
+    type=click.IntRange(1, 256),
+    help="Processes that answer; by default one a core, but at least 2. One more has the streams.",
+)
+@click.option(
+    "--deadline",
+    "seconds",
+    type=click.FloatRange(0.0, min_open=True, max=LONGEST),
+    default=10.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Of a question that names none, from its arrival.",
+)
+@click.option(
+    "--metrics-port",
+    type=click.IntRange(1, 65535),
+    help="Give Prometheus its text over HTTP on this port of this machine.",
+)
+@click.option("-v", "--verbose", is_flag=True, help="Log a line a question.")
+@click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
 @json_option
 def serve(
-    config: zenoh.Config, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool
+    config: zenoh.Config,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    workers: int | None,
+    seconds: float,
+    metrics_port: int | None,
+    verbose: bool,
+    log_format: str,
+    as_json: bool,
 ) -> None:
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
-    The hand of --hand is that of every question; a question's own numbers go on top. The robot of
-    --robot is the only one that is planned for, and gives the keys its name.
+    Without -l only programs on this machine can ask. The hand of --hand is that of every question;
+    a question's own numbers go on top. The robot of --robot is the only one that is planned for,
+    and gives the keys its name.
     """
     stop = _StopSignal()
-    from service.serving import PlanService, prepare_zenoh
+    from service.serving import JsonLines, PlanService, closed, exposed
 
-    logging.basicConfig(format="crux: %(levelname)s: %(message)s")
-    prepare_zenoh()
+    handler = logging.StreamHandler()
+    form = logging.Formatter("crux: %(levelname)s: %(message)s")
+    handler.setFormatter(JsonLines() if log_format == "json" else form)
+    logging.basicConfig(handlers=[handler], level=logging.INFO if verbose else logging.WARNING)
     start_zenoh_log()
+    closed(config)
     endpoints = listening(config)
     with open_session(config) as session:
-        service = PlanService(session, robot, hand)
+        service = PlanService(session, robot, hand, workers=workers, seconds=seconds)
+        if metrics_port is not None:
+            service.serve_metrics(metrics_port)
         if service.has_rival():
             note(
                 f"another service already answers {service_key(service.robot, '…')}: queries may "
@@ -78,6 +116,11 @@ def serve(
                 say({"v": 1, "keys": service.keys, "listen": endpoints})
             where = ", ".join(endpoints) or "no address"
             note(f"serving {', '.join(service.keys)}; listening on {where}")
+            if open_to := exposed(config):
+                note(
+                    f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh tells "
+                    "of this session (@/**); access control is zenoh's (-c FILE)"
+                )
             stop.wait()
 
 
@@ -157,7 +200,7 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
     request = with_extras(asked(read_request(DEMO_STANCE), hand, robot))
     start_zenoh_log()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with open_session(config) as session, PlanService(session, robot) as service:
+    with open_session(config) as session, PlanService(session, robot, workers=1) as service:
         client = CruxClient(session, service.robot, timeout=PATIENCE)
         try:
             reply = client.plan(request)

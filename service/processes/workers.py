@@ -21,7 +21,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
-__all__ = ["Lost", "Worker", "Workers", "cores"]
+__all__ = ["Lost", "Worker", "Workers", "cores", "one_thread"]
 
 log = logging.getLogger(__name__)
 
@@ -214,7 +214,7 @@ class Worker(Generic[T, R]):
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
         self.process = context.Process(target=_work, args=(other,), daemon=True)
-        with _one_thread():
+        with one_thread():
             self.process.start()
         # the process has the other end alone, so that its death ends the pipe
         other.close()
@@ -299,7 +299,7 @@ def _receive(pipe: Connection, chunks: SimpleQueue[Any]) -> None:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def one_thread() -> Iterator[None]:
     """Let processes that are started here do their linear algebra on one thread."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))

@@ -12,6 +12,11 @@ from .hand import (
     Tile as Tile,
     Wrist as Wrist,
 )
+from .health import (
+    HealthReply as HealthReply,
+    LastFailure as LastFailure,
+    ProcessHealth as ProcessHealth,
+)
 from .limits import LimitName as LimitName, Price as Price
 from .plan import (
     Certificate as Certificate,

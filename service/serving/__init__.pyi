@@ -1,9 +1,12 @@
 from .client import TIMEOUT as TIMEOUT, CruxClient as CruxClient
 from .config import (
+    closed as closed,
+    exposed as exposed,
     listening as listening,
     open_session as open_session,
     start_zenoh_log as start_zenoh_log,
     zenoh_config as zenoh_config,
     zenoh_options as zenoh_options,
 )
-from .server import PlanService as PlanService, prepare_zenoh as prepare_zenoh
+from .server import SECONDS as SECONDS, PlanService as PlanService
+from .watch import JsonLines as JsonLines

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from types import TracebackType
 from typing import Final, Self, TypeVar
@@ -30,6 +31,7 @@ from service.requests import (
 from service.serving.config import open_session
 from service.wire import (
     BODY_SPACE,
+    CLIENTS,
     DEFAULT_ROBOT,
     PLAN,
     SET_POINTS,
@@ -89,6 +91,11 @@ class CruxClient:
             self._session = self._owned = open_session(where)
         else:
             self._session = where
+        # by these a service gives each client its turn, and knows who has gone
+        self._asked = itertools.count()
+        self._source = self._session.declare_querier(service_key(robot, PLAN))
+        here = service_key(robot, f"{CLIENTS}/{self._session.info.zid()}")
+        self._here = self._session.liveliness().declare_token(here)
 
     def __enter__(self) -> Self:
         return self
@@ -103,6 +110,9 @@ class CruxClient:
 
     def close(self) -> None:
         """Close the session, if it is the client's own."""
+        if not self._session.is_closed():
+            self._here.undeclare()
+            self._source.undeclare()
         if self._owned is not None:
             self._owned.close()
 
@@ -168,6 +178,7 @@ class CruxClient:
             encoding=self.form.label(request),
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=self.timeout,
+            source_info=zenoh.SourceInfo(self._source.id, next(self._asked)),
         )
         return next(iter(replies), None)
 

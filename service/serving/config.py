@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import socket
 import sys
 from collections.abc import Callable, Sequence
 from functools import wraps
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +20,8 @@ from service.wire import NoServiceError
 
 __all__ = [
     "MODES",
+    "closed",
+    "exposed",
     "listening",
     "open_session",
     "start_zenoh_log",
@@ -26,6 +30,14 @@ __all__ = [
 ]
 
 MODES: Final = ("peer", "client", "router")
+
+LOOPBACK: Final = "127.0.0.1"
+
+ROUTER_PORT: Final = 7447
+"""On which zenoh's routers listen by default."""
+
+PORTS: Final = {"tcp": socket.SOCK_STREAM, "tls": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
+"""Protocols with ports, and how one is probed."""
 
 STANDARD_OUTPUT: Final = 1
 STANDARD_ERROR: Final = 2
@@ -100,6 +112,50 @@ def listening(config: zenoh.Config) -> list[str]:
         mode = msgspec.json.decode(config.get_json("mode"))
         endpoints = endpoints.get(mode or MODES[0], [])
     return [str(endpoint) for endpoint in endpoints]
+
+
+def closed(config: zenoh.Config) -> None:
+    """Make a configuration that names no endpoint listen for programs on this machine alone.
+
+    These find it by multicast as ever, which does not leave the machine either. Ports that are left
+    to the system are chosen here, so that they can be told.
+    """
+    unsaid = config.get_json("listen/endpoints") == zenoh.Config().get_json("listen/endpoints")
+    mode = msgspec.json.decode(config.get_json("mode"))
+    if mode == "client":
+        return
+    if unsaid:
+        port = ROUTER_PORT if mode == "router" else 0
+        _insert(config, "listen/endpoints", _json([f"tcp/{LOOPBACK}:{port}"]), "--listen")
+        if msgspec.json.decode(config.get_json("scouting/multicast"))["interface"] is None:
+            _insert(config, "scouting/multicast/interface", _json(LOOPBACK), "--listen")
+    endpoints = [_with_port(endpoint) for endpoint in listening(config)]
+    _insert(config, "listen/endpoints", _json(endpoints), "--listen")
+
+
+def exposed(config: zenoh.Config) -> list[str]:
+    """Return the endpoints of a configuration that programs on other machines may reach."""
+    return [each for each in listening(config) if not _is_loopback(each)]
+
+
+def _with_port(endpoint: str) -> str:
+    """Return an endpoint whose port is no longer the system's to choose."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol not in PORTS or port != "0":
+        return endpoint
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family, PORTS[protocol]) as probe:
+        probe.bind((host.strip("[]"), 0))
+        return f"{protocol}/{host}:{probe.getsockname()[1]}"
+
+
+def _is_loopback(endpoint: str) -> bool:
+    host = endpoint.partition("/")[2].partition("#")[0].rpartition(":")[0].strip("[]")
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def start_zenoh_log() -> None:

@@ -1,55 +1,48 @@
-"""The service on zenoh: one queryable a key, one question at a time.
+"""The service on zenoh: a queryable a key, whose queries go to a dispatcher at once.
 
-Each key has a small first-in-first-out channel and a thread that answers from it. The channel is
-small on purpose: zenoh lets a client wait whose query does not fit, so that a flood of questions
-waits in its own client's link, and the next client's question gets its turn. Such a link keeps one
-of zenoh's receiving threads, so there have to be more of those than clients that flood. A lock
-keeps the models, which are not thread-safe, to one question; only set-points of streams, which are
-there already, do not wait for it. Nothing of it runs on zenoh's threads.
+Nothing is worked out on zenoh's threads, and none of them ever waits.
 """
 
 from __future__ import annotations
 
-import logging
-import os
-import threading
-import time
+from collections.abc import Callable
+from functools import partial
 from types import TracebackType
 from typing import Final, Self
 
 import zenoh
-from zenoh.handlers import FifoChannel, Handler
+from zenoh.handlers import Callback
 
+from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.programs import build_ahead
 from planner.robots import RobotFile
-from service.answering import SERVICES, Streams, builder_of, handle, robots_of
-from service.wire import ALIVE, service_key
+from service.answering import SERVICES, robots_of
+from service.processes import Done, Job, Make, answering, cores
+from service.serving.crew import Crew
+from service.serving.dispatcher import Dispatcher
+from service.serving.watch import Told
+from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, service_key
 
-__all__ = ["PlanService", "prepare_zenoh"]
-
-log = logging.getLogger(__name__)
-
-CHANNEL: Final = 2
-"""Queries that wait at a key; more wait in their clients' links."""
-
-RECEIVERS: Final = 32
-"""Zenoh's receiving threads; with its own default of two, two floods delay others by seconds."""
+__all__ = ["MEMORY", "SECONDS", "PlanService"]
 
 SEARCH: Final = 1.0
 """How long another service of the same robot is looked for at most [s]."""
 
-PATIENCE: Final = 0.5
-"""How long a stop waits for a question that is being answered [s]."""
+SECONDS: Final = 10.0
+"""Deadline of a question that names none, from where it comes [s]."""
 
+MEMORY: Final = 2 * 2**30
+"""Bytes that a process may have by default, where the system can keep it to them."""
 
-def prepare_zenoh() -> None:
-    """Give zenoh its receiving threads, unless ``ZENOH_RUNTIME`` is set; before any session."""
-    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {RECEIVERS}))")
+FEWEST: Final = 2
+"""Processes by default even where there is one core: what takes long leaves one to others."""
 
 
 class PlanService:
     """A robot's plan service while it is entered.
+
+    Questions are answered in processes, which are spawned: a program that serves needs its
+    ``if __name__ == "__main__":``.
 
     Parameters
     ----------
@@ -59,6 +52,14 @@ class PlanService:
         The robot that is planned for; RoboSimian by default.
     hand : ParameterTable, optional
         Entries in which its hands are not the bundled one; a request's own go on top.
+    workers : int, optional
+        Processes that answer; one a core by default, but at least 2. One more has the streams.
+    seconds : float, optional
+        Deadline of a question that names none [s].
+    memory : int, optional
+        Bytes that each process may have.
+    make : callable, optional
+        What answers in each process, in place of the planner; it is pickled.
 
     Attributes
     ----------
@@ -66,8 +67,13 @@ class PlanService:
         Its name.
     keys : tuple of str
         That it answers at.
-    turn : Lock
-        Held by the one question that is answered.
+    operators : tuple of str
+        Keys of what an operator asks for: its health, and its counts.
+
+    Raises
+    ------
+    InvalidInputError
+        If there would be no worker, or no time.
     """
 
     def __init__(
@@ -75,17 +81,28 @@ class PlanService:
         session: zenoh.Session,
         robot: RobotFile | None = None,
         hand: ParameterTable | None = None,
+        *,
+        workers: int | None = None,
+        seconds: float = SECONDS,
+        memory: int = MEMORY,
+        make: Make[Job, Done] | None = None,
     ) -> None:
-        self._hand = hand
-        self._robots = robots_of(robot)
-        (self.robot,) = self._robots
+        count = max(FEWEST, cores()) if workers is None else workers
+        if count < 1:
+            raise InvalidInputError(f"must be 1 at least, got {count}", field="workers")
+        if not seconds > 0.0:
+            raise InvalidInputError(f"must be above 0 s, got {seconds:g}", field="seconds")
+        (self.robot,) = robots_of(robot)
         self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
+        self.operators = tuple(service_key(self.robot, name) for name in (HEALTH, METRICS))
         self._alive = service_key(self.robot, ALIVE)
         self._session = session
-        self.turn = threading.Lock()
-        self._streams = Streams()
-        self._threads: list[threading.Thread] = []
-        self._queryables: list[zenoh.Queryable[Handler[zenoh.Query]]] = []
+        made = make or partial(answering, robot, hand)
+        self._dispatcher = Dispatcher(Crew(made, count, memory), seconds, self.robot)
+        self._watch = self._dispatcher.watch
+        self._declared: list[
+            zenoh.Queryable[None] | zenoh.Subscriber[None] | zenoh.TransportEventsListener[None]
+        ] = []
         self._token: zenoh.LivelinessToken | None = None
 
     def has_rival(self) -> bool:
@@ -93,18 +110,37 @@ class PlanService:
         replies = self._session.liveliness().get(self._alive, timeout=SEARCH)
         return any(reply.ok is not None for reply in replies)
 
+    def serve_metrics(self, port: int) -> None:
+        """Give Prometheus what is counted over HTTP, on this machine alone.
+
+        Raises
+        ------
+        InvalidInputError
+            If the port cannot be had.
+        """
+        try:
+            self._watch.serve(port)
+        except OSError as error:
+            raise InvalidInputError(f"{port}: {error.strerror}", field="--metrics-port") from None
+
     def __enter__(self) -> Self:
+        self._dispatcher.start()
         for key in self.keys:
-            queryable = self._session.declare_queryable(key, FifoChannel(CHANNEL), complete=True)
-            thread = threading.Thread(
-                target=self._serve, args=(key, queryable.handler), name=key, daemon=True
+            self._declare(key, partial(self._ask, key))
+        health, metrics = self.operators
+        for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
+            self._declare(key, partial(self._look, key, told))
+        info = self._session.info
+        self._declared.append(
+            info.declare_transport_events_listener(Callback(self._transport, indirect=False))
+        )
+        clients = service_key(self.robot, f"{CLIENTS}/*")
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(
+                clients, Callback(self._client, indirect=False)
             )
-            thread.start()
-            self._queryables.append(queryable)
-            self._threads.append(thread)
+        )
         self._token = self._session.liveliness().declare_token(self._alive)
-        robot = builder_of(None, self._robots)(None)
-        build_ahead(len(robot.shoulders))
         return self
 
     def __exit__(
@@ -115,41 +151,37 @@ class PlanService:
     ) -> None:
         if self._token is not None:
             self._token.undeclare()
-        for queryable in self._queryables:
-            queryable.undeclare()
-        patient_until = time.monotonic() + PATIENCE
-        for thread in self._threads:
-            thread.join(max(0.0, patient_until - time.monotonic()))
-        self._streams.close()
+        self._dispatcher.stop()
+        for declared in self._declared:
+            declared.undeclare()  # type: ignore[no-untyped-call]
+        self._dispatcher.close()
 
-    def _serve(self, key: str, queries: Handler[zenoh.Query]) -> None:
-        while True:
-            try:
-                query = queries.recv()
-            except zenoh.ZError:  # undeclared
-                return
-            # without the with, the client would wait until its timeout
-            with query:
-                try:
-                    self._answer(key, query)
-                except Exception:
-                    log.exception("a reply at %s was lost", key)
-
-    def _answer(self, key: str, query: zenoh.Query) -> None:
-        started = time.perf_counter()
-        payload = b"" if query.payload is None else query.payload.to_bytes()
-        encoding = "" if query.encoding is None else str(query.encoding)
-        answer = handle(
-            key,
-            payload,
-            encoding,
-            self._hand,
-            self._robots,
-            started=started,
-            turn=self.turn,
-            streams=self._streams,
+    def _declare(self, key: str, callback: Callable[[zenoh.Query], None]) -> None:
+        self._declared.append(
+            self._session.declare_queryable(key, Callback(callback, indirect=False), complete=True)
         )
-        if answer.good:
-            query.reply(key, answer.payload, encoding=answer.encoding)
+
+    def _ask(self, key: str, query: zenoh.Query) -> None:
+        if _means(query, key):
+            self._dispatcher.ask(query, key)
         else:
-            query.reply_err(answer.payload, encoding=answer.encoding)
+            query.drop()
+
+    def _look(self, key: str, told: Callable[[], Told], query: zenoh.Query) -> None:
+        if _means(query, key):
+            self._dispatcher.look(query, key, told)
+        else:
+            query.drop()
+
+    def _transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.DELETE:
+            self._dispatcher.gone(str(event.transport.zid))
+
+    def _client(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._dispatcher.gone(str(sample.key_expr).rpartition("/")[2])
+
+
+def _means(query: zenoh.Query, key: str) -> bool:
+    """Whether a query is for a key, and not for every one that it happens to match."""
+    return str(query.key_expr).rpartition("/")[2] == key.rpartition("/")[2]

@@ -18,7 +18,10 @@ from .json_schema import schema as schema
 from .keys import (
     ALIVE as ALIVE,
     BODY_SPACE as BODY_SPACE,
+    CLIENTS as CLIENTS,
     DEFAULT_ROBOT as DEFAULT_ROBOT,
+    HEALTH as HEALTH,
+    METRICS as METRICS,
     PLAN as PLAN,
     SET_POINTS as SET_POINTS,
     STREAM as STREAM,

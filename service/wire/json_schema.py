@@ -10,6 +10,7 @@ from hand_models.parameters import Quantity
 from service.replies import (
     BodySpaceReply,
     ErrorReply,
+    HealthReply,
     PlanReply,
     SetPointsReply,
     StreamReply,
@@ -38,6 +39,7 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     SetPointsRequest,
     SetPointsReply,
     RouteRequest,
+    HealthReply,
     ErrorReply,
 )
 

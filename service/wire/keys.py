@@ -7,7 +7,10 @@ from typing import Final
 __all__ = [
     "ALIVE",
     "BODY_SPACE",
+    "CLIENTS",
     "DEFAULT_ROBOT",
+    "HEALTH",
+    "METRICS",
     "PLAN",
     "SET_POINTS",
     "STREAM",
@@ -22,7 +25,10 @@ STREAM: Final = "stream"
 SET_POINTS: Final = "set_points"
 ALIVE: Final = "alive"
 """The liveliness token, which is there while the service is."""
-
+HEALTH: Final = "health"
+METRICS: Final = "metrics"
+CLIENTS: Final = "clients"
+"""Before the identifiers of sessions, in the liveliness tokens of clients."""
 
 DEFAULT_ROBOT: Final = "robosimian"
 """Whose stance is meant where nothing names a robot."""

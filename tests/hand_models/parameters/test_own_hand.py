@@ -455,7 +455,7 @@ def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Se
     want = [untimed(dispatch.plan(request)) for request in asked]
     assert len({reply["utilisation"] for reply in want}) >= 2
     order = [i for _ in range(5) for i in (0, 1, 2, 3, 1, 0)]
-    with PlanService(alone), ThreadPoolExecutor(4) as pool:
+    with PlanService(alone, workers=1), ThreadPoolExecutor(4) as pool:
         client = CruxClient(alone, timeout=PATIENCE)
         got = list(pool.map(lambda i: untimed(client.plan(asked[i])), order))
         bad = put(

@@ -268,7 +268,7 @@ def test_reply_over_zenoh_tells_the_wrists():
     request = msgspec.structs.replace(read_request("wall-300-floating"), want=["model"])
     with (
         open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as session,
-        PlanService(session),
+        PlanService(session, workers=1),
     ):
         reply = CruxClient(session, timeout=PATIENCE).plan(request)
     assert reply.status == "optimal"

@@ -311,7 +311,7 @@ def alone() -> Iterator[zenoh.Session]:
 def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) -> None:
     own = read_robot(file)
     request = plan_request(hanging(file))
-    with PlanService(alone), PlanService(alone, own) as service:
+    with PlanService(alone, workers=1), PlanService(alone, own, workers=1) as service:
         assert service.robot == "arms"
         heard = alone.liveliness().get("crux/**", timeout=PATIENCE)
         alive = {str(reply.ok.key_expr) for reply in heard}

@@ -15,10 +15,8 @@ from pathlib import Path
 import msgspec
 import pytest
 import zenoh
-from zenoh.handlers import FifoChannel
 
 from hand_models.base import InvalidInputError
-from planner import solving
 from planner.robots import RobotFile
 from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
 from service.answering import dispatch
@@ -247,134 +245,34 @@ def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
 # Faults and floods --------------------------------------------------------------------------------
 
 
-def test_a_fault_is_the_callers_error_and_the_service_goes_on(
-    alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_service_that_ends_is_not_there_any_more(alone: zenoh.Session) -> None:
     client = CruxClient(alone, timeout=PATIENCE)
-    with PlanService(alone):
-        with monkeypatch.context() as patch:
-            patch.setattr(solving, "plan", lambda _: 1 / 0)
-            with pytest.raises(ServiceError, match=r"the service failed \(ZeroDivisionError\)"):
-                client.plan(plan_request())
-        assert "Traceback" in caplog.text
+    with PlanService(alone, workers=1):
         assert client.plan(plan_request()).status == "optimal"
     with pytest.raises(NoServiceError):
         client.plan(plan_request())
 
 
-class Turn:
-    """A lock that knows whose it is."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self.owner: int | None = None
-
-    def acquire(self, *, timeout: float = -1.0) -> bool:
-        taken = self._lock.acquire(timeout=timeout)
-        if taken:
-            self.owner = threading.get_ident()
-        return taken
-
-    def release(self) -> None:
-        self.owner = None
-        self._lock.release()
-
-
-def test_one_question_at_a_time(alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    turn, all_sent = Turn(), threading.Event()
-
-    def exclusive(*_: object) -> None:
-        # while others wait
-        assert all_sent.wait(PATIENCE)
-        assert turn.owner == threading.get_ident()
-        raise InvalidInputError("done", field="stance")
-
-    monkeypatch.setattr(solving, "plan", exclusive)
-    # not where hands are settled: these may be known already
-    monkeypatch.setattr(dispatch, "tension_limits", exclusive)
-    monkeypatch.setattr(dispatch, "explore", exclusive)
-    stance = wall_request()["stance"]
-    questions = {
-        PLAN: wall_request(),
-        WRENCH_SPACE: {"v": 1, "stance": stance, "limb": "front_left"},
-        BODY_SPACE: {"v": 1, "stance": stance, "axes": ["fx", "fz"]},
-    }
-    service = PlanService(alone)
-    monkeypatch.setattr(service, "turn", turn)
-    with service:
-        # no more than fit into the channels while nothing is answered
-        channels = [
-            alone.get(key, payload=msgspec.json.encode(asked), encoding=JSON, timeout=PATIENCE)
-            for key, asked in 2 * list(questions.items())
-        ]
-        all_sent.set()
-        for channel in channels:
-            (reply,) = channel
-            error = Format.JSON.decode(reply.err.payload.to_bytes(), ErrorReply).error
-            assert (error.kind, error.message) == ("invalid", "done")
-
-
-def test_a_stop_does_not_wait_for_a_long_question(
-    alone: zenoh.Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
-
-    def long_question(_: object) -> None:
-        begun.set()
-        go_on.wait(0.5 * PATIENCE)
-        ended.set()
-        raise InvalidInputError("too late")
-
-    monkeypatch.setattr(solving, "plan", long_question)
-    with PlanService(alone):
-        payload = msgspec.json.encode(wall_request())
-        channel = alone.get(PLAN, payload=payload, timeout=PATIENCE)
-        assert begun.wait(PATIENCE)
-    assert not ended.is_set()
-    go_on.set()
-    list(channel)
-
-
 FLOOD, FLOODS = 300, 4
 """Questions that a flood has at once, and floods."""
 
-BEFORE = 300
-"""Others' questions that may be answered before one: far fewer than are waiting."""
 
-
-def test_a_flood_from_some_leaves_the_others_their_turn(served: Served) -> None:
+def test_floods_without_a_name_leave_a_client_its_turn(served: Served) -> None:
     payload = msgspec.json.encode(wall_request() | {"want": ["load_factor"]})
-    answered: list[int] = []
-    flooded, stop = threading.Event(), threading.Event()
-
-    def note(_: zenoh.Reply) -> None:
-        answered.append(1)
-        if len(answered) >= 4 * FLOODS:
-            flooded.set()
-
-    def flood() -> None:
-        with zenoh.open(client_config(served.endpoint)) as mine:
+    replies: queue.SimpleQueue[zenoh.Reply] = queue.SimpleQueue()
+    with contextlib.ExitStack() as sessions, CruxClient(client_config(served.endpoint)) as client:
+        client.timeout = PATIENCE
+        for _ in range(FLOODS):
+            mine = sessions.enter_context(zenoh.open(client_config(served.endpoint)))
             for _ in range(FLOOD):
-                if stop.is_set():
-                    return
-                mine.get(PLAN, note, payload=payload, timeout=PATIENCE)
-            stop.wait(PATIENCE)
-
-    floods = [threading.Thread(target=flood) for _ in range(FLOODS)]
-    with zenoh.open(client_config(served.endpoint)) as mine:
-        for thread in floods:
-            thread.start()
-        assert flooded.wait(PATIENCE)
-        before = []
-        for _ in range(3):
-            start = len(answered)
-            (answer,) = ask(mine, payload, JSON)
-            before.append(len(answered) - start)
-            assert answer.good
-        stop.set()
-        for thread in floods:
-            thread.join()
-    assert max(before) < BEFORE
+                mine.get(PLAN, replies.put, payload=payload, timeout=PATIENCE)
+        assert all(client.plan(plan_request()).status == "optimal" for _ in range(10))
+        told = [replies.get(timeout=PATIENCE) for _ in range(FLOODS * FLOOD)]
+    refused = [Format.JSON.decode(r.err.payload.to_bytes(), ErrorReply) for r in told if r.err]
+    # everybody has a reply, and who is refused knows when to come again
+    assert {reply.error.kind for reply in refused} == {"busy"}
+    assert all(reply.error.retry_after > 0.0 for reply in refused)
+    assert len(refused) < len(told)
 
 
 # Processes ----------------------------------------------------------------------------------------
@@ -405,8 +303,10 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
         out, err = server.stop(number)
         replies = [reply for channel in channels for reply in channel]
     assert server.process.returncode == 0
-    # who has no answer is told that none comes, and does not wait until his time is over
-    assert all(reply.ok is not None for reply in replies)
+    # who has no answer is told so, and does not wait until his time is over
+    assert len(replies) == len(channels)
+    refused = [Format.JSON.decode(r.err.payload.to_bytes(), ErrorReply) for r in replies if r.err]
+    assert {reply.error.kind for reply in refused} <= {"busy", "lost"}
     assert out == ""
     assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
 
@@ -539,20 +439,3 @@ def test_a_bad_flag_is_named(flags: dict, field: str) -> None:
         zenoh_config(**flags)
     assert caught.value.field == field
     assert ".rs:" not in caught.value.message
-
-
-def test_a_channel_that_is_full_makes_its_client_wait(alone: zenoh.Session) -> None:
-    """What the server builds on: zenoh loses no query of a full channel."""
-    queryable = alone.declare_queryable(PLAN, FifoChannel(1))
-    replies = []
-    sender = threading.Thread(
-        target=lambda: replies.extend(
-            alone.get(PLAN, payload=str(i), timeout=PATIENCE) for i in range(5)
-        )
-    )
-    sender.start()
-    for _ in range(5):
-        with queryable.handler.recv() as query:
-            query.reply(PLAN, query.payload.to_bytes())
-    sender.join()
-    assert [next(iter(r)).ok.payload.to_string() for r in replies] == list("01234")

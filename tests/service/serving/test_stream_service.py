@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import threading
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -64,7 +63,7 @@ def serving() -> Iterator[tuple[PlanService, str]]:
     """A service of this process, on TCP loopback."""
     endpoint = free_endpoint()
     config = zenoh_config(mode="peer", listen=[endpoint], multicast=False)
-    with open_session(config) as session, PlanService(session) as service:
+    with open_session(config) as session, PlanService(session, workers=1) as service:
         yield service, endpoint
 
 
@@ -119,34 +118,11 @@ def test_messages_come_in_the_encoding_of_the_request(serving, form: Format) -> 
         assert form.decode(told.payload.to_bytes(), SetPointsReply).verified
 
 
-def test_set_points_do_not_wait_for_other_questions(serving, client: CruxClient) -> None:
-    declared = client.stream(declaration())
-    request = SetPointsRequest(v=1, stream=declared.stream, body_wrench=tuple(WRENCH))
-    with serving[0].turn:
-        # while a question is answered that takes longer than anyone waits
-        assert client.set_points(request).verified
-
-
 def test_an_unknown_stream_is_an_error_that_names_the_field(client: CruxClient) -> None:
     request = SetPointsRequest(v=1, stream="nobody", body_wrench=tuple(WRENCH))
     with pytest.raises(ServiceError, match="no stream 'nobody'") as caught:
         client.set_points(request)
     assert (caught.value.kind, caught.value.field) == ("invalid", "stream")
-
-
-def test_a_service_that_ends_lets_its_streams_go() -> None:
-    def running() -> int:
-        return sum("crux-stream" in thread.name for thread in threading.enumerate())
-
-    before = running()
-    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with open_session(config) as session, PlanService(session) as service:
-        client = CruxClient(session, service.robot, timeout=PATIENCE)
-        declared = client.stream(declaration(radius=5.0))
-        far = tuple(part + 5.0 for part in declared.body_wrench)
-        client.set_points(SetPointsRequest(v=1, stream=declared.stream, body_wrench=far))
-        assert running() == before + 1
-    assert running() == before
 
 
 # Messages -----------------------------------------------------------------------------------------

@@ -1,0 +1,186 @@
+"""Processes of a service that answers: each takes one question at a time in each of its lanes.
+
+A process can be killed at any time, which costs the questions in its lanes and nothing else.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any, Final, Generic, TypeVar
+
+from service.processes.workers import one_thread
+
+__all__ = ["Lane", "Make", "Station", "resident"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+SWITCH: Final = 5e-4
+"""How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
+times as long, in which a short question would wait for a long one at each of its steps."""
+
+OUT_OF_MEMORY: Final = 77
+"""Exit status of a process that may not have the memory that a question needs."""
+
+Make = Callable[[], Callable[[T], R]]
+"""Called once in a process: returns what answers there."""
+
+
+class Lane(Generic[T, R]):
+    """One of a process's lanes: it has at most one question.
+
+    Attributes
+    ----------
+    station : Station
+    number : int
+        Among its process's lanes.
+    pipe : Connection
+        To it.
+    ready : bool
+        Whether it has said that it can work.
+    """
+
+    def __init__(self, station: Station[T, R], number: int, pipe: Connection) -> None:
+        self.station = station
+        self.number = number
+        self.pipe = pipe
+        self.ready = False
+
+    def give(self, question: T) -> None:
+        """Send a question; of a process that has died, `take` tells."""
+        with suppress(OSError):
+            self.pipe.send(question)
+
+    def take(self) -> R | None:
+        """Return what has come; None for the word that the lane is ready.
+
+        Raises
+        ------
+        EOFError
+            If the process has died.
+        """
+        try:
+            found: R | None = self.pipe.recv()
+        except OSError:
+            raise EOFError from None
+        self.ready = True
+        return found
+
+
+class Station(Generic[T, R]):
+    """A process that answers.
+
+    Parameters
+    ----------
+    make : callable
+        Called once in the process; returns what answers a question. It, questions and answers can
+        be pickled. What it raises ends the process.
+    lanes : int
+        How many questions it has at a time, each in a thread of its own.
+    memory : int or None
+        Bytes that it may have, where the system can keep it to them.
+
+    Attributes
+    ----------
+    process : Process
+    lanes : tuple of Lane
+    """
+
+    def __init__(self, make: Make[T, R], lanes: int, memory: int | None) -> None:
+        context = multiprocessing.get_context("spawn")
+        pipes = [context.Pipe() for _ in range(lanes)]
+        others = [other for _, other in pipes]
+        self.process = context.Process(target=_answer_each, args=(others, memory), daemon=True)
+        with one_thread():
+            self.process.start()
+        for other in others:
+            # the process has the other ends alone, so that its death ends the pipes
+            other.close()
+        self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(pipes))
+        # what it is to make may be large: by a pipe, of which a death is told
+        with suppress(OSError):
+            self.lanes[0].pipe.send(make)
+
+    @property
+    def ready(self) -> bool:
+        """Whether it has said that it can work."""
+        return all(lane.ready for lane in self.lanes)
+
+    def kill(self) -> str:
+        """End it, whatever it does; return how it ended."""
+        self.process.join(0.05 if self.process.exitcode is None else 0.0)
+        died = self.process.exitcode
+        self.process.kill()
+        self.process.join()
+        for lane in self.lanes:
+            lane.pipe.close()
+        if died is None:
+            return "was stopped"
+        if died == OUT_OF_MEMORY:
+            return "had not enough memory"
+        return f"was ended by signal {-died}" if died < 0 else f"ended with status {died}"
+
+
+def resident(pid: int | None) -> int | None:
+    """Return a process's resident memory [bytes]; None where the system does not tell it so."""
+    try:
+        with open(f"/proc/{pid}/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _answer_each(pipes: list[Connection], memory: int | None) -> None:
+    """Answer what comes through pipes until their other ends are gone: a process's whole run."""
+    # these are the service's to answer; with it, its processes end
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    threading.Thread(
+        target=_end_with, args=(multiprocessing.parent_process(),), daemon=True
+    ).start()
+    sys.setswitchinterval(SWITCH)
+    make = pipes[0].recv()
+    answer = make()
+    _keep_to(memory)
+    for pipe in pipes[1:]:
+        threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()
+    _lane(answer, pipes[0])
+    os._exit(0)
+
+
+def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
+    """Answer what comes through one pipe."""
+    with suppress(EOFError, OSError):
+        pipe.send(None)
+        while True:
+            question = pipe.recv()
+            try:
+                result = answer(question)
+                pipe.send(result)
+            except MemoryError:
+                # nothing here can be trusted to go on
+                os._exit(OUT_OF_MEMORY)
+            del question, result
+
+
+def _end_with(parent: Any) -> None:
+    """End this process when its parent ends, whatever it does."""
+    parent.join()
+    os._exit(1)
+
+
+def _keep_to(memory: int | None) -> None:
+    """Let allocations fail that would take this process beyond its memory, where that exists."""
+    if memory is None or sys.platform != "linux":
+        return
+    import resource
+
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))

@@ -1,0 +1,170 @@
+"""A service's processes: started, told from each other, replaced."""
+
+from __future__ import annotations
+
+import time
+from multiprocessing.connection import Connection
+from typing import Final
+
+from service.processes import Done, Job, Lane, Make, Station, resident
+from service.replies import ProcessHealth
+from service.serving.question import Question
+
+__all__ = ["Crew"]
+
+GRACE: Final = 0.5
+"""How long beyond its deadline a process may take to say that it is over [s]."""
+
+HANGS: Final = 30.0
+"""The same of the process that has the streams: with it, they are lost [s]."""
+
+RESTING: Final = 1.0
+"""How long no process is started after one that did not live to be ready; doubled each time [s]."""
+
+LONGEST_REST: Final = 30.0
+"""The longest such time [s]."""
+
+GROWN: Final = 700 * 2**20
+"""Resident memory of a process that is replaced when it has nothing to do [bytes]."""
+
+STREAMS_LANES: Final = 2
+"""Of the process that has the streams: one for set-points, one for what else is short."""
+
+SET_POINTS_LANE: Final = 0
+
+
+class Crew:
+    """Processes that answer questions, and one that has the streams.
+
+    Parameters
+    ----------
+    make : callable
+        What answers, in each process.
+    workers : int
+        Processes that answer.
+    memory : int
+        Bytes that each may have.
+
+    Attributes
+    ----------
+    workers : int
+    work : dict of Lane to Question or None
+        What each lane does.
+    rests_until : float
+        When processes are started again, on the clock of `time.perf_counter`.
+    stillborn : int
+        Processes in a row that died before they were ready.
+    """
+
+    def __init__(self, make: Make[Job, Done], workers: int, memory: int) -> None:
+        self._make, self.workers, self._memory = make, workers, memory
+        self.work: dict[Lane[Job, Done], Question | None] = {}
+        self.rests_until = 0.0
+        self.stillborn = 0
+        self._streams: Station[Job, Done] | None = None
+
+    @property
+    def stations(self) -> list[Station[Job, Done]]:
+        """The processes."""
+        return list(dict.fromkeys(lane.station for lane in self.work))
+
+    @property
+    def pipes(self) -> dict[Connection, Lane[Job, Done]]:
+        """The lanes, by their pipes."""
+        return {lane.pipe: lane for lane in self.work}
+
+    @property
+    def up(self) -> bool:
+        """Whether questions of all kinds can be answered."""
+        ready = [station for station in self.stations if station.ready]
+        return self._streams in ready and len(ready) > 1
+
+    def hire(self) -> None:
+        """Start the processes that are missing."""
+        if time.perf_counter() < self.rests_until:
+            return
+        if self._streams is None:
+            self._streams = Station(self._make, STREAMS_LANES, self._memory)
+            self.work |= dict.fromkeys(self._streams.lanes)
+        for _ in range(1 + self.workers - len(self.stations)):
+            self.work |= dict.fromkeys(Station(self._make, 1, self._memory).lanes)
+
+    def has_streams(self, lane: Lane[Job, Done]) -> bool:
+        """Whether a lane is of the process that has the streams."""
+        return lane.station is self._streams
+
+    def is_for_set_points(self, lane: Lane[Job, Done]) -> bool:
+        """Whether a lane is kept for set-points."""
+        return self.has_streams(lane) and lane.number == SET_POINTS_LANE
+
+    def idle(self) -> list[Lane[Job, Done]]:
+        """Return the lanes that have nothing to do."""
+        return [
+            lane
+            for lane, asked in self.work.items()
+            # of one that has just died, its pipe tells next
+            if asked is None and lane.ready and lane.station.process.is_alive()
+        ]
+
+    def dear(self) -> int:
+        """Return how many processes that answer questions have one that may take long."""
+        asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
+        return sum(each is not None and each.dear for each in asked)
+
+    def ends(self, lane: Lane[Job, Done]) -> tuple[float, float] | None:
+        """Return when a lane's question and then its process are given up; None without one."""
+        question = self.work[lane]
+        if question is None:
+            return None
+        late = question.deadline + GRACE
+        return late, question.deadline + HANGS if self.has_streams(lane) else late
+
+    def has_grown(self, lane: Lane[Job, Done]) -> bool:
+        """Whether a lane's process has so much memory that a new one is better."""
+        size = resident(lane.station.process.pid)
+        return size is not None and size > GROWN and not self.has_streams(lane)
+
+    def dismiss(self, station: Station[Job, Done]) -> tuple[str, list[Question]]:
+        """End a process.
+
+        Returns
+        -------
+        how : str
+            It ended.
+        left : list of Question
+            That it had, and nobody has replied to.
+        """
+        asked = [self.work.pop(lane) for lane in station.lanes]
+        if station is self._streams:
+            self._streams = None
+        if station.ready:
+            self.stillborn = 0
+        else:
+            rest = min(RESTING * 2.0**self.stillborn, LONGEST_REST)
+            self.rests_until = time.perf_counter() + rest
+            self.stillborn += 1
+        left = [each for each in asked if each is not None and not each.replied]
+        return station.kill(), left
+
+    def left(self) -> list[Question]:
+        """Return the questions in work that nobody has replied to."""
+        return [each for each in self.work.values() if each is not None and not each.replied]
+
+    def end(self) -> None:
+        """End all processes."""
+        for station in self.stations:
+            station.kill()
+        self.work.clear()
+
+    def states(self) -> list[ProcessHealth]:
+        """Return what each process does."""
+        return [self._state(station) for station in self.stations]
+
+    def _state(self, station: Station[Job, Done]) -> ProcessHealth:
+        busy = any(self.work[lane] is not None for lane in station.lanes)
+        return ProcessHealth(
+            pid=station.process.pid,
+            purpose="streams" if station is self._streams else "questions",
+            state="starting" if not station.ready else "working" if busy else "idle",
+            resident=resident(station.process.pid),
+        )

@@ -1,0 +1,362 @@
+"""Which question is answered when, and by which process: one thread, which never waits for any.
+
+Questions wait by their kind: set-points; those about known stances, which are short; others; and
+those that may take long, which leave one process to the others. One more process has the streams
+and a lane for what is short, so that nothing delays these. What is over its deadline ends, with its
+process if it must be.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection, wait
+from queue import Empty, SimpleQueue
+from typing import Final, cast
+
+import zenoh
+
+from hand_models.base import CruxError
+from planner.deadline import DeadlineError
+from service.answering import Answer
+from service.processes import Done, Job, Lane, Station
+from service.serving.costs import Costs
+from service.serving.crew import Crew
+from service.serving.mail import Mail
+from service.serving.question import Question, take
+from service.serving.waiting import Kind, Waiting
+from service.serving.watch import State, Told, Watch
+from service.wire import PLAN, SET_POINTS, STREAM, BusyError, LostError, encode_error
+
+__all__ = ["Dispatcher"]
+
+log = logging.getLogger(__name__)
+
+STILLBORN: Final = 3
+"""Processes in a row that may die before they are ready, when a service starts."""
+
+STOPS: Final = 2.0
+"""How long the end of the service waits for questions in work [s]."""
+
+QUIET: Final = 0.2
+"""How long no question may have come at the end: those on their way are to be told [s]."""
+
+MAILS: Final = 0.5
+"""And for replies that are on their way [s]."""
+
+FIRST_GUESS: Final = 0.05
+"""How long questions take, before any has been answered [s]."""
+
+AVERAGED: Final = 20
+"""About how many questions the mean time is of."""
+
+TOLD_IN: Final = 1.0
+"""How long another thread waits to be told what the service does [s]."""
+
+UNNAMED: Final = 8
+"""Clients without a name as which those without a name are replied to."""
+
+COME_AGAIN: Final = (0.05, 10.0)
+"""Least and longest time after which a client is told to come again [s]."""
+
+
+class Dispatcher:
+    """Hands questions to processes, and their answers to the mail, in a thread of its own.
+
+    Parameters
+    ----------
+    crew : Crew
+        With 2 processes or more, questions that may take long leave one to others.
+    seconds : float
+        The deadline of a question that names none [s].
+    robot : str
+        Whose service it is.
+
+    Attributes
+    ----------
+    watch : Watch
+        Is told what happens.
+    """
+
+    def __init__(self, crew: Crew, seconds: float, robot: str) -> None:
+        self._crew, self._seconds = crew, seconds
+        self.watch = Watch(robot, self._state)
+        self._mail = Mail()
+        self._costs = Costs()
+        self._waiting = Waiting()
+        self._mean = FIRST_GUESS
+        self._unnamed = 0
+        self._started = threading.Event()
+        self._stops_at: float | None = None
+        self._quiet_from = 0.0
+        self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._woken, self._waker = Pipe(duplex=False)
+        self._bell = threading.Lock()
+        self._rung = False
+        self._thread = threading.Thread(target=self._run, name="crux-dispatcher", daemon=True)
+
+    def start(self) -> None:
+        """Start the processes and the thread, and wait until questions can be answered.
+
+        Raises
+        ------
+        LostError
+            If processes die before they are ready.
+        """
+        self._thread.start()
+        self._started.wait()
+        if not self._crew.up:
+            self.stop()
+            self.close()
+            raise LostError("the processes that answer do not live to be ready; the log says how")
+
+    def ask(self, query: zenoh.Query, key: str) -> None:
+        """Take a query at a key; returns at once, whatever the thread."""
+        self._post(partial(self._admit, query, key, time.perf_counter()))
+
+    def look(self, query: zenoh.Query, key: str, told: Callable[[], Told]) -> None:
+        """Take an operator's query; returns at once."""
+        self._post(lambda: self._send(query, key, "", Answer(*told(), True)))
+
+    def gone(self, client: str) -> None:
+        """Say that a client has gone: what it asked is not answered unless it is in work."""
+        self._post(partial(self._drop, client))
+
+    def stop(self) -> None:
+        """Refuse what waits and what still comes, and wait a little for what is in work."""
+        self._post(self._end)
+        self._thread.join()
+
+    def close(self) -> None:
+        """Refuse what has come since the stop, and wait a little for replies on their way."""
+        self._take_in()
+        self._mail.close(MAILS)
+
+    def _post(self, event: Callable[[], None]) -> None:
+        """Let the dispatcher's own thread do something; all that follows is in it."""
+        self._inbox.put(event)
+        with self._bell:
+            if not self._rung:
+                self._rung = True
+                self._waker.send_bytes(b"!")
+
+    def _run(self) -> None:
+        while not self._ended():
+            self._guarded(self._step)
+        self._crew.end()
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        """Do something of which a fault ends nothing else."""
+        try:
+            step()
+        except Exception:
+            log.exception("the dispatcher failed")
+
+    def _step(self) -> None:
+        if self._stops_at is None:
+            self._crew.hire()
+            self._deal()
+        pipes = self._crew.pipes
+        for ready in wait([self._woken, *pipes], self._pause()):
+            if ready is self._woken:
+                self._take_in()
+            elif (lane := pipes[cast(Connection, ready)]) in self._crew.work:
+                self._take_back(lane)
+        self._end_overdue()
+        if self._crew.up or self._crew.stillborn >= STILLBORN:
+            self._started.set()
+
+    def _take_in(self) -> None:
+        """Do what other threads have posted."""
+        if self._woken.poll():
+            self._woken.recv_bytes()
+        with self._bell:
+            self._rung = False
+        while True:
+            try:
+                event = self._inbox.get_nowait()
+            except Empty:
+                return
+            self._guarded(event)
+
+    def _pause(self) -> float | None:
+        """Return how long there is nothing to do unless something comes [s]."""
+        now = time.perf_counter()
+        times = [question.deadline for question in self._waiting]
+        for lane in self._crew.work:
+            times += self._crew.ends(lane) or ()
+        if self._stops_at is None:
+            times.append(self._crew.rests_until)
+        else:
+            times += [self._stops_at, self._quiet_from]
+        later = [each - now for each in times if each > now]
+        return min(later) if later else None
+
+    # questions -----------------------------------------------------------------------------------
+
+    def _admit(self, query: zenoh.Query, key: str, arrived: float) -> None:
+        question = take(query, key, arrived, self._seconds)
+        if self._stops_at is not None:
+            self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+            self._quiet_from = time.perf_counter() + QUIET
+            return
+        kind = self._kind(question)
+        if self._waiting.has_room(kind, question):
+            self._waiting.put(kind, question)
+            return
+        low, high = COME_AGAIN
+        ahead = self._mean * len(self._waiting) / self._crew.workers
+        again = round(min(max(ahead, low), high), 3)
+        busy = f"the service has too many questions; ask again in {again:g} s"
+        self._refuse(question, BusyError(busy, again))
+
+    def _kind(self, question: Question) -> Kind:
+        if question.name == SET_POINTS:
+            return Kind.SET_POINTS
+        if question.dear:
+            return Kind.DEAR
+        if question.name == PLAN and self._costs.is_short(question.stance):
+            return Kind.SHORT
+        return Kind.DEAR if self._costs.is_dear(question.client) else Kind.OTHER
+
+    def _deal(self) -> None:
+        """Give lanes that have nothing to do the questions whose turn it is."""
+        idle = self._crew.idle()
+        others = [lane for lane in idle if not self._crew.has_streams(lane)]
+        most = max(1, self._crew.workers - 1)
+        while others and (question := self._waiting.next(dear=self._crew.dear() < most)):
+            knowing = [lane for lane in others if self._knows(lane, question)]
+            lane = (knowing or others)[0]
+            others.remove(lane)
+            self._give(lane, question)
+        for lane in idle:
+            if not self._crew.has_streams(lane):
+                continue
+            short = (Kind.DECLARED, Kind.SHORT)
+            kinds = (Kind.SET_POINTS,) if self._crew.is_for_set_points(lane) else short
+            if question := self._waiting.take(*kinds):
+                self._give(lane, question)
+
+    def _knows(self, lane: Lane[Job, Done], question: Question) -> bool:
+        return self._costs.knows(_number(lane.station), question.stance)
+
+    def _give(self, lane: Lane[Job, Done], question: Question) -> None:
+        question.begun = time.perf_counter()
+        self._crew.work[lane] = question
+        rehearsal = question.name == STREAM and not question.rehearsed
+        lane.give(question.job(question.begun, rehearsal))
+
+    def _drop(self, client: str) -> None:
+        for question in self._waiting.remove(lambda each: each.client == client):
+            self.watch.told(question, "gone", 0.0)
+            self._mail.send(client, question.query.drop)
+
+    # answers -------------------------------------------------------------------------------------
+
+    def _take_back(self, lane: Lane[Job, Done]) -> None:
+        try:
+            done = lane.take()
+        except EOFError:
+            how, left = self._dismiss(lane.station)
+            for question in left:
+                lost = f"the process that worked on it {how}; nothing else was lost with it"
+                self._refuse(question, LostError(lost))
+            return
+        if done is None:
+            return
+        asked = self._crew.work[lane]
+        self._crew.work[lane] = None
+        assert asked is not None
+        self._mean += (done.seconds - self._mean) / AVERAGED
+        stance = asked.stance if asked.name == PLAN else None
+        self._costs.took(asked.client, stance, _number(lane.station), done.seconds)
+        if asked.name == STREAM and not asked.rehearsed and done.answer.good:
+            asked.rehearsed = True
+            self._waiting.put(Kind.DECLARED, asked)
+        elif not asked.replied:
+            self._reply(asked, done.answer, done.seconds)
+        if self._crew.has_grown(lane):
+            self._dismiss(lane.station, "had grown too large")
+
+    def _end_overdue(self) -> None:
+        """End questions whose time is over, and processes that do not stop at it."""
+        now = time.perf_counter()
+        for question in self._waiting.remove(lambda each: each.deadline <= now):
+            missing = "it was its turn, since the service is busy"
+            self._refuse(question, DeadlineError(question.seconds, missing))
+        for lane, asked in list(self._crew.work.items()):
+            ends = self._crew.ends(lane) if lane in self._crew.work else None
+            if asked is None or ends is None or ends[0] > now:
+                continue
+            if not asked.replied:
+                missing = "there was an answer, and its work was broken off"
+                self._refuse(asked, DeadlineError(asked.seconds, missing))
+            if ends[1] <= now:
+                self._dismiss(lane.station, "did not stop at a deadline")
+
+    def _dismiss(
+        self, station: Station[Job, Done], why: str | None = None
+    ) -> tuple[str, list[Question]]:
+        """End a process, which another replaces; as `Crew.dismiss`."""
+        how, left = self._crew.dismiss(station)
+        self._costs.lost(_number(station))
+        self.watch.ended(station.process.pid, why or how)
+        return how, left
+
+    def _refuse(self, question: Question, error: CruxError) -> None:
+        coded = encode_error(error.kind, error, question.form, question.id)
+        self._reply(question, Answer(*coded, False, error.kind), 0.0)
+
+    def _reply(self, question: Question, answer: Answer, seconds: float) -> None:
+        question.replied, question.payload = True, b""
+        self.watch.told(question, answer.status, seconds)
+        self._send(question.query, question.key, question.client, answer)
+
+    def _send(self, query: zenoh.Query, key: str, client: str, answer: Answer) -> None:
+        def send() -> None:
+            with query:
+                if answer.good:
+                    query.reply(key, answer.payload, encoding=answer.encoding)
+                else:
+                    query.reply_err(answer.payload, encoding=answer.encoding)
+
+        if not client:
+            self._unnamed = (self._unnamed + 1) % UNNAMED
+        self._mail.send(client or str(self._unnamed), send)
+
+    def _state(self) -> State:
+        """Return what the service does, to whatever thread."""
+        if threading.current_thread() is self._thread or not self._thread.is_alive():
+            return State(self._crew.states(), self._waiting.counts())
+        found: SimpleQueue[State] = SimpleQueue()
+        self._post(lambda: found.put(self._state()))
+        try:
+            return found.get(timeout=TOLD_IN)
+        except Empty:
+            return State([], {})
+
+    # the end -------------------------------------------------------------------------------------
+
+    def _end(self) -> None:
+        now = time.perf_counter()
+        self._stops_at, self._quiet_from = now + STOPS, now + QUIET
+        for question in self._waiting.remove(lambda _: True):
+            self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+
+    def _ended(self) -> bool:
+        if self._stops_at is None:
+            return False
+        left, now = self._crew.left(), time.perf_counter()
+        if (left or now < self._quiet_from) and now < self._stops_at:
+            return False
+        for question in left:
+            self._refuse(question, LostError("the service ended before there was an answer"))
+        return True
+
+
+def _number(station: Station[Job, Done]) -> int:
+    return station.process.pid or 0

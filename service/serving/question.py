@@ -1,0 +1,136 @@
+"""A query that a service has taken, and what of it is read before its turn comes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import msgspec
+import zenoh
+
+from service.processes import Job
+from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError
+
+__all__ = ["Question", "take"]
+
+READ: Final = 2**18
+"""Bytes of a payload that is looked into before its turn; what is larger is a process's to read."""
+
+
+class _Head(msgspec.Struct):
+    """Of a request's fields those that decide when it is answered."""
+
+    id: Any = None
+    deadline: Any = None
+    want: Any = None
+    stance: msgspec.Raw = msgspec.Raw()
+
+
+@dataclass(eq=False, slots=True)
+class Question:
+    """A query on its way.
+
+    Attributes
+    ----------
+    query : Query
+        To be answered once, and let go then.
+    key, name : str
+        Of the service; the name is its last part.
+    client : str
+        Its session's identifier; empty for clients that do not tell it.
+    arrived : float
+        On the clock of `time.perf_counter`.
+    payload : bytes
+    encoding : str
+    deadline : float
+        When its time is over, on the same clock.
+    seconds : float
+        How long that is [s].
+    id : str or None
+    stance : int or None
+        A hash of its stance, where it could be read.
+    dear : bool
+        Whether it may take long.
+    rehearsed : bool
+        Whether it declares a stream that another process has found to be possible.
+    replied : bool
+    """
+
+    query: zenoh.Query
+    key: str
+    name: str
+    client: str
+    arrived: float
+    payload: bytes
+    encoding: str
+    seconds: float
+    id: str | None = None
+    stance: int | None = None
+    dear: bool = False
+    rehearsed: bool = False
+    replied: bool = False
+    begun: float = -1.0
+    deadline: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.deadline = self.arrived + self.seconds
+
+    @property
+    def form(self) -> Format:
+        """Its encoding; JSON where that is none."""
+        try:
+            return Format.named(self.encoding)
+        except MalformedError:
+            return Format.JSON
+
+    def job(self, now: float, rehearsal: bool) -> Job:
+        """Return it for a process."""
+        waited = now - self.arrived
+        return Job(self.name, self.payload, self.encoding, waited, self.seconds, rehearsal)
+
+
+def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Question:
+    """Return a query as a question.
+
+    Parameters
+    ----------
+    query : Query
+    key : str
+    arrived : float
+    longest : float
+        The deadline of one that names none [s].
+    """
+    payload = b"" if query.payload is None else query.payload.to_bytes()
+    source = query.source_info
+    name = key.rpartition("/")[2]
+    question = Question(
+        query=query,
+        key=key,
+        name=name,
+        client="" if source is None else str(source.source_id.zid),
+        arrived=arrived,
+        payload=payload,
+        encoding="" if query.encoding is None else str(query.encoding),
+        seconds=longest,
+        dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > READ,
+    )
+    if len(payload) <= READ:
+        _read(question)
+    return question
+
+
+def _read(question: Question) -> None:
+    try:
+        head = question.form.decode(question.payload, _Head)
+    except (MalformedError, msgspec.ValidationError):
+        # its process says what is wrong with it
+        return
+    if isinstance(head.id, str):
+        question.id = head.id
+    seconds = head.deadline
+    if isinstance(seconds, int | float) and math.isfinite(seconds) and seconds > 0.0:
+        question.seconds = float(seconds)
+        question.deadline = question.arrived + question.seconds
+    question.dear = question.dear or (isinstance(head.want, list) and "robust" in head.want)
+    question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None

@@ -1,0 +1,150 @@
+"""Questions that wait: in queues by their kind, in which each client has its turn."""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator
+from enum import Enum
+from typing import Final
+
+from service.serving.question import Question
+
+__all__ = ["FairQueue", "Kind", "Waiting"]
+
+EACH: Final = 32
+"""Questions of one client that wait in a queue; further ones are told to come again."""
+
+ALL: Final = 256
+"""Questions of all clients that wait in a queue."""
+
+HELD: Final = 2**28
+"""Bytes of all questions that wait."""
+
+
+class Kind(Enum):
+    """Queues, and what their questions are."""
+
+    SET_POINTS = "set_points"
+    """To streams."""
+    DECLARED = "declared"
+    """Streams that a process has found to be possible."""
+    SHORT = "short"
+    """About stances that are known."""
+    OTHER = "other"
+    DEAR = "dear"
+    """That may take long."""
+
+
+class FairQueue:
+    """Questions by client: first in, first out among a client's, and clients in turn."""
+
+    def __init__(self) -> None:
+        self._of: OrderedDict[str, deque[Question]] = OrderedDict()
+        self._size = 0
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __iter__(self) -> Iterator[Question]:
+        for questions in self._of.values():
+            yield from questions
+
+    def has_room(self, client: str) -> bool:
+        """Whether one more question of a client may wait."""
+        return self._size < ALL and len(self._of.get(client, ())) < EACH
+
+    def put(self, question: Question) -> None:
+        """Let a question wait."""
+        self._of.setdefault(question.client, deque()).append(question)
+        self._size += 1
+
+    def take(self) -> Question:
+        """Return the next question; the client whose it is comes last from then on."""
+        client, questions = next(iter(self._of.items()))
+        question = questions.popleft()
+        if questions:
+            self._of.move_to_end(client)
+        else:
+            del self._of[client]
+        self._size -= 1
+        return question
+
+    def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
+        """Take some questions out, wherever they wait; return them."""
+        gone = []
+        for client, questions in list(self._of.items()):
+            out = [question for question in questions if unwanted(question)]
+            if not out:
+                continue
+            gone += out
+            kept = deque(question for question in questions if not unwanted(question))
+            if kept:
+                self._of[client] = kept
+            else:
+                del self._of[client]
+        self._size -= len(gone)
+        return gone
+
+
+class Waiting:
+    """All questions that wait."""
+
+    def __init__(self) -> None:
+        self._queues = {kind: FairQueue() for kind in Kind}
+        self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        return sum(map(len, self._queues.values()))
+
+    def __iter__(self) -> Iterator[Question]:
+        for queue in self._queues.values():
+            yield from queue
+
+    def counts(self) -> dict[str, int]:
+        """Return how many there are, by kind."""
+        return {kind.value: len(queue) for kind, queue in self._queues.items()}
+
+    def has_room(self, kind: Kind, question: Question) -> bool:
+        """Whether a question may wait, too."""
+        fits = not self._bytes or self._bytes + len(question.payload) <= HELD
+        return fits and self._queues[kind].has_room(question.client)
+
+    def put(self, kind: Kind, question: Question) -> None:
+        """Let a question wait."""
+        self._bytes += len(question.payload)
+        self._queues[kind].put(question)
+
+    def take(self, *kinds: Kind) -> Question | None:
+        """Return the next question of the first of some kinds that has one."""
+        for kind in kinds:
+            if self._queues[kind]:
+                question = self._queues[kind].take()
+                self._bytes -= len(question.payload)
+                return question
+        return None
+
+    def next(self, *, dear: bool) -> Question | None:
+        """Return the next question of those kinds that have their turns one after another.
+
+        Parameters
+        ----------
+        dear : bool
+            Whether it may be one that takes long.
+        """
+        for _ in range(len(self._turns)):
+            kind = self._turns[0]
+            self._turns.rotate(-1)
+            if kind is Kind.DEAR and not dear:
+                continue
+            question = self.take(kind)
+            if question is not None:
+                question.dear = kind is Kind.DEAR
+                return question
+        return None
+
+    def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
+        """Take some questions out, wherever they wait; return them."""
+        gone = [each for queue in self._queues.values() for each in queue.remove(unwanted)]
+        self._bytes -= sum(len(question.payload) for question in gone)
+        return gone

@@ -1,0 +1,220 @@
+"""What an operator sees of a service: a line a question, its health, and counts for Prometheus."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections import Counter as Counts
+from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final, NamedTuple
+
+from prometheus_client import (
+    CONTENT_TYPE_LATEST,
+    CollectorRegistry,
+    Counter,
+    Histogram,
+    generate_latest,
+    start_http_server,
+)
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from service.replies import HealthReply, LastFailure, ProcessHealth
+from service.serving.question import Question
+from service.wire import Format
+
+__all__ = ["JsonLines", "State", "Told", "Watch"]
+
+log = logging.getLogger(__name__)
+
+BUCKETS: Final = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Upper ends of what times are counted in [s]."""
+
+LOOPBACK: Final = "127.0.0.1"
+
+FAILURES: Final = frozenset({"failed", "internal", "lost", "deadline"})
+"""Statuses and kinds of error that are the service's, and not the question's."""
+
+Told = tuple[bytes, str]
+"""What an operator is told, and its encoding."""
+
+
+class State(NamedTuple):
+    """What a service does at this moment.
+
+    Attributes
+    ----------
+    processes : list of ProcessHealth
+    waiting : dict of str to int
+        Questions by the kind of their queue.
+    """
+
+    processes: list[ProcessHealth]
+    waiting: dict[str, int]
+
+
+class Watch:
+    """Counts and tells what happens in a service; of its dispatcher's thread.
+
+    Parameters
+    ----------
+    robot : str
+    state : callable
+        Returns what the service does at this moment.
+    """
+
+    def __init__(self, robot: str, state: Callable[[], State]) -> None:
+        self._robot, self._state = robot, state
+        self._started = time.time()
+        self._failure: LastFailure | None = None
+        self._replied = 0
+        self.registry = kept = CollectorRegistry()
+        self._questions = Counter(
+            "crux_questions",
+            "Questions that have been replied to.",
+            ["key", "status"],
+            registry=kept,
+        )
+        self._waited = Histogram(
+            "crux_waiting_seconds",
+            "From arrival to work.",
+            ["key"],
+            buckets=BUCKETS,
+            registry=kept,
+        )
+        self._worked = Histogram(
+            "crux_work_seconds", "Of a process.", ["key"], buckets=BUCKETS, registry=kept
+        )
+        self._ended = Counter(
+            "crux_processes_ended", "Processes that were replaced.", registry=kept
+        )
+        self.registry.register(_Now(state, self._started))
+
+    def serve(self, port: int) -> None:
+        """Give Prometheus its text over HTTP, on this machine alone.
+
+        Raises
+        ------
+        OSError
+            If the port is taken.
+        """
+        start_http_server(port, addr=LOOPBACK, registry=self.registry)
+
+    def told(self, question: Question, status: str, worked: float) -> None:
+        """Count a reply.
+
+        Parameters
+        ----------
+        question : Question
+        status : str
+            Of the reply, or the kind of an error.
+        worked : float
+            How long a process took for it [s].
+        """
+        self._replied += 1
+        now = time.perf_counter()
+        waited = (now if question.begun < 0.0 else question.begun) - question.arrived
+        self._questions.labels(question.name, status).inc()
+        self._waited.labels(question.name).observe(waited)
+        if worked > 0.0:
+            self._worked.labels(question.name).observe(worked)
+        if status in FAILURES:
+            self._failure = LastFailure(kind=status, about=question.name, at=time.time())
+        if log.isEnabledFor(logging.INFO):
+            line = {
+                "key": question.key,
+                "id": question.id,
+                "client": question.client or None,
+                "waited": round(waited, 6),
+                "worked": round(worked, 6),
+                "status": status,
+            }
+            log.info(
+                "%s %s: %s after %.1f ms, %.1f ms of them at work; client %s",
+                question.key,
+                "-" if question.id is None else repr(question.id),
+                status,
+                1e3 * (now - question.arrived),
+                1e3 * worked,
+                question.client or "unnamed",
+                extra={"question": line},
+            )
+
+    def ended(self, pid: int | None, how: str) -> None:
+        """Count a process that is replaced."""
+        self._ended.inc()
+        self._failure = LastFailure(kind="lost", about=f"process {pid} {how}", at=time.time())
+        log.warning("process %s %s; another takes its place", pid, how)
+
+    def health(self) -> Told:
+        """Return the service's health as a reply."""
+        state = self._state()
+        reply = HealthReply(
+            robot=self._robot,
+            version=_version(),
+            uptime=time.time() - self._started,
+            replied=self._replied,
+            waiting=state.waiting,
+            processes=state.processes,
+            last_failure=self._failure,
+        )
+        return Format.JSON.encode(reply), Format.JSON.label(reply)
+
+    def metrics(self) -> Told:
+        """Return what has been counted, as Prometheus reads it."""
+        return generate_latest(self.registry), CONTENT_TYPE_LATEST
+
+
+class _Now(Collector):
+    """What is only so at the moment when it is asked for."""
+
+    def __init__(self, state: Callable[[], State], started: float) -> None:
+        self._state, self._started = state, started
+
+    def describe(self) -> list[Metric]:
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        state = self._state()
+        up = "Since the service was started."
+        yield GaugeMetricFamily("crux_uptime_seconds", up, time.time() - self._started)
+        waiting = GaugeMetricFamily(
+            "crux_questions_waiting", "Questions that wait, by kind.", labels=["kind"]
+        )
+        for kind, count in state.waiting.items():
+            waiting.add_metric([kind], count)
+        yield waiting
+        processes = GaugeMetricFamily(
+            "crux_processes", "Processes by what they do.", labels=["purpose", "state"]
+        )
+        for (purpose, does), count in Counts((p.purpose, p.state) for p in state.processes).items():
+            processes.add_metric([purpose, does], count)
+        yield processes
+        memory = GaugeMetricFamily(
+            "crux_process_resident_bytes", "Memory of each process.", labels=["pid", "purpose"]
+        )
+        for each in state.processes:
+            if each.resident is not None:
+                memory.add_metric([str(each.pid), each.purpose], each.resident)
+        yield memory
+
+
+class JsonLines(logging.Formatter):
+    """Log lines as JSON objects: time, level, message, and all of a question's fields."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line: dict[str, object] = {"time": record.created, "level": record.levelname.lower()}
+        question = getattr(record, "question", None)
+        line |= {"message": record.getMessage()} if question is None else question
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        return json.dumps(line)
+
+
+def _version() -> str | None:
+    try:
+        return version("crux")
+    except PackageNotFoundError:
+        return None

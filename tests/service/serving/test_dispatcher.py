@@ -1,0 +1,379 @@
+"""Questions and processes: deadlines, deaths, turns, and the end; real sessions and processes."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import partial
+
+import pytest
+import zenoh
+
+from hand_models.base import InvalidInputError
+from service.serving import PlanService, open_session, zenoh_config
+from service.serving.waiting import EACH
+from service.wire import LostError, service_key
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.odd_answers import obedient, stillborn
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.served import client_config, free_endpoint
+
+PLAN = service_key("robosimian", "plan")
+WRENCH_SPACE = service_key("robosimian", "wrench_space")
+STREAM = service_key("robosimian", "stream")
+SET_POINTS = service_key("robosimian", "set_points")
+HEALTH = service_key("robosimian", "health")
+METRICS = service_key("robosimian", "metrics")
+
+LONG = 600.0
+"""Far longer than any test waits [s]."""
+
+
+class Client:
+    """A session of its own; named as `CruxClient` names itself, or not."""
+
+    def __init__(self, session: zenoh.Session, *, named: bool = True) -> None:
+        self.session = session
+        self._numbers = itertools.count()
+        self._source = session.declare_querier(PLAN) if named else None
+
+    def send(self, asked: dict, key: str = PLAN) -> Iterator[zenoh.Reply]:
+        source = None
+        if self._source is not None:
+            source = zenoh.SourceInfo(self._source.id, next(self._numbers))
+        return self.session.get(
+            key, payload=json.dumps(asked).encode(), timeout=PATIENCE, source_info=source
+        )
+
+    def ask(self, asked: dict, key: str = PLAN) -> dict:
+        return result(self.send(asked, key))
+
+
+def result(replies: Iterator[zenoh.Reply]) -> dict:
+    """What the one reply says."""
+    (reply,) = replies
+    return json.loads((reply.ok or reply.err).payload.to_bytes())
+
+
+def kind(answer: dict) -> str:
+    return answer["error"]["kind"]
+
+
+class Site:
+    """A service on loopback, and clients of it."""
+
+    def __init__(self, **settings: object) -> None:
+        self._open = ExitStack()
+        self.endpoint = free_endpoint()
+        config = zenoh_config(mode="peer", listen=[self.endpoint], multicast=False)
+        session = self._open.enter_context(open_session(config))
+        self.service = PlanService(session, make=obedient, **settings)  # type: ignore[arg-type]
+        self._open.enter_context(self.service)
+
+    def client(self, *, named: bool = True) -> Client:
+        session = self._open.enter_context(zenoh.open(client_config(self.endpoint)))
+        return Client(session, named=named)
+
+    def close(self) -> None:
+        self._open.close()
+
+    def health(self, client: Client) -> dict:
+        return client.ask({}, HEALTH)
+
+    def wait_until(self, client: Client, so: Callable[[dict], bool]) -> dict:
+        until = time.monotonic() + PATIENCE
+        while not so(health := self.health(client)):
+            assert time.monotonic() < until, health
+            time.sleep(0.02)
+        return health
+
+
+def states(health: dict, purpose: str = "questions") -> list[str]:
+    return [p["state"] for p in health["processes"] if p["purpose"] == purpose]
+
+
+def all_up(health: dict) -> bool:
+    return "starting" not in states(health) + states(health, "streams")
+
+
+def all_new(old: set[int], health: dict) -> bool:
+    return not old & {each["pid"] for each in health["processes"]}
+
+
+@pytest.fixture(scope="module")
+def site() -> Iterator[Site]:
+    opened = Site(workers=2, memory=2**30)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def client(site: Site) -> Client:
+    made = site.client()
+    site.wait_until(made, all_up)
+    return made
+
+
+# Ends ---------------------------------------------------------------------------------------------
+
+
+def test_a_question_that_hangs_ends_at_its_deadline_and_costs_nobody_else(
+    site: Site, client: Client
+) -> None:
+    before = {p["pid"] for p in site.health(client)["processes"]}
+    hanging = client.send({"sleep": LONG, "deadline": 0.3, "id": "mine"})
+    other = site.client()
+    assert all("echo" in other.ask({"echo": i}) for i in range(20))
+    answer = result(hanging)
+    assert (kind(answer), answer["id"]) == ("deadline", "mine")
+    assert "0.3 s were over" in answer["error"]["message"]
+    health = site.wait_until(client, all_up)
+    assert len({p["pid"] for p in health["processes"]} & before) == len(before) - 1
+    assert health["last_failure"] is not None
+
+
+def test_a_deadline_that_comes_while_the_question_waits(site: Site, client: Client) -> None:
+    work = [client.send({"sleep": 3.0}) for _ in range(2)]
+    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
+    waits = client.ask({"echo": 1, "deadline": 0.2})
+    assert kind(waits) == "deadline"
+    assert "its turn" in waits["error"]["message"]
+    assert all("pid" in result(each) for each in work)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
+def test_a_process_that_dies_costs_its_own_question(
+    site: Site, client: Client, number: int
+) -> None:
+    answer = client.ask({"signal": int(number), "id": "mine"})
+    assert (kind(answer), answer["id"]) == ("lost", "mine")
+    assert f"was ended by signal {int(number)}" in answer["error"]["message"]
+    assert "pid" in client.ask({"echo": 1})
+    site.wait_until(client, all_up)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system keeps a process to its memory")
+def test_a_process_that_eats_memory_costs_its_own_question(site: Site, client: Client) -> None:
+    answer = client.ask({"eat": 2**31})
+    assert kind(answer) == "lost"
+    assert "had not enough memory" in answer["error"]["message"]
+    assert "pid" in client.ask({"eat": 2**24})
+
+
+def test_processes_that_are_killed_are_replaced_whatever_they_do(
+    site: Site, client: Client
+) -> None:
+    for _ in range(2):
+        before = site.wait_until(client, all_up)["processes"]
+        for each in before:
+            os.kill(each["pid"], signal.SIGKILL)
+        gone = partial(all_new, {each["pid"] for each in before})
+        site.wait_until(client, gone)
+        assert "pid" in client.ask({"echo": 1})
+        assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
+
+
+def test_a_service_whose_processes_do_not_start_says_so() -> None:
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with (
+        open_session(config) as session,
+        pytest.raises(LostError, match="do not live to be ready"),
+        PlanService(session, make=stillborn),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"), [({"workers": 0}, "workers"), ({"seconds": 0.0}, "seconds")]
+)
+def test_settings_that_cannot_be(settings: dict, field: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        PlanService(None, **settings)  # type: ignore[arg-type]
+    assert caught.value.field == field
+
+
+# Turns --------------------------------------------------------------------------------------------
+
+
+def test_what_takes_long_leaves_a_process_to_others(site: Site, client: Client) -> None:
+    dear = [client.send({"sleep": 2.0}, WRENCH_SPACE) for _ in range(3)]
+    other = site.client()
+    answered = [other.ask({"echo": i})["pid"] for i in range(10)]
+    # none of the three that take seconds was there before them
+    assert len(set(answered)) == 1
+    assert site.health(client)["waiting"]["dear"] == 2
+    assert len({result(each)["pid"] for each in dear}) >= 1
+
+
+def test_nothing_delays_set_points(site: Site, client: Client) -> None:
+    held = [site.client().send({"sleep": 4.0}) for _ in range(4)]
+    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
+    streams = {client.ask({"echo": i}, SET_POINTS)["pid"] for i in range(20)}
+    health = site.health(client)
+    assert states(health) == ["working"] * 2
+    assert streams == {p["pid"] for p in health["processes"] if p["purpose"] == "streams"}
+    for each in held:
+        result(each)
+
+
+def test_a_stance_that_is_known_and_short_does_not_wait_for_long_questions(
+    site: Site, client: Client
+) -> None:
+    asked = {"stance": {"a": 1}, "echo": 0}
+    # known to both processes, and short there again
+    for _ in range(20):
+        client.ask(asked)
+    held = [site.client().send({"sleep": 4.0}) for _ in range(4)]
+    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
+    (streams,) = (p["pid"] for p in site.health(client)["processes"] if p["purpose"] == "streams")
+    assert client.ask(asked)["pid"] == streams
+    assert states(site.health(client)) == ["working"] * 2
+    for each in held:
+        result(each)
+
+
+def test_a_stream_is_rehearsed_where_it_can_do_no_harm(site: Site, client: Client) -> None:
+    answer = client.ask({"echo": 1}, STREAM)
+    (streams,) = (p["pid"] for p in site.health(client)["processes"] if p["purpose"] == "streams")
+    assert (answer["pid"], answer["rehearsal"]) == (streams, False)
+    assert kind(client.ask({"signal": 9}, STREAM)) == "lost"
+    # the process that has the streams lives
+    assert client.ask({}, SET_POINTS)["pid"] == streams
+
+
+def test_who_asks_too_much_is_told_to_come_again_and_others_have_their_turn(
+    site: Site, client: Client
+) -> None:
+    flood = site.client(named=False)
+    asked = [flood.send({"sleep": 0.05, "id": "flood"}) for _ in range(3 * EACH)]
+    named = [client.ask({"echo": i}) for i in range(5)]
+    assert all(answer.get("echo") == i for i, answer in enumerate(named))
+    answers = [result(each) for each in asked]
+    busy = [answer for answer in answers if "error" in answer]
+    assert {kind(answer) for answer in busy} == {"busy"}
+    assert all(answer["error"]["retry_after"] > 0.0 for answer in busy)
+    assert {answer["id"] for answer in busy} == {"flood"}
+    # what was let in has been worked on
+    assert len(answers) - len(busy) >= EACH
+
+
+def test_what_a_client_asked_that_has_gone_is_not_worked_on(site: Site, client: Client) -> None:
+    held = [client.send({"sleep": 3.0}) for _ in range(2)]
+    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
+    with zenoh.open(client_config(site.endpoint)) as session:
+        left = Client(session)
+        for _ in range(5):
+            left.send({"sleep": LONG})
+        site.wait_until(client, lambda health: sum(health["waiting"].values()) == 5)
+    site.wait_until(client, lambda health: sum(health["waiting"].values()) == 0)
+    for each in held:
+        result(each)
+    assert 'status="gone"} 5.0' in metrics(client)
+
+
+STALLED = """
+import sys, time, zenoh
+from tests.service.serving.test_dispatcher import PLAN, Client, client_config
+with zenoh.open(client_config(sys.argv[1])) as session:
+    client = Client(session)
+    kept = []
+    for _ in range(40):
+        kept += [client.send({"pad": 2**20}) for _ in range(10)]
+        print("asked", flush=True)
+        time.sleep(0.05)
+    time.sleep(600)
+"""
+
+
+def test_a_client_that_takes_no_replies_keeps_nobody_waiting(site: Site, client: Client) -> None:
+    stalled = subprocess.Popen(
+        [sys.executable, "-c", STALLED, site.endpoint],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert stalled.stdout is not None
+        for _ in range(3):
+            assert stalled.stdout.readline()
+        stalled.send_signal(signal.SIGSTOP)
+        assert all(client.ask({"echo": i})["echo"] == i for i in range(50))
+    finally:
+        stalled.kill()
+        stalled.communicate()
+
+
+# The end ------------------------------------------------------------------------------------------
+
+
+def test_at_the_end_everybody_is_told() -> None:
+    ending = Site(workers=2)
+    client = ending.client()
+    ending.wait_until(client, all_up)
+    soon = client.send({"sleep": 0.5, "echo": "soon"})
+    never = client.send({"sleep": LONG, "deadline": LONG, "echo": "never"})
+    ending.wait_until(client, lambda health: states(health) == ["working"] * 2)
+    waiting = [client.send({"echo": i}) for i in range(5)]
+    ending.wait_until(client, lambda health: sum(health["waiting"].values()) == 5)
+    answers: queue.SimpleQueue[dict] = queue.SimpleQueue()
+    with ThreadPoolExecutor(7) as pool:
+        for each in (soon, never, *waiting):
+            pool.submit(lambda replies=each: answers.put(result(replies)))
+        with ThreadPoolExecutor(1) as closing:
+            closing.submit(ending.service.__exit__, None, None, None)
+    told = [answers.get_nowait() for _ in range(7)]
+    assert [a["echo"] for a in told if "echo" in a] == ["soon"]
+    assert sorted(kind(a) for a in told if "error" in a) == ["busy"] * 5 + ["lost"]
+
+
+# Operators ----------------------------------------------------------------------------------------
+
+
+def metrics(client: Client) -> str:
+    (reply,) = client.session.get(METRICS, timeout=PATIENCE)
+    assert str(reply.ok.encoding).startswith("text/plain")
+    return reply.ok.payload.to_string()
+
+
+def test_an_operator_sees_what_is_going_on(site: Site, client: Client) -> None:
+    client.ask({"echo": 1})
+    health = site.health(client)
+    assert health["robot"] == "robosimian"
+    assert health["uptime"] > 0.0
+    assert len(states(health)) == 2
+    assert len(states(health, "streams")) == 1
+    if sys.platform == "linux":
+        assert all(p["resident"] > 2**20 for p in health["processes"])
+    text = metrics(client)
+    assert 'crux_questions_total{key="plan",status="done"}' in text
+    assert "crux_processes_ended_total" in text
+    assert 'crux_questions_waiting{kind="dear"} 0.0' in text
+
+
+def test_metrics_over_http(site: Site) -> None:
+    port = int(free_endpoint().rpartition(":")[2])
+    site.service.serve_metrics(port)
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=PATIENCE) as page:
+        text = page.read().decode()
+    assert 'crux_processes{purpose="streams"' in text
+    with pytest.raises(InvalidInputError, match="Address already in use") as caught:
+        site.service.serve_metrics(port)
+    assert caught.value.field == "--metrics-port"
+
+
+@pytest.mark.parametrize(("key", "answered"), [("crux/**", 0), ("crux/*/plan", 1), ("**/plan", 1)])
+def test_a_wildcard_is_answered_once_or_not_at_all(client: Client, key: str, answered: int) -> None:
+    replies = list(client.send({"echo": 1}, key))
+    assert len(replies) == answered
+    assert all(str(reply.ok.key_expr) == PLAN for reply in replies)
