@@ -13,8 +13,10 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 import zenoh
@@ -74,6 +76,8 @@ class Site:
 
     def __init__(self, **settings: object) -> None:
         self._open = ExitStack()
+        self.folder = Path(self._open.enter_context(TemporaryDirectory()))
+        self.numbers = itertools.count()
         self.endpoint = free_endpoint()
         config = zenoh_config(mode="peer", listen=[self.endpoint], multicast=False)
         session = self._open.enter_context(open_session(config))
@@ -100,6 +104,29 @@ class Site:
 
 def states(health: dict, purpose: str = "questions") -> list[str]:
     return [p["state"] for p in health["processes"] if p["purpose"] == purpose]
+
+
+def of_streams(health: dict) -> list[dict]:
+    return [each for each in health["processes"] if each["purpose"] == "streams"]
+
+
+@contextmanager
+def until(site: Site) -> Iterator[dict]:
+    """A question that is in work until this is left."""
+    file = site.folder / str(next(site.numbers))
+    yield {"until": str(file), "deadline": LONG}
+    file.touch()
+
+
+@contextmanager
+def all_working(site: Site, client: Client) -> Iterator[None]:
+    """All processes that answer questions are at work until this is left."""
+    with until(site) as go_on:
+        held = [site.client().send(go_on) for _ in range(2)]
+        site.wait_until(client, lambda health: states(health) == ["working"] * 2)
+        yield
+        assert states(site.health(client)) == ["working"] * 2
+    assert all("pid" in result(each) for each in held)
 
 
 def all_up(health: dict) -> bool:
@@ -143,12 +170,10 @@ def test_a_question_that_hangs_ends_at_its_deadline_and_costs_nobody_else(
 
 
 def test_a_deadline_that_comes_while_the_question_waits(site: Site, client: Client) -> None:
-    work = [client.send({"sleep": 3.0}) for _ in range(2)]
-    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
-    waits = client.ask({"echo": 1, "deadline": 0.2})
-    assert kind(waits) == "deadline"
-    assert "its turn" in waits["error"]["message"]
-    assert all("pid" in result(each) for each in work)
+    with all_working(site, client):
+        waits = client.ask({"echo": 1, "deadline": 0.2})
+        assert kind(waits) == "deadline"
+        assert "its turn" in waits["error"]["message"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
@@ -206,24 +231,19 @@ def test_settings_that_cannot_be(settings: dict, field: str) -> None:
 
 
 def test_what_takes_long_leaves_a_process_to_others(site: Site, client: Client) -> None:
-    dear = [client.send({"sleep": 2.0}, WRENCH_SPACE) for _ in range(3)]
     other = site.client()
-    answered = [other.ask({"echo": i})["pid"] for i in range(10)]
-    # none of the three that take seconds was there before them
-    assert len(set(answered)) == 1
-    assert site.health(client)["waiting"]["dear"] == 2
-    assert len({result(each)["pid"] for each in dear}) >= 1
+    with until(site) as go_on:
+        dear = [client.send(go_on, WRENCH_SPACE) for _ in range(3)]
+        assert len({other.ask({"echo": i})["pid"] for i in range(10)}) == 1
+        health = site.health(client)
+        assert (states(health).count("working"), health["waiting"]["dear"]) == (1, 2)
+    assert all("pid" in result(each) for each in dear)
 
 
 def test_nothing_delays_set_points(site: Site, client: Client) -> None:
-    held = [site.client().send({"sleep": 4.0}) for _ in range(4)]
-    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
-    streams = {client.ask({"echo": i}, SET_POINTS)["pid"] for i in range(20)}
-    health = site.health(client)
-    assert states(health) == ["working"] * 2
-    assert streams == {p["pid"] for p in health["processes"] if p["purpose"] == "streams"}
-    for each in held:
-        result(each)
+    with all_working(site, client):
+        streams = {client.ask({"echo": i}, SET_POINTS)["pid"] for i in range(20)}
+        assert streams == {p["pid"] for p in of_streams(site.health(client))}
 
 
 def test_a_stance_that_is_known_and_short_does_not_wait_for_long_questions(
@@ -233,13 +253,8 @@ def test_a_stance_that_is_known_and_short_does_not_wait_for_long_questions(
     # known to both processes, and short there again
     for _ in range(20):
         client.ask(asked)
-    held = [site.client().send({"sleep": 4.0}) for _ in range(4)]
-    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
-    (streams,) = (p["pid"] for p in site.health(client)["processes"] if p["purpose"] == "streams")
-    assert client.ask(asked)["pid"] == streams
-    assert states(site.health(client)) == ["working"] * 2
-    for each in held:
-        result(each)
+    with all_working(site, client):
+        assert client.ask(asked)["pid"] == of_streams(site.health(client))[0]["pid"]
 
 
 def test_a_stream_is_rehearsed_where_it_can_do_no_harm(site: Site, client: Client) -> None:
@@ -268,16 +283,13 @@ def test_who_asks_too_much_is_told_to_come_again_and_others_have_their_turn(
 
 
 def test_what_a_client_asked_that_has_gone_is_not_worked_on(site: Site, client: Client) -> None:
-    held = [client.send({"sleep": 3.0}) for _ in range(2)]
-    site.wait_until(client, lambda health: states(health) == ["working"] * 2)
-    with zenoh.open(client_config(site.endpoint)) as session:
-        left = Client(session)
-        for _ in range(5):
-            left.send({"sleep": LONG})
-        site.wait_until(client, lambda health: sum(health["waiting"].values()) == 5)
-    site.wait_until(client, lambda health: sum(health["waiting"].values()) == 0)
-    for each in held:
-        result(each)
+    with all_working(site, client):
+        with zenoh.open(client_config(site.endpoint)) as session:
+            left = Client(session)
+            for _ in range(5):
+                left.send({"sleep": LONG})
+            site.wait_until(client, lambda health: sum(health["waiting"].values()) == 5)
+        site.wait_until(client, lambda health: sum(health["waiting"].values()) == 0)
     assert 'status="gone"} 5.0' in metrics(client)
 
 
@@ -321,7 +333,7 @@ def test_at_the_end_everybody_is_told() -> None:
     ending = Site(workers=2)
     client = ending.client()
     ending.wait_until(client, all_up)
-    soon = client.send({"sleep": 0.5, "echo": "soon"})
+    soon = client.send({"sleep": 1.0, "echo": "soon"})
     never = client.send({"sleep": LONG, "deadline": LONG, "echo": "never"})
     ending.wait_until(client, lambda health: states(health) == ["working"] * 2)
     waiting = [client.send({"echo": i}) for i in range(5)]

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from service.answering import Answer
 from service.processes import Done, Job
@@ -20,6 +21,8 @@ def obedient() -> Callable[[Job], Done]:
         start = time.perf_counter()
         if "sleep" in asked:
             time.sleep(asked["sleep"])
+        while "until" in asked and not Path(asked["until"]).exists():
+            time.sleep(0.01)
         if "signal" in asked:
             os.kill(os.getpid(), asked["signal"])
         if "eat" in asked:
