@@ -10,8 +10,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, Final, Generic, TypeVar
 
@@ -98,7 +99,7 @@ class Station(Generic[T, R]):
         pipes = [context.Pipe() for _ in range(lanes)]
         others = [other for _, other in pipes]
         self.process = context.Process(target=_answer_each, args=(others, memory), daemon=True)
-        with one_thread():
+        with one_thread(), _unsignalled():
             self.process.start()
         for other in others:
             # the process has the other ends alone, so that its death ends the pipes
@@ -135,6 +136,25 @@ def resident(pid: int | None) -> int | None:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
         return None
+
+
+@contextmanager
+def _unsignalled() -> Iterator[None]:
+    """Let processes that are started here never see what ends the service: it is to tell them.
+
+    A terminal, or who runs the service, sends it to all of them, and while they start nothing else
+    could keep it from them.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # which the first process starts as well, and lets the signals in again
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _answer_each(pipes: list[Connection], memory: int | None) -> None:
