@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import queue
 import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import matplotlib as mpl
 import pytest
+import zenoh
 
 from service.commands.cli import run
 from service.commands.stances import bundled
+from service.serving import open_session, zenoh_config
 from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -83,6 +88,30 @@ def test_the_example_of_a_scan_makes_a_wall_of_terrain(
     assert run(["rock", str(terrain), *options.split(), "--spacing", "0.01"]) == 0
     assert capfd.readouterr().out.endswith("rock.ply\n")
     assert (tmp_path / "rock.png").is_file()
+
+
+def test_the_example_of_a_clients_name_is_a_query_that_a_service_can_tell_from_others():
+    (example,) = (block for block in blocks("python") if "zenoh.SourceInfo" in block)
+    names = queue.SimpleQueue()
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(config) as session:
+
+        def told(query: zenoh.Query) -> None:
+            with query:
+                names.put((query.source_info.source_id.zid, query.source_info.source_sn))
+
+        class Here:
+            """The session of the example is one that is open already."""
+
+            Config, SourceInfo = zenoh.Config, zenoh.SourceInfo
+
+            @staticmethod
+            def open(_: zenoh.Config) -> nullcontext:
+                return nullcontext(session)
+
+        session.declare_queryable("crux/robosimian/plan", told)
+        exec(compile(example.replace("import zenoh", ""), "README.md", "exec"), {"zenoh": Here})
+        assert names.get(timeout=PATIENCE) == (session.zid(), 1)
 
 
 def test_every_command_line_uses_a_bundled_name_that_exists():

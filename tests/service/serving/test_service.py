@@ -6,6 +6,7 @@ import contextlib
 import json
 import queue
 import random
+import re
 import signal
 import threading
 import time
@@ -22,7 +23,7 @@ from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
 from service.answering import dispatch
 from service.answering.dispatch import Answer
 from service.replies import ErrorReply, PlanReply
-from service.serving import PlanService, listening, open_session, zenoh_config
+from service.serving import PlanService, closed, exposed, listening, open_session, zenoh_config
 from service.wire import (
     Format,
     NoServiceError,
@@ -439,3 +440,89 @@ def test_a_bad_flag_is_named(flags: dict, field: str) -> None:
         zenoh_config(**flags)
     assert caught.value.field == field
     assert ".rs:" not in caught.value.message
+
+
+# Who can ask --------------------------------------------------------------------------------------
+
+
+def test_without_endpoints_a_service_listens_on_this_machine_alone() -> None:
+    config = zenoh_config()
+    closed(config)
+    (endpoint,) = listening(config)
+    assert re.fullmatch(r"tcp/127\.0\.0\.1:[1-9]\d*", endpoint)
+    assert setting(config, "scouting/multicast/interface") == "127.0.0.1"
+    assert exposed(config) == []
+    router = zenoh_config(mode="router")
+    closed(router)
+    assert listening(router) == ["tcp/127.0.0.1:7447"]
+    client = zenoh_config(mode="client", connect=["tcp/127.0.0.1:1"])
+    before = client.get_json("listen/endpoints")
+    closed(client)
+    assert client.get_json("listen/endpoints") == before
+
+
+@pytest.mark.parametrize("way", ["flag", "setting", "file", "environment"])
+def test_endpoints_that_are_named_are_kept(
+    way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text('{listen: {endpoints: ["tcp/0.0.0.0:7555"]}}')
+    if way == "environment":
+        monkeypatch.setenv("ZENOH_CONFIG", str(file))
+    config = {
+        "flag": lambda: zenoh_config(listen=["tcp/0.0.0.0:7555"]),
+        "setting": lambda: zenoh_config(settings=['listen/endpoints:["tcp/0.0.0.0:7555"]']),
+        "file": lambda: zenoh_config(file=file),
+        "environment": zenoh_config,
+    }[way]()
+    closed(config)
+    assert listening(config) == exposed(config) == ["tcp/0.0.0.0:7555"]
+    assert setting(config, "scouting/multicast/interface") is None
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "open_to_others"),
+    [
+        ("tcp/127.0.0.1:7447", False),
+        ("tcp/[::1]:7447", False),
+        ("tcp/localhost:7447", False),
+        ("tcp/127.0.0.1:7447#iface=lo", False),
+        ("tcp/[::]:7447", True),
+        ("tls/robot.example:7447", True),
+    ],
+)
+def test_what_others_may_reach_is_known(endpoint: str, open_to_others: bool) -> None:
+    config = zenoh_config(listen=[endpoint])
+    assert exposed(config) == ([endpoint] if open_to_others else [])
+
+
+def test_a_port_that_is_the_systems_to_choose_is_told() -> None:
+    config = zenoh_config(listen=["tcp/127.0.0.1:0", "tcp/[::1]:0", "tcp/127.0.0.1:7447"])
+    closed(config)
+    first, second, third = listening(config)
+    assert re.fullmatch(r"tcp/127\.0\.0\.1:[1-9]\d*", first)
+    assert re.fullmatch(r"tcp/\[::1\]:[1-9]\d*", second)
+    assert third == "tcp/127.0.0.1:7447"
+
+
+def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
+    port = free_endpoint().rpartition(":")[2]
+    server = Served(f"tcp/0.0.0.0:{port}")
+    serving, exposes = server.stop(signal.SIGTERM)[1].splitlines()
+    assert serving.endswith(f"listening on tcp/0.0.0.0:{port}")
+    assert exposes.startswith(f"crux: tcp/0.0.0.0:{port}: whoever reaches it can ask")
+
+
+def test_a_log_line_a_question() -> None:
+    server = Served(free_endpoint(), "-v", "--log-format", "json")
+    with CruxClient(client_config(server.endpoint), timeout=PATIENCE) as client:
+        client.plan(plan_request())
+        bad = msgspec.structs.replace(plan_request(), objective="max_reliability", id="bad")
+        with pytest.raises(ServiceError):
+            client.plan(bad)
+    _, *lines = server.stop(signal.SIGTERM)[1].splitlines()
+    first, second = (json.loads(line) for line in lines)
+    assert (first["id"], first["status"], first["key"]) == ("wall", "optimal", PLAN)
+    assert first["client"] == second["client"]
+    assert first["worked"] > 0.0 <= first["waited"]
+    assert (second["id"], second["status"]) == ("bad", "unsupported")

@@ -1,0 +1,349 @@
+"""Studies of the service under load: real ``crux serve`` processes, clients in others."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+import zenoh
+from rich.console import Console
+from rich.table import Table
+
+from service.answering import dispatch
+from tests.load.asking import (
+    PLAN,
+    Asked,
+    Client,
+    Tally,
+    dear_questions,
+    health,
+    mixed,
+    new_stances,
+    new_wrenches,
+    spoilt,
+)
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.served import Served, free_endpoint
+
+ECHO = "echo/plan"
+ROUNDS = 5
+console = Console()
+
+
+@contextmanager
+def served(*flags: str) -> Iterator[Served]:
+    """A service until this is left; then it has to end cleanly."""
+    server = Served(free_endpoint(), *flags)
+    try:
+        yield server
+    finally:
+        started = time.perf_counter()
+        _, err = server.stop(signal.SIGTERM)
+        took = time.perf_counter() - started
+        console.print(f"SIGTERM: status {server.process.returncode} after {took:.1f} s")
+        if len(err.splitlines()) > 1:
+            console.print(f"its log has {len(err.splitlines())} lines; the last: {err[-300:]}")
+
+
+@contextmanager
+def other(command: str, endpoint: str) -> Iterator[None]:
+    """A process of this module until this is left."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.load", command, endpoint],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+@click.group()
+def main() -> None:
+    """The service under load."""
+
+
+@main.command()
+@click.argument("endpoint")
+def dear(endpoint: str) -> None:
+    """Ask the dearest legal questions without pause, until killed."""
+    client = Client(endpoint, timeout=60.0)
+    print("on", flush=True)
+    for key, payload, encoding in dear_questions():
+        client.ask(key, payload, encoding)
+
+
+@main.command()
+@click.argument("endpoint")
+def echo(endpoint: str) -> None:
+    """Reply to each query with as many bytes as a plan has, until killed."""
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    reply = b"x" * 33_000
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(ECHO, reply)
+
+    with zenoh.open(config) as session:
+        session.declare_queryable(ECHO, answer, complete=True)
+        print("on", flush=True)
+        threading.Event().wait()
+
+
+def times(client: Client, key: str, payloads: Iterator[bytes], count: int) -> list[float]:
+    """How long each of some questions takes, one after another [s]."""
+    found = []
+    for _ in range(count):
+        payload = next(payloads)
+        start = time.perf_counter()
+        reply = client.ask(key, payload)
+        found.append(time.perf_counter() - start)
+        assert reply is not None
+        assert reply.ok is not None, reply.err.payload.to_string()
+    return found
+
+
+def in_process(payloads: Iterator[bytes], count: int) -> list[float]:
+    """How long planning takes in this process, from bytes to bytes [s]."""
+    found = []
+    for _ in range(count):
+        payload = next(payloads)
+        start = time.perf_counter()
+        assert dispatch.handle(PLAN, payload).good
+        found.append(time.perf_counter() - start)
+    return found
+
+
+def percentile(values: list[float], part: float) -> float:
+    """A percentile, in ms."""
+    return 1e3 * sorted(values)[min(len(values) - 1, int(part * len(values)))]
+
+
+@main.command()
+@click.option("--count", default=400, show_default=True, help="Questions a round.")
+def latency(count: int) -> None:
+    """Compare plans over loopback with a bare echo and planning in process; quiet, and beside."""
+    table = Table("", "p50 [ms]", "p99 [ms]", title=f"medians of {ROUNDS} rounds of {count}")
+    where = free_endpoint()
+    with served() as server, other("echo", where):
+        client, bare = Client(server.endpoint), Client(where)
+        payloads = new_wrenches()
+        times(client, PLAN, payloads, 50), in_process(payloads, 50)
+        rounds: dict[str, list[list[float]]] = {}
+        for _ in range(ROUNDS):
+            rounds.setdefault("bare echo", []).append(times(bare, ECHO, payloads, count))
+            rounds.setdefault("plan in process", []).append(in_process(payloads, count))
+            rounds.setdefault("plan over loopback", []).append(times(client, PLAN, payloads, count))
+        for _ in range(ROUNDS):
+            with other("dear", server.endpoint):
+                time.sleep(1.0)
+                rounds.setdefault("plan, beside dear questions", []).append(
+                    times(client, PLAN, payloads, count)
+                )
+                rounds.setdefault("bare echo, beside them", []).append(
+                    times(bare, ECHO, payloads, count)
+                )
+    middle = {
+        name: tuple(
+            statistics.median(percentile(one, part) for one in all_) for part in (0.5, 0.99)
+        )
+        for name, all_ in rounds.items()
+    }
+    for name, (half, most) in middle.items():
+        table.add_row(name, f"{half:.2f}", f"{most:.2f}")
+    console.print(table)
+    floor = middle["bare echo"][0] + middle["plan in process"][0]
+    console.print(
+        f"p50 over loopback / (echo + in process): {middle['plan over loopback'][0] / floor:.2f}"
+    )
+    beside, quiet = middle["plan, beside dear questions"][1], middle["plan over loopback"][1]
+    console.print(f"p99 beside dear questions / quiet: {beside / quiet:.2f}")
+    echoes = middle["bare echo, beside them"][1] / middle["bare echo"][1]
+    console.print(f"the same of the bare echo: {echoes:.2f}")
+
+
+def rate(endpoint: str, seconds: float, clients: int, deep: int) -> float:
+    """How many new stances are planned a second, by clients that each have some questions open."""
+    counts = []
+    until = time.perf_counter() + seconds
+
+    def ask(seed: int) -> None:
+        client, payloads, count = Client(endpoint), new_stances(seed), 0
+        while time.perf_counter() < until:
+            reply = client.ask(PLAN, next(payloads))
+            count += reply is not None and reply.ok is not None
+        counts.append(count)
+        client.close()
+
+    threads = [threading.Thread(target=ask, args=(i,)) for i in range(clients * deep)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return sum(counts) / seconds
+
+
+@main.command()
+@click.option("--seconds", default=10.0, show_default=True)
+def throughput(seconds: float) -> None:
+    """Compare how many new stances one and two processes plan a second."""
+    ratios = []
+    for _ in range(ROUNDS):
+        found = []
+        for workers in ("1", "2"):
+            with served("--workers", workers) as server:
+                rate(server.endpoint, 2.0, 2, 2)
+                found.append(rate(server.endpoint, seconds, 2, 2))
+        ratios.append(found[1] / found[0])
+        console.print(f"one process {found[0]:.1f}/s, two {found[1]:.1f}/s: {ratios[-1]:.2f}")
+    console.print(f"median {statistics.median(ratios):.2f}")
+
+
+@main.command()
+@click.option("--seconds", default=60.0, show_default=True)
+@click.option("--times", "factor", default=5.0, show_default=True, help="Of what it can do.")
+def overload(seconds: float, factor: float) -> None:
+    """Ask several times as much as the service can answer, by four clients, and count."""
+    with served() as server:
+        rate(server.endpoint, 3.0, 2, 2)
+        capacity = rate(server.endpoint, 10.0, 2, 2)
+        clients = [Client(server.endpoint) for _ in range(4)]
+        payloads, tally = new_stances(99), Tally()
+        start, gap = time.perf_counter(), 1.0 / (factor * capacity)
+        asked = 0
+        while (now := time.perf_counter()) < start + seconds:
+            due = start + asked * gap
+            if now < due:
+                time.sleep(due - now)
+            tally.late.append(max(0.0, now - due))
+            clients[asked % 4].send(tally, PLAN, next(payloads), "application/json")
+            asked += 1
+        good = tally.statuses["good"] / seconds
+        while sum(tally.statuses.values()) < asked and time.perf_counter() < start + seconds + 40.0:
+            time.sleep(0.1)
+        for client in clients:
+            client.close()
+    console.print(f"capacity {capacity:.1f}/s; asked {asked / seconds:.1f}/s for {seconds:g} s")
+    console.print(f"answered {good:.1f}/s: {good / capacity:.2f} of the capacity")
+    console.print(f"{dict(tally.statuses)} of {asked}")
+    console.print(
+        f"good ones p50 {percentile(tally.times, 0.5):.0f} ms, "
+        f"p99 {percentile(tally.times, 0.99):.0f} ms"
+    )
+    console.print(f"the generator was late by p99 {percentile(tally.late, 0.99):.1f} ms")
+
+
+def resident(server: Served) -> int:
+    """Memory of a service's processes, all together [bytes]."""
+    pids = [server.process.pid]
+    for task in Path(f"/proc/{server.process.pid}/task").iterdir():
+        pids += [int(pid) for pid in (task / "children").read_text().split()]
+    pages = 0
+    for pid in set(pids):
+        try:
+            pages += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        except OSError:
+            continue
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@main.command()
+@click.option("--minutes", default=30.0, show_default=True)
+@click.option("--every", default=10.0, show_default=True, help="A process is killed [s].")
+@click.option("--seed", default=0, show_default=True)
+def soak(minutes: float, every: float, seed: int) -> None:
+    """Ask everything, mixed, with a process killed again and again; count, and watch the memory."""
+    tally, rng = Tally(), random.Random(seed)
+    sizes: list[tuple[float, int]] = []
+    stop = threading.Event()
+
+    def ask(number: int, endpoint: str) -> None:
+        client = Client(endpoint, timeout=60.0)
+        for key, payload, encoding in mixed(seed * 100 + number):
+            if stop.is_set():
+                break
+            start = time.perf_counter()
+            reply = client.ask(key, payload, encoding)
+            tally.note(reply, time.perf_counter() - start)
+        client.close()
+
+    with served() as server:
+        operator = Client(server.endpoint)
+        threads = [threading.Thread(target=ask, args=(i, server.endpoint)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        start, killed, told = time.perf_counter(), 0, 0.0
+        while (now := time.perf_counter() - start) < 60.0 * minutes:
+            time.sleep(min(every, 60.0 * minutes - now))
+            sizes.append((now, resident(server)))
+            processes = [p for p in health(operator)["processes"] if p["state"] != "starting"]
+            if processes:
+                os.kill(rng.choice(processes)["pid"], signal.SIGKILL)
+                killed += 1
+            if now - told > 60.0:
+                told = now
+                console.print(
+                    f"{now / 60:.0f} min: {sizes[-1][1] / 2**20:.0f} MB, {dict(tally.statuses)}"
+                )
+        stop.set()
+        for thread in threads:
+            thread.join()
+        operator.close()
+    console.print(f"{dict(tally.statuses)}; {killed} processes killed")
+    console.print(f"the slowest reply took {tally.slowest:.2f} s")
+    early = [size for when, size in sizes if 240.0 <= when <= 360.0] or [size for _, size in sizes]
+    late = [size for when, size in sizes if when >= 60.0 * minutes - 120.0]
+    before, after = statistics.median(early), statistics.median(late)
+    console.print(
+        f"memory of all processes: {before / 2**20:.0f} MB about 5 min, {after / 2**20:.0f} MB at "
+        f"the end: {after / before:.2f}"
+    )
+
+
+@main.command()
+@click.option("--count", default=20_000, show_default=True)
+@click.option("--seed", default=1, show_default=True)
+def fuzz(count: int, seed: int) -> None:
+    """Send spoilt payloads; none may be left without a reply, none may be `internal`."""
+    tally = Tally()
+    with served() as server:
+        clients = [Client(server.endpoint, timeout=60.0) for _ in range(2)]
+        questions: list[Iterator[Asked]] = [spoilt(seed + i) for i in range(2)]
+
+        def ask(i: int) -> None:
+            for _ in range(count // 2):
+                start = time.perf_counter()
+                reply = clients[i].ask(*next(questions[i]))
+                tally.note(reply, time.perf_counter() - start)
+
+        threads = [threading.Thread(target=ask, args=(i,)) for i in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        state = health(clients[0])
+        for client in clients:
+            client.close()
+    console.print(f"{dict(tally.statuses)}; the slowest reply took {tally.slowest:.2f} s")
+    console.print(f"last failure: {state['last_failure']}")
+
+
+if __name__ == "__main__":
+    main()
