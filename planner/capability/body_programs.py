@@ -15,7 +15,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, SolverError
 from hand_models.wrench_spaces import SCALE
-from planner import programs
+from planner import deadline, programs
 from planner.capability.body_motion import Motion, motion_of
 from planner.explanation import ALIKE, BINDING, joint_name, limit_name
 from planner.prepare import (
@@ -32,6 +32,9 @@ from planner.result import LimitName, Plan
 from planner.solving import plan
 
 __all__ = ["BodyPrograms", "size_of"]
+
+MISSING: Final = "it was known what the stance can hold"
+"""What a deadline may come before."""
 
 EMPTY: Final = ("infeasible", "infeasible_inaccurate")
 """The solver's words for a set in which there is nothing."""
@@ -173,6 +176,7 @@ class BodyPrograms:
             return 0.0
         spaces, worst = self._hands.sets(self._point).spaces, 0.0
         for loads in ends:
+            deadline.check(MISSING)
             there = self._hands.sets(replace(self._point, loads=tuple(loads))).spaces
             for wrist, a, b, y in zip(self._hands.wrists, spaces, there, loads, strict=True):
                 off = 0.0
@@ -192,6 +196,7 @@ def _solved(
     SolverError
         If there is no answer that passes the checks.
     """
+    deadline.check(MISSING)
     B = np.vstack([columns, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
     found = programs.reach(data, goal / size_of(goal), B, cap, K)
     if not found.outcome.solved:
@@ -280,4 +285,5 @@ def _error(
 
 
 def _unsolved(outcome: Outcome) -> SolverError:
+    deadline.check(MISSING)
     return SolverError(f"body space: the solver gave no usable answer ({outcome.status})")

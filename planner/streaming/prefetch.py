@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array
+from planner import deadline
 from planner.streaming.interpolation import PER_RADIUS, Interpolation
 from planner.streaming.stream_stance import StreamStance
 
@@ -171,7 +172,7 @@ class Prefetch:
         try:
             for centre in centres:
                 radius, found = self._radius, None
-                while radius >= SMALLEST * self._radius:
+                while radius >= SMALLEST * self._radius and not deadline.expired():
                     found = Interpolation.about(self._stance, centre, radius) or found
                     if found is not None and (found.most <= cap or found.utilisation > cap):
                         break

@@ -14,6 +14,7 @@ from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, TensionLimit
 from hand_models.hand import FINGERS, NearbyClosure, SettledHand, Tile, closing_sequence
 from hand_models.wrench_spaces import WrenchSpace
+from planner import deadline
 from planner.result import LimitName, Plan, Price, TensionPath, WristPlan
 from service import replies
 from service.answering.hand_answers import (
@@ -26,12 +27,22 @@ from service.answering.hand_answers import (
 )
 from service.replies import AXES
 
-__all__ = ["BOTH_WAYS", "limit_reply", "plan_reply", "wrench_space_reply"]
+__all__ = [
+    "BOTH_WAYS",
+    "limbs_reply",
+    "limit_reply",
+    "number",
+    "plan_reply",
+    "wrench_space_reply",
+]
 
 SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 """Names of both directions along each axis, in the order of `BOTH_WAYS`."""
 
 BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
+
+VIEWS: Final = "it was known how far the hand's set reaches"
+"""What a deadline may come before."""
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
@@ -52,15 +63,15 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         warnings=list(answer.warnings),
         unfinished=list(answer.unfinished),
         body_wrench=vector(answer.body_wrench),
-        utilisation=_number(answer.utilisation),
-        effort=_number(answer.effort),
-        load_factor=_number(answer.load_factor),
+        utilisation=number(answer.utilisation),
+        effort=number(answer.effort),
+        load_factor=number(answer.load_factor),
         load_factor_unbounded=answer.load_factor_unbounded,
         limiting=None if answer.limiting is None else limit_reply(answer.limiting),
         hands=None if answer.hands is None else [hand_reply(h, model) for h in answer.hands],
-        joints=_by_limb(answer.joints),
-        joint_torque=_by_limb(answer.joint_torque),
-        joint_torque_limit=_by_limb(answer.joint_torque_limit),
+        joints=limbs_reply(answer.joints),
+        joint_torque=limbs_reply(answer.joint_torque),
+        joint_torque_limit=limbs_reply(answer.joint_torque_limit),
         prices=_prices(answer.prices),
         effort_prices=_prices(answer.effort_prices),
         certificate=_certificate(answer, model),
@@ -138,7 +149,7 @@ def wrench_space_reply(
             for closing, there in zip(closing_sequence(settled), nearby, strict=True)
         ],
         tension_limits=[
-            replies.TensionLimit(limit.finger, _number(limit.tension), limit.phalanx)
+            replies.TensionLimit(limit.finger, number(limit.tension), limit.phalanx)
             for limit in limits
         ],
         origin=parts.origin,
@@ -151,7 +162,7 @@ def wrench_space_reply(
 
 def _robust(found: Robustness) -> replies.RobustCapability:
     worst, tenth = (
-        dict(zip(SIDES, map(_number, reach.tolist()), strict=True))
+        dict(zip(SIDES, map(number, reach.tolist()), strict=True))
         for reach in (found.worst, found.tenth)
     )
     numbers = found._asdict() | {"worst": worst, "tenth": tenth}
@@ -175,6 +186,7 @@ class _Views(NamedTuple):
 
 
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
+    deadline.check(VIEWS)
     faces = space.half_spaces()
     return replies.HalfSpaces(
         vectors(faces.normals),
@@ -183,7 +195,7 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
     )
 
 
-def _number(value: float | None) -> float | None:
+def number(value: float | None) -> float | None:
     """Return a number as it travels: what is infinite does not exist."""
     return float(value) if value is not None and math.isfinite(value) else None
 
@@ -216,7 +228,8 @@ def _prices(prices: Iterable[Price] | None) -> list[replies.Price] | None:
     return None if prices is None else [_price(price) for price in prices]
 
 
-def _by_limb(values: Mapping[str, Array] | None) -> dict[str, list[float]] | None:
+def limbs_reply(values: Mapping[str, Array] | None) -> dict[str, list[float]] | None:
+    """Return the limbs' numbers as they travel."""
     return None if values is None else {limb: vector(value) for limb, value in values.items()}
 
 
@@ -226,7 +239,7 @@ def _certificate(answer: Plan, model: bool) -> replies.Certificate | None:
     if proof is None:
         return None
     return replies.Certificate(
-        utilisation=_number(proof.utilisation),
+        utilisation=number(proof.utilisation),
         direction=vector(proof.direction),
         held={limb: vector(part) for limb, part in proof.held.items()},
         supremum=float(proof.supremum),
@@ -250,7 +263,7 @@ def _path(path: TensionPath) -> replies.TensionPath:
     return replies.TensionPath(
         safe=path.safe,
         safe_part=float(path.safe_part),
-        utilisation_at_present=_number(path.utilisation_at_present),
+        utilisation_at_present=number(path.utilisation_at_present),
         largest_change=float(path.largest_change),
         limiting=[limit_reply(name) for name in path.limiting],
     )
@@ -259,6 +272,7 @@ def _path(path: TensionPath) -> replies.TensionPath:
 def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
     reaches = {}
     for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
+        deadline.check(VIEWS)
         ends = space.capability(direction)
         low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))
         for sign, pure, way in (("+", high, direction), ("-", low, -direction)):

@@ -27,7 +27,13 @@ from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question, stance
 from service.answering.streams import STREAMS, Streams
-from service.replies import BodySpaceReply, PlanReply, SetPointsReply, StreamReply, WrenchSpaceReply
+from service.replies import (
+    BodySpaceReply,
+    PlanReply,
+    SetPointsReply,
+    StreamReply,
+    WrenchSpaceReply,
+)
 from service.requests import (
     BodySpaceRequest,
     PlanRequest,
@@ -125,12 +131,14 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         If the request is impossible.
     """
     asked = stance(request.stance, robots)
+    _mind_time()
     hand = prepare.resting_hand(asked, request.limb)
+    _mind_time()
     robust = None
     if "robust" in request.want:
         if hand.palm is not None:
             raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
-        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS)
+        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS, between=_mind_time)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     reply = wrench_space_reply(
         asked.robot.name,
@@ -142,8 +150,13 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         wrist,
         robust,
     )
+    reply.id = request.id
     reply.poses = placed_poses(asked)
     return reply
+
+
+def _mind_time() -> None:
+    deadline.check("the hand's wrench space was known")
 
 
 def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceReply:
@@ -261,9 +274,10 @@ def handle(
             request = files.whole(request)
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
-        seconds = request.deadline if isinstance(request, PlanRequest) else None
         about = (request, robots, streams) if service.streams else (request, robots)
-        with deadline.within(seconds, started=started), _taking(turn if service.waits else None):
+        turn = turn if service.waits else None
+        with deadline.within(request.deadline, started=started), _taking(turn):
+            deadline.check("an answer was begun")
             reply = service.answer(*about)
         status: str = getattr(reply, "status", "done")
         return Answer(form.encode(reply), form.label(reply), True, status)

@@ -8,7 +8,8 @@ import uuid
 from collections import OrderedDict
 from typing import Final
 
-from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.base import CruxError, InvalidInputError, UnsupportedError
+from planner import deadline
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service.answering.hand_answers import placed_poses
@@ -18,6 +19,9 @@ from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamRe
 from service.requests import PlanRequest, SetPointsRequest, StreamRequest
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
+
+FIRST: Final = "the plans about the first body wrench were there"
+"""What a deadline may come before."""
 
 KEPT: Final = 16
 """Streams that a service keeps; then the one that was asked for longest ago goes."""
@@ -63,7 +67,14 @@ class Streams:
         """Answer a declaration; parameters and errors as of `opened`."""
         start = time.perf_counter()
         stream = opened(request, robots)
-        first = stream.set_points(stream.first)
+        try:
+            # with fewer plans, later set-points would not be the same
+            deadline.check(FIRST)
+            first = stream.set_points(stream.first)
+            deadline.check(FIRST)
+        except CruxError:
+            stream.close()
+            raise
         identifier = uuid.uuid4().hex
         with self._lock:
             self._kept[identifier] = stream
@@ -71,6 +82,7 @@ class Streams:
         for old in gone:
             old.close()
         return StreamReply(
+            id=request.id,
             poses=placed_poses(stream.question.stance),
             stream=identifier,
             radius=stream.interpolates,
@@ -106,7 +118,9 @@ class Streams:
                 field="stream",
             )
         points = stream.set_points(request.body_wrench)
-        return set_points_reply(request.stream, stream, points, start)
+        reply = set_points_reply(request.stream, stream, points, start)
+        reply.id = request.id
+        return reply
 
     def close(self) -> None:
         """Let all streams go."""

@@ -65,7 +65,6 @@ class BodySpaceReply(StanceReply, kw_only=True):
     newtons with moments over 0.1 m. ``error``: its old name, for one more version.
     """
 
-    id: str | None = None
     robot: str
     status: str
     reason: str

@@ -107,7 +107,6 @@ class PlanReply(StanceReply, kw_only=True):
     not for a body wrench of zero.
     """
 
-    id: str | None = None
     status: str
     reason: str
     body_wrench: Vector

@@ -29,9 +29,10 @@ Vector = list[float]
 
 
 class Reply(Struct, kw_only=True):
-    """What every reply has."""
+    """What every reply has. ``id``: the request's, where there was one that could be read."""
 
     v: int = 1
+    id: str | None = None
 
 
 class PlacedFrame(Struct):
@@ -65,10 +66,6 @@ class ErrorDetail(Struct):
 
 
 class ErrorReply(Reply, kw_only=True):
-    """A request that could not be understood, or a service that failed on it.
+    """A request that could not be understood, or a service that failed on it."""
 
-    ``id``: the request's, where it could be read.
-    """
-
-    id: str | None = None
     error: ErrorDetail

@@ -22,6 +22,7 @@ from .request import (
     Identifier as Identifier,
     Name as Name,
     Pose as Pose,
+    Query as Query,
     Request as Request,
     Wrench as Wrench,
 )

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from service.requests.limits import Limits, Load
-from service.requests.request import Identifier, Later, Name, Request, Tensions, Wrench
+from service.requests.request import Later, Name, Query, Tensions, Wrench
 from service.requests.stance import Stance
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "Want",
 ]
 
-Duration = Annotated[float, Meta(gt=0.0, le=1e6, description="[s]")]
 ObjectiveName = Annotated[
     Literal["max_margin", "min_effort", "max_reliability"],
     Meta(
@@ -31,10 +30,9 @@ ObjectiveName = Annotated[
 Want = Literal["load_factor", "prices", "model", "robust"]
 
 
-class PlanRequest(Request, frozen=True, kw_only=True):
+class PlanRequest(Query, frozen=True, kw_only=True):
     """Asks who carries what in a stance."""
 
-    id: Identifier | None = None
     stance: Stance
     body_wrench: Annotated[
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
@@ -47,13 +45,6 @@ class PlanRequest(Request, frozen=True, kw_only=True):
         Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
     ] = {}
     confidence: Later = None
-    deadline: Annotated[
-        Duration | None,
-        Meta(
-            description="how long the answer may take, from where the service takes the question "
-            "on: then what is verified so far is the answer [s]"
-        ),
-    ] = None
     want: Annotated[
         list[Want],
         Meta(description="robust: the least load factor over a scatter of the hands' places, too"),

@@ -20,6 +20,7 @@ __all__ = [
     "Pose",
     "Position",
     "PreloadEntry",
+    "Query",
     "Request",
     "Strict",
     "Tension",
@@ -54,6 +55,7 @@ Tensions = Annotated[
 Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
+Duration = Annotated[float, Meta(gt=0.0, le=600.0, description="[s]")]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
 
 
@@ -72,3 +74,17 @@ class Request(Strict, frozen=True, kw_only=True):
     """What every request has."""
 
     v: Literal[1]
+
+
+class Query(Request, frozen=True, kw_only=True):
+    """What every request has that is asked over zenoh."""
+
+    id: Identifier | None = None
+    deadline: Annotated[
+        Duration | None,
+        Meta(
+            description="how long the answer may take, from its question's arrival at the service "
+            "on, waiting included: then the best plan that is verified is the answer, or that "
+            "there is none yet [s]"
+        ),
+    ] = None

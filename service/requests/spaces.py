@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from service.requests.limits import Limits, Load
-from service.requests.request import Coordinate, Identifier, Name, Request, Tensions, Wrench
+from service.requests.request import Coordinate, Name, Query, Tensions, Wrench
 from service.requests.stance import Stance
 
 __all__ = [
@@ -20,7 +20,7 @@ Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 
 
-class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
+class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
     """Asks what one hand of a stance can carry."""
 
     stance: Stance
@@ -34,10 +34,9 @@ class WrenchSpaceRequest(Request, frozen=True, kw_only=True):
     ] = []
 
 
-class BodySpaceRequest(Request, frozen=True, kw_only=True):
+class BodySpaceRequest(Query, frozen=True, kw_only=True):
     """Asks what a stance can hold: body wrenches, a plane of them, and accelerations."""
 
-    id: Identifier | None = None
     stance: Stance
     body_wrench: Annotated[
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")

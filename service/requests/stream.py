@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from service.requests.limits import Limits, Load
-from service.requests.request import Name, Request, Wrench
+from service.requests.request import Name, Query, Wrench
 from service.requests.stance import Stance
 
 __all__ = ["SetPointsRequest", "StreamRequest"]
@@ -22,7 +22,7 @@ Radius = Annotated[
 ]
 
 
-class StreamRequest(Request, frozen=True, kw_only=True):
+class StreamRequest(Query, frozen=True, kw_only=True):
     """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
 
     stance: Stance
@@ -34,7 +34,7 @@ class StreamRequest(Request, frozen=True, kw_only=True):
     radius: Radius = 30.0
 
 
-class SetPointsRequest(Request, frozen=True, kw_only=True):
+class SetPointsRequest(Query, frozen=True, kw_only=True):
     """Asks a stream for the set-points of a body wrench."""
 
     stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
