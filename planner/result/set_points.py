@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from hand_models.base import Array
 from hand_models.tendon import TendonDrive
 from planner.result.plan import Status
@@ -40,6 +42,8 @@ class SetPoints:
         Mixed from plans known before; solved for this wrench alone; or a mixture of both.
     drive : TendonDrive or None
         Of all tendons.
+    winches : ndarray, shape (2, hands, 4), or None
+        Angles from the open finger without a tension [rad], and per newton of it.
     reason : str or None
         Why there is no plan.
     """
@@ -54,7 +58,16 @@ class SetPoints:
     verified: bool
     source: SetPointSource
     drive: TendonDrive | None = None
+    winches: Array | None = None
     reason: str | None = None
+
+    @property
+    def winch_angle(self) -> Array | None:
+        """Where the winches are then, from the open finger, shape (hands, 4) [rad]."""
+        if self.tensions is None or self.winches is None:
+            return None
+        at_zero, per_newton = self.winches
+        return np.asarray(at_zero + per_newton * self.tensions)
 
     @property
     def motor_torque(self) -> Array | None:

@@ -213,6 +213,7 @@ class WrenchStream:
             verified=check.fault(loads, wrenches, used, wrench) is None,
             source=source,
             drive=stance.drive,
+            winches=stance.winches,
         )
 
     def _without(self, wrench: Array) -> SetPoints:

@@ -14,11 +14,12 @@ import numpy as np
 
 from hand_models.base import Array, UnsupportedError
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
-from hand_models.hand import FINGERS, NAIL
+from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
 from planner.programs import WRENCH_UNIT, Outcome
 from planner.question import Question
-from planner.result import Plan
+from planner.result import Plan, load_recovery_of
 from planner.solving import KnownStance, is_least, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import LoadsCheck
@@ -79,6 +80,8 @@ class StreamStance:
         Names of each hand's loads.
     check : LoadsCheck
         That of every plan.
+    winches : ndarray, shape (2, hands, 4)
+        Their angles without a tension [rad], and per newton of it.
 
     Raises
     ------
@@ -105,6 +108,7 @@ class StreamStance:
         self.shape = len(spaces), max(sizes)
         self.check = LoadsCheck(prepared.question, prepared.settled, self.columns, prepared.where)
         self.drive = prepared.settled[0].hand.drive
+        self.winches = _winches(prepared.settled, spaces)
         self._least = np.zeros(self.shape)
         limits = max(len(space.s) for space in spaces)
         self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
@@ -185,6 +189,17 @@ class StreamStance:
         for row, y in zip(whole, loads, strict=True):
             row[: len(y)] = y
         return np.maximum(whole, self._least)
+
+
+def _winches(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> Array:
+    """Return the winches' angles without tension and per newton, which no other load changes."""
+    reader, tendons = load_recovery_of(settled, spaces), len(FINGERS)
+    loads = [np.zeros(len(space.columns)) for space in spaces]
+    at_zero = reader.read(loads).arrays.drives[-1]
+    for y in loads:
+        y[:tendons] = 1.0
+    per_newton = reader.read(loads).arrays.drives[-1] - at_zero
+    return np.array([at_zero, per_newton]).reshape(2, -1, tendons)
 
 
 def _refuse(question: Question) -> None:

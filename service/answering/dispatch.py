@@ -21,6 +21,7 @@ from planner.question import Question
 from planner.result import Plan, WristPlan
 from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
 from service.answering.body_space import explore
+from service.answering.brief_plan import brief_plan_reply
 from service.answering.hand_answers import placed_poses
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_hand import over_default
@@ -29,6 +30,7 @@ from service.answering.questions import question, stance
 from service.answering.streams import STREAMS, Streams
 from service.replies import (
     BodySpaceReply,
+    BriefPlanReply,
     PlanReply,
     SetPointsReply,
     StreamReply,
@@ -88,7 +90,7 @@ class Answer(NamedTuple):
     status: str = "done"
 
 
-def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply:
+def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
     """Answer a plan request.
 
     Parameters
@@ -110,15 +112,20 @@ class Planned(NamedTuple):
 
     question: Question
     plan: Plan
-    reply: PlanReply
+    reply: PlanReply | BriefPlanReply
 
 
 def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     """Answer a plan request, and keep what the reply leaves out; as `plan`."""
     asked = question(request, robots)
     answer = solving.plan(asked)
-    reply = plan_reply(answer, request.id, model="model" in request.want)
-    reply.poses = placed_poses(asked.stance)
+    reply: PlanReply | BriefPlanReply
+    if request.detail == "full":
+        reply = plan_reply(answer, request.id, model="model" in request.want)
+    else:
+        reply = brief_plan_reply(answer, request.id, hands=request.detail == "hands")
+    if request.detail != "set_points":
+        reply.poses = placed_poses(asked.stance)
     return Planned(asked, answer, reply)
 
 

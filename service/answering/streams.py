@@ -8,15 +8,18 @@ import uuid
 from collections import OrderedDict
 from typing import Final
 
+from msgspec import UNSET
+
 from hand_models.base import CruxError, InvalidInputError, UnsupportedError
 from planner import deadline
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
+from service.answering.brief_plan import cut_reason
 from service.answering.hand_answers import placed_poses
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
-from service.requests import PlanRequest, SetPointsRequest, StreamRequest
+from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
 
@@ -118,7 +121,7 @@ class Streams:
                 field="stream",
             )
         points = stream.set_points(request.body_wrench)
-        reply = set_points_reply(request.stream, stream, points, start)
+        reply = set_points_reply(request.stream, stream, points, start, request.detail)
         reply.id = request.id
         return reply
 
@@ -131,7 +134,11 @@ class Streams:
 
 
 def set_points_reply(
-    identifier: str, stream: WrenchStream, points: SetPoints, start: float
+    identifier: str,
+    stream: WrenchStream,
+    points: SetPoints,
+    start: float,
+    detail: Detail = "full",
 ) -> SetPointsReply:
     """Return set-points as they travel.
 
@@ -142,23 +149,29 @@ def set_points_reply(
     points : SetPoints
     start : float
         When the question came, on the clock of `time.perf_counter`.
+    detail : {'set_points', 'hands', 'full'}, optional
+        With the first, hands have their tensions alone; the other two are the same.
     """
+    brief = detail == "set_points"
     hands = None
     if points.tensions is not None:
         assert points.motor_torque is not None
         assert points.motor_current is not None
         assert points.wrenches is not None
+        assert points.winch_angle is not None
         hands = [
             HandSetPoints(
                 limb=limb,
                 tensions=tensions,
-                motor_torque=torque,
-                motor_current=current,
-                wrench=wrench,
+                winch_angle=angle,
+                motor_torque=UNSET if brief else torque,
+                motor_current=UNSET if brief else current,
+                wrench=UNSET if brief else wrench,
             )
-            for limb, tensions, torque, current, wrench in zip(
+            for limb, tensions, angle, torque, current, wrench in zip(
                 stream.limbs,
                 points.tensions.tolist(),
+                points.winch_angle.tolist(),
                 points.motor_torque.tolist(),
                 points.motor_current.tolist(),
                 points.wrenches.tolist(),
@@ -168,7 +181,7 @@ def set_points_reply(
     return SetPointsReply(
         stream=identifier,
         status=points.status,
-        reason=points.reason,
+        reason=cut_reason(points.reason) if brief and points.reason else points.reason,
         body_wrench=points.body_wrench.tolist(),
         utilisation=points.utilisation,
         gap=points.gap,

@@ -47,7 +47,7 @@ from service.commands.terminal import (
     say,
     waiting,
 )
-from service.replies import PlanReply
+from service.replies import BriefPlanReply, PlanReply
 from service.requests import PlanRequest, Want
 from service.tables import console, print_plan
 from service.wire import REQUEST_KINDS, schema as message_schema
@@ -142,15 +142,18 @@ def plan(
     from service.answering import robots_of
 
     extras: list[Want] = ["robust"] if robust else []
-    request = with_extras(asked(read_request(stance), hand, robot), *extras)
+    request = asked(read_request(stance), hand, robot)
+    request = with_extras(request, *extras, whole=not as_json)
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):
             answer = answering.planned(request, robots)
-            bare = _without_palms(request, robots)
+            bare = _without_palms(request, robots) if request.detail == "full" else None
         if picture is not None:
             draw_plan(answer, picture)
-    if as_json:
+    if isinstance(answer.reply, BriefPlanReply):
+        say(answer.reply)
+    elif as_json:
         without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
         say(msgspec.to_builtins(answer.reply) | without)
     else:
@@ -167,9 +170,11 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
     try:
-        return answering.plan(replace(request, stance=stance, want=["load_factor"]), robots)
+        reply = answering.plan(replace(request, stance=stance, want=["load_factor"]), robots)
     except DeadlineError:
         return None
+    assert isinstance(reply, PlanReply)  # of a whole request
+    return reply
 
 
 @crux.command()

@@ -166,7 +166,7 @@ def query(
 
     It has to serve the robot that the stance or --robot names.
     """
-    request = with_extras(asked(read_request(stance), hand, robot))
+    request = with_extras(asked(read_request(stance), hand, robot), whole=not as_json)
     start_zenoh_log()
     with CruxClient(config, request.stance.robot or DEFAULT_ROBOT, timeout=timeout) as client:
         reply = client.plan(request)

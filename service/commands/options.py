@@ -48,10 +48,14 @@ def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R
     return with_robot(request, robot)
 
 
-def with_extras(request: PlanRequest, *further: Want) -> PlanRequest:
-    """Return a request that wants what the command line shows besides the plan, and more, too."""
+def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> PlanRequest:
+    """Return a request that wants what the command line shows besides the plan, and more, too.
+
+    ``whole``: whether a person reads the reply, who gets all of it.
+    """
     want = dict.fromkeys([*request.want, *EXTRAS, *further])
-    return msgspec.structs.replace(request, want=list(want))
+    detail = "full" if whole else request.detail
+    return msgspec.structs.replace(request, want=list(want), detail=detail)
 
 
 def check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:

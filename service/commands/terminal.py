@@ -11,7 +11,7 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError
-from service.replies import PlanReply
+from service.replies import BriefPlanReply, PlanReply
 from service.requests import PlanRequest
 from service.tables import console, print_plan
 
@@ -53,9 +53,9 @@ def say(result: object) -> None:
     click.echo(msgspec.json.encode(result))
 
 
-def show(reply: PlanReply, as_json: bool) -> int:
-    """Write a plan, and return its exit status."""
-    if as_json:
+def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
+    """Write a plan, and return its exit status; what is brief is not for a person."""
+    if as_json or isinstance(reply, BriefPlanReply):
         say(reply)
     else:
         print_plan(reply, console())

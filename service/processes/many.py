@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Self
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
 from service.processes.workers import Lost, Workers, cores
-from service.replies import ErrorReply, PlanReply
+from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import PLAN, Format, LostError, MalformedError, encode_error, identifier
 
@@ -100,7 +100,7 @@ class Planners:
         self,
         requests: Sequence[PlanRequest],
         progress: Callable[[int, int], None] | None = None,
-    ) -> list[PlanReply | ErrorReply]:
+    ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
         """Return the reply to each request, or the error in its place; as `plan_many`."""
         form = Format.MSGPACK
         found: dict[int, Answered] = {}
@@ -118,7 +118,7 @@ class Planners:
             if progress is not None:
                 progress(len(found), len(requests))
         with _no_collection():
-            return [_decoded(found[i], form) for i in range(len(requests))]
+            return [_decoded(found[i], form, each) for i, each in enumerate(requests)]
 
     def answers(
         self, payloads: Sequence[bytes], form: Format = Format.JSON
@@ -143,7 +143,7 @@ def plan_many(
     *,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[PlanReply | ErrorReply]:
+) -> list[PlanReply | BriefPlanReply | ErrorReply]:
     """Return the reply to each request, or the error in its place.
 
     Parameters
@@ -158,7 +158,7 @@ def plan_many(
 
     Returns
     -------
-    list of PlanReply or ErrorReply
+    list of PlanReply, BriefPlanReply or ErrorReply
         In the order of the requests. Nothing that is wrong with one of them is raised.
 
     Raises
@@ -230,7 +230,11 @@ def _refused(error: CruxError, form: Format, name: str | None) -> Answered:
     return Answered(payload, False)
 
 
-def _decoded(answer: Answered, form: Format) -> PlanReply | ErrorReply:
-    if answer.good:
+def _decoded(
+    answer: Answered, form: Format, request: PlanRequest
+) -> PlanReply | BriefPlanReply | ErrorReply:
+    if not answer.good:
+        return form.decode(answer.payload, ErrorReply)
+    if getattr(request, "detail", "full") == "full":
         return form.decode(answer.payload, PlanReply)
-    return form.decode(answer.payload, ErrorReply)
+    return form.decode(answer.payload, BriefPlanReply)

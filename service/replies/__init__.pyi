@@ -4,6 +4,7 @@ from .body_space import (
     BodySection as BodySection,
     BodySpaceReply as BodySpaceReply,
 )
+from .brief_plan import BriefPlanReply as BriefPlanReply
 from .hand import (
     Finger as Finger,
     Hand as Hand,

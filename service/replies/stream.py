@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
 
 from service.replies.reply import Reply, StanceReply, Vector
 
@@ -36,13 +36,19 @@ class StreamReply(StanceReply, kw_only=True):
 
 
 class HandSetPoints(Struct, kw_only=True):
-    """What one hand is to do: tensions [N], motors [N·m, A], its wrench on the rock in H."""
+    """What one hand is to do: tensions [N], motors [N·m, A], its wrench on the rock in H.
+
+    ``winch_angle``: from the open finger [rad]. The hand's ``utilisation`` is only of a plan. With
+    ``"detail": "set_points"`` there are tensions and winches alone.
+    """
 
     limb: str
     tensions: Vector
-    motor_torque: Vector
-    motor_current: Vector
-    wrench: Vector
+    winch_angle: Vector
+    motor_torque: Vector | UnsetType = UNSET
+    motor_current: Vector | UnsetType = UNSET
+    wrench: Vector | UnsetType = UNSET
+    utilisation: float | UnsetType = UNSET
 
 
 class SetPointsReply(Reply, kw_only=True):

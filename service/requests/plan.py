@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from service.requests.limits import Limits, Load
-from service.requests.request import Later, Name, Query, Tensions, Wrench
+from service.requests.request import Detail, Later, Name, Query, Tensions, Wrench
 from service.requests.stance import Stance
 
 __all__ = [
@@ -45,6 +45,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
     ] = {}
     confidence: Later = None
+    detail: Detail = "full"
     want: Annotated[
         list[Want],
         Meta(description="robust: the least load factor over a scatter of the hands' places, too"),

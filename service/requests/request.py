@@ -13,6 +13,7 @@ __all__ = [
     "Acceleration",
     "AccelerationEntry",
     "Coordinate",
+    "Detail",
     "Force",
     "Identifier",
     "Later",
@@ -56,6 +57,13 @@ Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
 Duration = Annotated[float, Meta(gt=0.0, le=600.0, description="[s]")]
+Detail = Annotated[
+    Literal["set_points", "hands", "full"],
+    Meta(
+        description="how much the reply tells: what tendons are to do, in little room; also what "
+        "the hands carry; or all that is known"
+    ),
+]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
 
 

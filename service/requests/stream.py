@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from service.requests.limits import Limits, Load
-from service.requests.request import Name, Query, Wrench
+from service.requests.request import Detail, Name, Query, Wrench
 from service.requests.stance import Stance
 
 __all__ = ["SetPointsRequest", "StreamRequest"]
@@ -39,3 +39,4 @@ class SetPointsRequest(Query, frozen=True, kw_only=True):
 
     stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
     body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
+    detail: Detail = "full"

@@ -13,6 +13,7 @@ from msgspec import UNSET
 
 from service.replies import (
     BodySpaceReply,
+    BriefPlanReply,
     ErrorReply,
     PlanReply,
     Reply,
@@ -116,8 +117,8 @@ class CruxClient:
         if self._owned is not None:
             self._owned.close()
 
-    def plan(self, request: PlanRequest) -> PlanReply:
-        """Return the service's plan.
+    def plan(self, request: PlanRequest) -> PlanReply | BriefPlanReply:
+        """Return the service's plan; a `BriefPlanReply` where the request wants less detail.
 
         Raises
         ------
@@ -128,7 +129,9 @@ class CruxClient:
         ServiceTimeout
             If nobody answers in time.
         """
-        return self._ask(PLAN, request, PlanReply)
+        if request.detail == "full":
+            return self._ask(PLAN, request, PlanReply)
+        return self._ask(PLAN, request, BriefPlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""

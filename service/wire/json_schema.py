@@ -9,6 +9,7 @@ import msgspec
 from hand_models.parameters import Quantity
 from service.replies import (
     BodySpaceReply,
+    BriefPlanReply,
     ErrorReply,
     HealthReply,
     PlanReply,
@@ -30,6 +31,7 @@ __all__ = ["MESSAGES", "schema"]
 MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanRequest,
     PlanReply,
+    BriefPlanReply,
     WrenchSpaceRequest,
     WrenchSpaceReply,
     BodySpaceRequest,
