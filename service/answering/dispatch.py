@@ -272,11 +272,12 @@ def handle(
     Answer
         A reply, or a structured error; nothing is raised but a lack of memory.
     """
-    form = Format.JSON
+    form, kind = Format.JSON, None
     try:
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
-        request = decode_request(payload, service.request, form)
+        kind = service.request
+        request = decode_request(payload, kind, form)
         if files is not None:
             request = files.whole(request)
         if not isinstance(request, SetPointsRequest):
@@ -289,10 +290,11 @@ def handle(
         status: str = getattr(reply, "status", "done")
         return Answer(form.encode(reply), form.label(reply), True, status)
     except InvalidInputError as error:
-        kind = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        return Answer(*encode_error(kind, error, form, identifier(payload, form)), False, kind)
+        told = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
+        coded = encode_error(told, error, form, identifier(payload, form, kind))
+        return Answer(*coded, False, told)
     except DeadlineError as error:
-        coded = encode_error(error.kind, error, form, identifier(payload, form))
+        coded = encode_error(error.kind, error, form, identifier(payload, form, kind))
         return Answer(*coded, False, error.kind)
     except MemoryError:
         # of a process, not of a question: who runs the process has to know
@@ -300,7 +302,7 @@ def handle(
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        coded = encode_error("internal", excuse, form, identifier(payload, form))
+        coded = encode_error("internal", excuse, form, identifier(payload, form, kind))
         return Answer(*coded, False, "internal")
 
 

@@ -1,8 +1,10 @@
 from .codec import (
+    LARGEST_ERROR as LARGEST_ERROR,
     Format as Format,
     decode_request as decode_request,
     encode_error as encode_error,
     identifier as identifier,
+    most_bytes as most_bytes,
 )
 from .errors import (
     REQUEST_KINDS as REQUEST_KINDS,

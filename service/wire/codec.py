@@ -8,19 +8,47 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError, InvalidInputError, LimitError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import Identifier
+from service.requests import Identifier, SetPointsRequest
 from service.wire.checks import check
+from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import leaves_open, validation_error
 
-__all__ = ["LARGEST_REQUEST", "Format", "decode_request", "encode_error", "identifier"]
+__all__ = [
+    "LARGEST_ERROR",
+    "LARGEST_REQUEST",
+    "Format",
+    "decode_request",
+    "encode_error",
+    "identifier",
+    "most_bytes",
+]
 
 T = TypeVar("T")
 
 LARGEST_REQUEST: Final = 2**26
 """Bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
+
+LARGEST: Final[dict[type, int]] = {SetPointsRequest: 2**12}
+"""The same of requests that have no rock in them."""
+
+ADVICE: Final[dict[type, str]] = {
+    SetPointsRequest: "ask for one body wrench at a time, with a shorter id",
+}
+"""How to ask for less; by default how to send less rock."""
+
+LESS_ROCK: Final = (
+    "let hands share a scan under stance.rocks, cut it to what is near them, or make its triangles "
+    "larger (crux rock --spacing)"
+)
+
+LARGEST_ERROR: Final = 4096
+"""Bytes of an error reply."""
+
+PARTS: Final = {"id": 1540, "field": 600, "message": 1600}
+"""Bytes of its texts as they are written; an ``id`` that a request may have is never more."""
 
 ALIASES: Final = {
     "": "application/json",
@@ -94,8 +122,12 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
     InvalidInputError
         With the field to blame; as `MalformedError` or `UnsupportedError` where that is the case.
     """
-    if len(payload) > LARGEST_REQUEST:
-        raise MalformedError(f"{len(payload)} bytes; a request may have {LARGEST_REQUEST} at most")
+    most = most_bytes(kind)
+    if len(payload) > most:
+        raise LimitError(
+            f"{len(payload)} bytes; a {kind.__name__} may have {most} at most: "
+            f"{ADVICE.get(kind, LESS_ROCK)}"
+        )
     try:
         request = form.decode(payload, kind)
     except msgspec.ValidationError as error:
@@ -109,10 +141,19 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
         )
         raise InvalidInputError(message, field=field) from None
     try:
+        if form is Format.JSON:
+            refuse_in_json(payload)
+        else:
+            refuse_in_msgpack(payload)
         check(request)
     except RecursionError:
         raise MalformedError("nested too deeply") from None
     return request
+
+
+def most_bytes(kind: type) -> int:
+    """Return how many bytes a request of a kind may have; of more nothing is decoded."""
+    return LARGEST.get(kind, LARGEST_REQUEST)
 
 
 def _plain(payload: bytes, form: Format) -> Any:
@@ -127,9 +168,12 @@ class _Named(msgspec.Struct):
     id: Identifier | None = None
 
 
-def identifier(payload: bytes, form: Format) -> str | None:
-    """Return a request's ``id``, whatever else is wrong with it; None where it cannot be read."""
-    if len(payload) > LARGEST_REQUEST:
+def identifier(payload: bytes, form: Format, kind: type | None = None) -> str | None:
+    """Return a request's ``id``, whatever else is wrong with it; None where it cannot be read.
+
+    Nor is it read where the payload is too large for the kind of request.
+    """
+    if len(payload) > (LARGEST_REQUEST if kind is None else most_bytes(kind)):
         return None
     try:
         return form.decode(payload, _Named).id
@@ -140,9 +184,28 @@ def identifier(payload: bytes, form: Format) -> str | None:
 def encode_error(
     kind: str, error: CruxError, form: Format, name: str | None = None
 ) -> tuple[bytes, str]:
-    """Return an error reply's bytes and encoding; ``name`` is the request's ``id``."""
-    detail = ErrorDetail(kind, error.field, error.message)
+    """Return an error reply's bytes and encoding; ``name`` is the request's ``id``.
+
+    Texts are cut where there would be more than `LARGEST_ERROR` bytes of it.
+    """
+    detail = ErrorDetail(
+        kind,
+        None if error.field is None else _cut(error.field, PARTS["field"], form),
+        _cut(error.message, PARTS["message"], form),
+    )
     if isinstance(error, BusyError):
         detail.retry_after = error.retry_after
-    reply = ErrorReply(id=name, error=detail)
+    reply = ErrorReply(id=None if name is None else _cut(name, PARTS["id"], form), error=detail)
     return form.encode(reply), form.label(reply)
+
+
+def _cut(text: str, most: int, form: Format) -> str:
+    """Return a text that takes so many bytes at most."""
+    whole = text.encode(errors="replace").decode()  # half a pair of UTF-16 cannot be written
+    if len(form.encode(whole)) <= most:
+        return whole
+    end = "…"
+    beginning = whole[:most]
+    while len(form.encode(beginning + end)) > most:
+        beginning = beginning[: len(beginning) * 9 // 10]
+    return beginning + end

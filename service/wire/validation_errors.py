@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
@@ -59,7 +60,7 @@ def validation_error(
     found = WHERE.search(text)
     path = found.group(1) if found else ""
     complaint = text[: found.start()] if found else text
-    places = list(_places_at(inspect.type_info(kind), path))
+    places = list(_places_at(_known(kind), path))
     types = [place.kind for place in places]
     field = _with_keys(path, document, decode).removeprefix(".")
 
@@ -79,6 +80,12 @@ def validation_error(
         if OUT_OF_RANGE.search(complaint):
             message += _in_units(places)
     return _clip(field) or None, _clip(message)
+
+
+@cache
+def _known(kind: type) -> inspect.Type:
+    """Return what is known of a message, which takes milliseconds to find out."""
+    return inspect.type_info(kind)
 
 
 def leaves_open(error: msgspec.ValidationError) -> bool:

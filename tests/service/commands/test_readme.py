@@ -17,6 +17,7 @@ from service.commands.stances import bundled
 from service.serving import open_session, zenoh_config
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.served import Served, free_endpoint
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -112,6 +113,27 @@ def test_the_example_of_a_clients_name_is_a_query_that_a_service_can_tell_from_o
         session.declare_queryable("crux/robosimian/plan", told)
         exec(compile(example.replace("import zenoh", ""), "README.md", "exec"), {"zenoh": Here})
         assert names.get(timeout=PATIENCE) == (session.zid(), 1)
+
+
+def test_the_examples_of_a_client_read_whole_plans_and_set_points(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    (stance,) = blocks("json")
+    (tmp_path / "stance.json").write_text(stance, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    server, scope = Served(free_endpoint()), dict[str, object]()
+    try:
+        for example in (block for block in blocks("python") if "CruxClient(" in block):
+            text = example.replace("tcp/127.0.0.1:7447", server.endpoint)
+            exec(compile(text, "README.md", "exec"), scope)
+    finally:
+        server.process.kill()
+        server.process.communicate()
+    whole, points = capsys.readouterr().out.splitlines()
+    assert whole.startswith("optimal 0.7")
+    status, tensions = points.split(maxsplit=1)
+    assert status == "optimal"
+    assert [len(hand) for hand in json.loads(tensions)] == [4, 4]
 
 
 def test_every_command_line_uses_a_bundled_name_that_exists():
