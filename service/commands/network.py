@@ -24,6 +24,7 @@ from service.commands.options import (
 )
 from service.commands.stances import read_request
 from service.commands.terminal import draw_plan, note, say, show
+from service.requests import LONGEST_DEADLINE
 from service.serving import (
     CruxClient,
     listening,
@@ -43,9 +44,6 @@ __all__ = ["demo", "query", "serve"]
 PATIENCE: Final = 120.0
 """How long the demo waits for its own service, however busy the machine [s]."""
 
-LONGEST: Final = 600.0
-"""The longest deadline of a service's own [s]."""
-
 DEMO_STANCE: Final = "wall-300-joints"
 
 
@@ -61,7 +59,7 @@ DEMO_STANCE: Final = "wall-300-joints"
 @click.option(
     "--deadline",
     "seconds",
-    type=click.FloatRange(0.0, min_open=True, max=LONGEST),
+    type=click.FloatRange(0.0, min_open=True, max=LONGEST_DEADLINE),
     default=10.0,
     show_default=True,
     metavar="SECONDS",

@@ -19,6 +19,7 @@ from .limits import (
 )
 from .plan import PlanRequest as PlanRequest, Want as Want
 from .request import (
+    LONGEST_DEADLINE as LONGEST_DEADLINE,
     Detail as Detail,
     Identifier as Identifier,
     Name as Name,

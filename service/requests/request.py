@@ -5,11 +5,12 @@ Bounds are far beyond any climbing robot; they keep arithmetic finite.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta, Struct
 
 __all__ = [
+    "LONGEST_DEADLINE",
     "Acceleration",
     "AccelerationEntry",
     "Coordinate",
@@ -56,7 +57,10 @@ Tensions = Annotated[
 Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
-Duration = Annotated[float, Meta(gt=0.0, le=600.0, description="[s]")]
+LONGEST_DEADLINE: Final = 600.0
+"""[s]"""
+
+Duration = Annotated[float, Meta(gt=0.0, le=LONGEST_DEADLINE, description="[s]")]
 Detail = Annotated[
     Literal["set_points", "hands", "full"],
     Meta(

@@ -22,9 +22,10 @@ from service.replies import (
     WrenchSpaceReply,
 )
 from service.requests import (
+    LONGEST_DEADLINE,
     BodySpaceRequest,
     PlanRequest,
-    Request,
+    Query,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
@@ -50,6 +51,9 @@ __all__ = ["TIMEOUT", "CruxClient"]
 
 R = TypeVar("R", bound=Reply)
 
+IN_TIME: Final = 0.9
+"""Part of a client's time in which a question without a deadline is to be answered."""
+
 TIMEOUT: Final = 10.0
 """How long a client waits for an answer by default [s]."""
 
@@ -66,7 +70,7 @@ class CruxClient:
         A session, which stays open, or the configuration of one that the client opens and closes.
     robot : str, optional
     timeout : float, optional
-        Of each question [s].
+        Of each question [s]; one that names no deadline has nine tenths of it.
     form : Format, optional
         How messages travel.
 
@@ -149,8 +153,12 @@ class CruxClient:
         """Return a stream's set-points for a body wrench; raises what `plan` raises."""
         return self._ask(SET_POINTS, request, SetPointsReply)
 
-    def _ask(self, name: str, request: Request, kind: type[R]) -> R:
+    def _ask(self, name: str, request: Query, kind: type[R]) -> R:
         key = service_key(self.robot, name)
+        if request.deadline is None:
+            # nobody waits for an answer that comes later
+            own = min(IN_TIME * self.timeout, LONGEST_DEADLINE)
+            request = msgspec.structs.replace(request, deadline=own)
         reply = self._get(key, request)
         if reply is None:
             time.sleep(SECOND_TRY_AFTER)
@@ -162,8 +170,7 @@ class CruxClient:
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
-                f"no answer at {key} within {self.timeout:g} s; the service may be busy with "
-                "another question: allow it longer (--timeout)"
+                f"no answer at {key} within {self.timeout:g} s; allow it longer (--timeout)"
             )
         detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
         raise ServiceError(
@@ -173,7 +180,7 @@ class CruxClient:
             retry_after=None if detail.retry_after is UNSET else detail.retry_after,
         )
 
-    def _get(self, key: str, request: Request) -> zenoh.Reply | None:
+    def _get(self, key: str, request: Query) -> zenoh.Reply | None:
         """Return the first reply, or None where there is none."""
         replies = self._session.get(
             key,

@@ -204,6 +204,9 @@ class Dispatcher:
             self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
             self._quiet_from = time.perf_counter() + QUIET
             return
+        if question.fault is not None:
+            self._refuse(question, question.fault)
+            return
         kind = self._kind(question)
         if self._waiting.has_room(kind, question):
             self._waiting.put(kind, question)

@@ -9,8 +9,10 @@ from typing import Any, Final
 import msgspec
 import zenoh
 
+from hand_models.base import LimitError
+from service.answering import SERVICES
 from service.processes import Job
-from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError
+from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError, check_size
 
 __all__ = ["Question", "take"]
 
@@ -54,6 +56,8 @@ class Question:
         Whether it may take long.
     rehearsed : bool
         Whether it declares a stream that another process has found to be possible.
+    fault : LimitError or None
+        If it has too many bytes, which are not taken then.
     replied : bool
     """
 
@@ -69,6 +73,7 @@ class Question:
     stance: int | None = None
     dear: bool = False
     rehearsed: bool = False
+    fault: LimitError | None = None
     replied: bool = False
     begun: float = -1.0
     deadline: float = field(init=False)
@@ -101,9 +106,16 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
     longest : float
         The deadline of one that names none [s].
     """
-    payload = b"" if query.payload is None else query.payload.to_bytes()
-    source = query.source_info
+    given = query.payload
+    fault, payload = None, b""
     name = key.rpartition("/")[2]
+    if given is not None:
+        try:
+            check_size(len(given), SERVICES[name].request)
+            payload = given.to_bytes()
+        except LimitError as error:
+            fault = error
+    source = query.source_info
     question = Question(
         query=query,
         key=key,
@@ -114,6 +126,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
         encoding="" if query.encoding is None else str(query.encoding),
         seconds=longest,
         dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > READ,
+        fault=fault,
     )
     if len(payload) <= READ:
         _read(question)

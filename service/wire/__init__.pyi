@@ -1,6 +1,7 @@
 from .codec import (
     LARGEST_ERROR as LARGEST_ERROR,
     Format as Format,
+    check_size as check_size,
     decode_request as decode_request,
     encode_error as encode_error,
     identifier as identifier,

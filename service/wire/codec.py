@@ -20,6 +20,7 @@ __all__ = [
     "LARGEST_ERROR",
     "LARGEST_REQUEST",
     "Format",
+    "check_size",
     "decode_request",
     "encode_error",
     "identifier",
@@ -122,12 +123,7 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
     InvalidInputError
         With the field to blame; as `MalformedError` or `UnsupportedError` where that is the case.
     """
-    most = most_bytes(kind)
-    if len(payload) > most:
-        raise LimitError(
-            f"{len(payload)} bytes; a {kind.__name__} may have {most} at most: "
-            f"{ADVICE.get(kind, LESS_ROCK)}"
-        )
+    check_size(len(payload), kind)
     try:
         request = form.decode(payload, kind)
     except msgspec.ValidationError as error:
@@ -154,6 +150,22 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
 def most_bytes(kind: type) -> int:
     """Return how many bytes a request of a kind may have; of more nothing is decoded."""
     return LARGEST.get(kind, LARGEST_REQUEST)
+
+
+def check_size(size: int, kind: type) -> None:
+    """Refuse a payload of too many bytes.
+
+    Raises
+    ------
+    LimitError
+        If a request of that kind may not have so many.
+    """
+    most = most_bytes(kind)
+    if size > most:
+        raise LimitError(
+            f"{size} bytes; a {kind.__name__} may have {most} at most: "
+            f"{ADVICE.get(kind, LESS_ROCK)}"
+        )
 
 
 def _plain(payload: bytes, form: Format) -> Any:

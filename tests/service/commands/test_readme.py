@@ -91,6 +91,25 @@ def test_the_example_of_a_scan_makes_a_wall_of_terrain(
     assert (tmp_path / "rock.png").is_file()
 
 
+@pytest.mark.slow
+def test_the_example_of_holds_on_a_scan_makes_a_stance_that_stands(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    (options,) = re.findall(r"^crux rock \$terrain (.*)$", README, re.MULTILINE)
+    (tried,) = re.findall(r"^crux holds (.*) --plot holds.png$", README, re.MULTILINE)
+    (example,) = (block for block in blocks("python") if "holds.json" in block)
+    terrain = Path(mpl.get_data_path()) / "sample_data" / "jacksboro_fault_dem.npz"
+    monkeypatch.chdir(tmp_path)
+    assert run(["rock", str(terrain), *options.split()]) == 0
+    assert run(["holds", *tried.split()]) == 0
+    exec(compile(example, "README.md", "exec"), {})
+    capfd.readouterr()
+    assert run(["plan", "on-rock.json", "--json"]) == 0
+    reply = json.loads(capfd.readouterr().out)
+    assert reply["utilisation"] < 0.6
+    assert len(reply["poses"]) == 4
+
+
 def test_the_example_of_a_clients_name_is_a_query_that_a_service_can_tell_from_others():
     (example,) = (block for block in blocks("python") if "zenoh.SourceInfo" in block)
     names = queue.SimpleQueue()

@@ -389,3 +389,9 @@ def test_a_wildcard_is_answered_once_or_not_at_all(client: Client, key: str, ans
     replies = list(client.send({"echo": 1}, key))
     assert len(replies) == answered
     assert all(str(reply.ok.key_expr) == PLAN for reply in replies)
+
+
+def test_a_payload_that_is_too_large_is_refused_before_anything_reads_it(client: Client) -> None:
+    answer = client.ask({"echo": "x" * 2**12}, SET_POINTS)
+    assert kind(answer) == "limit"
+    assert "4096 at most" in answer["error"]["message"]
