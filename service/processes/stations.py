@@ -27,6 +27,9 @@ SWITCH: Final = 5e-4
 """How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
 times as long, in which a short question would wait for a long one at each of its steps."""
 
+LAST_MOMENT: Final = 0.2
+"""Longest time between the end of a process's pipes and its own [s]."""
+
 OUT_OF_MEMORY: Final = 77
 """Exit status of a process that may not have the memory that a question needs."""
 
@@ -114,9 +117,15 @@ class Station(Generic[T, R]):
         """Whether it has said that it can work."""
         return all(lane.ready for lane in self.lanes)
 
-    def kill(self) -> str:
-        """End it, whatever it does; return how it ended."""
-        self.process.join(0.05 if self.process.exitcode is None else 0.0)
+    def kill(self, *, dead: bool = False) -> str:
+        """End it, whatever it does; return how it ended.
+
+        Parameters
+        ----------
+        dead : bool, optional
+            Whether it has ended by itself: its pipes tell of that a moment earlier than the system.
+        """
+        self.process.join(LAST_MOMENT if dead else 0.0)
         died = self.process.exitcode
         self.process.kill()
         self.process.join()

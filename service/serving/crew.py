@@ -124,8 +124,10 @@ class Crew:
         size = resident(lane.station.process.pid)
         return size is not None and size > GROWN and not self.has_streams(lane)
 
-    def dismiss(self, station: Station[Job, Done]) -> tuple[str, list[Question]]:
-        """End a process.
+    def dismiss(
+        self, station: Station[Job, Done], *, dead: bool = False
+    ) -> tuple[str, list[Question]]:
+        """End a process; parameters as for `Station.kill`.
 
         Returns
         -------
@@ -144,7 +146,7 @@ class Crew:
             self.rests_until = time.perf_counter() + rest
             self.stillborn += 1
         left = [each for each in asked if each is not None and not each.replied]
-        return station.kill(), left
+        return station.kill(dead=dead), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""

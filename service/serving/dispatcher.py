@@ -305,7 +305,7 @@ class Dispatcher:
         self, station: Station[Job, Done], why: str | None = None
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
-        how, left = self._crew.dismiss(station)
+        how, left = self._crew.dismiss(station, dead=why is None)
         self._costs.lost(_number(station))
         self.watch.ended(station.process.pid, why or how)
         return how, left
