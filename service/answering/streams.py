@@ -10,7 +10,7 @@ from typing import Final
 
 from msgspec import UNSET
 
-from hand_models.base import CruxError, InvalidInputError, UnsupportedError
+from hand_models.base import InvalidInputError, UnsupportedError
 from planner import deadline
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
@@ -20,6 +20,7 @@ from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
 from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
+from service.wire import Format
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
 
@@ -70,36 +71,23 @@ class Streams:
         """Answer a declaration; parameters and errors as of `opened`."""
         start = time.perf_counter()
         stream = opened(request, robots)
+        identifier = uuid.uuid4().hex
         try:
-            # with fewer plans, later set-points would not be the same
-            deadline.check(FIRST)
-            first = stream.set_points(stream.first)
-            deadline.check(FIRST)
-        except CruxError:
+            reply = _declared(identifier, stream, request.id, start)
+            # what cannot be told would take a place that nobody knows of
+            Format.MSGPACK.encode(reply)
+        except BaseException:
             stream.close()
             raise
-        identifier = uuid.uuid4().hex
         with self._lock:
             self._kept[identifier] = stream
             gone = [self._kept.popitem(last=False)[1] for _ in range(len(self._kept) - KEPT)]
         for old in gone:
             old.close()
-        return StreamReply(
-            id=request.id,
-            poses=placed_poses(stream.question.stance),
-            stream=identifier,
-            radius=stream.interpolates,
-            status=first.status,
-            reason=first.reason,
-            body_wrench=stream.first.tolist(),
-            utilisation=first.utilisation,
-            gap=first.gap,
-            hands=[
-                HandColumns(limb=limb, columns=list(columns))
-                for limb, columns in zip(stream.limbs, stream.columns, strict=True)
-            ],
-            took=time.perf_counter() - start,
-        )
+        return reply
+
+    def __len__(self) -> int:
+        return len(self._kept)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Answer a question for set-points.
@@ -131,6 +119,30 @@ class Streams:
             gone, self._kept = self._kept, OrderedDict()
         for stream in gone.values():
             stream.close()
+
+
+def _declared(identifier: str, stream: WrenchStream, name: str | None, start: float) -> StreamReply:
+    """Return a stream as it travels; ``name`` is the request's, others as of `set_points_reply`."""
+    # with fewer plans, later set-points would not be the same
+    deadline.check(FIRST)
+    first = stream.set_points(stream.first)
+    deadline.check(FIRST)
+    return StreamReply(
+        id=name,
+        poses=placed_poses(stream.question.stance),
+        stream=identifier,
+        radius=stream.interpolates,
+        status=first.status,
+        reason=first.reason,
+        body_wrench=stream.first.tolist(),
+        utilisation=first.utilisation,
+        gap=first.gap,
+        hands=[
+            HandColumns(limb=limb, columns=list(columns))
+            for limb, columns in zip(stream.limbs, stream.columns, strict=True)
+        ],
+        took=time.perf_counter() - start,
+    )
 
 
 def set_points_reply(
