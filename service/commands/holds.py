@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from service.commands.options import hand_option, json_option, plot_option
+from service.commands.options import FiniteRange, hand_option, json_option, plot_option
 from service.commands.terminal import progress, say, writing
 from service.tables import console, table_of
 
@@ -81,7 +81,7 @@ def _writing(path: Path) -> Iterator[None]:
 @click.option(
     "--outer-rotation",
     "rotations",
-    type=click.FloatRange(0.0, math.pi + 1e-6),
+    type=FiniteRange(0.0, math.pi + 1e-6),
     multiple=True,
     default=(0.0, math.pi),
     show_default="0 and π",

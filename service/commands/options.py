@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
 
 __all__ = [
+    "FiniteRange",
     "asked",
     "check_picture",
     "folder_option",
@@ -36,6 +38,22 @@ PICTURES: Final = (".png", ".pdf", ".svg")
 HAND_FILE: Final = ".toml"
 EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
+
+LONGEST: Final = 1e6
+"""Of what may be waited for [s]; the longest deadline of a request."""
+
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers, of which nan is none."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number, or refuse it."""
+        number = float(super().convert(value, param, ctx))
+        if math.isnan(number):
+            self.fail(f"{number} is not in the range {self._describe_range()}.", param, ctx)
+        return number
 
 
 def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
@@ -129,7 +147,11 @@ robot_option = click.option(
     help="TOML that describes a robot of your own, and names its URDF.",
 )
 timeout_option = click.option(
-    "--timeout", type=click.FloatRange(min=0.01), default=TIMEOUT, show_default=True, help="[s]"
+    "--timeout",
+    type=FiniteRange(0.01, LONGEST),
+    default=TIMEOUT,
+    show_default=True,
+    help="[s]",
 )
 
 

@@ -14,7 +14,7 @@ import msgspec
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterTable
-from service.commands.options import asked, hand_option, json_option, robot_option
+from service.commands.options import FiniteRange, asked, hand_option, json_option, robot_option
 from service.commands.stances import read_request
 from service.commands.terminal import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
 from service.replies import ErrorDetail, ErrorReply, SetPointsReply
@@ -41,7 +41,7 @@ HANDS_A_LINE: Final = 4
 @click.argument("stance")
 @click.option(
     "--radius",
-    type=click.FloatRange(min=0.0, min_open=True, max=1e4),
+    type=FiniteRange(min=0.0, min_open=True, max=1e4),
     default=30.0,
     show_default=True,
     help="Of interpolations along a force; along a moment a tenth of it, per metre [N].",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import sys
 from collections.abc import Callable, Sequence
@@ -38,6 +39,12 @@ ROUTER_PORT: Final = 7447
 
 PORTS: Final = {"tcp": socket.SOCK_STREAM, "tls": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
 """Protocols with ports, and how one is probed."""
+
+EXAMPLE: Final = "tcp/127.0.0.1:7447"
+"""Of an endpoint."""
+
+SHOWN: Final = 60
+"""Characters of what was given that are repeated."""
 
 STANDARD_OUTPUT: Final = 1
 STANDARD_ERROR: Final = 2
@@ -77,16 +84,22 @@ def zenoh_config(
     _insert(config, "transport/shared_memory/enabled", "false", "shared_memory")
     if mode is not None:
         _insert(config, "mode", _json(mode), "--mode")
-    if connect:
-        _insert(config, "connect/endpoints", _json(list(connect)), "--connect")
-    if listen:
-        _insert(config, "listen/endpoints", _json(list(listen)), "--listen")
+    for endpoints, key, flag in (
+        (connect, "connect/endpoints", "--connect"),
+        (listen, "listen/endpoints", "--listen"),
+    ):
+        if endpoints:
+            for endpoint in endpoints:
+                _must_be_endpoint(endpoint, flag)
+            _insert(config, key, _json(list(endpoints)), flag)
     if not multicast:
         _insert(config, "scouting/multicast/enabled", "false", "--no-multicast-scouting")
     for setting in settings:
         key, colon, value = setting.partition(":")
         if not colon:
-            raise InvalidInputError(f"KEY:VALUE is needed, got {setting!r}", field="--cfg")
+            raise InvalidInputError(
+                f"KEY:VALUE is needed, such as mode:'client', got {setting!r}", field="--cfg"
+            )
         _insert(config, key, value, "--cfg")
     return config
 
@@ -172,22 +185,49 @@ def start_zenoh_log() -> None:
 
 
 def _read(file: Path | None) -> zenoh.Config:
+    source, field = str(file), "--config"
+    if file is None:
+        source, field = os.environ.get("ZENOH_CONFIG", ""), "ZENOH_CONFIG"
+        if not source:
+            return zenoh.Config()
     try:
-        if file is not None:
-            return zenoh.Config.from_file(file)
-        if "ZENOH_CONFIG" in os.environ:
-            return zenoh.Config.from_env()
+        # what zenoh says of a file does not tell whether it is there
+        Path(source).open("rb").close()
+        return zenoh.Config.from_file(source)
+    except OSError as error:
+        raise InvalidInputError(f"{source}: {error.strerror}", field=field) from None
     except zenoh.ZError as error:
-        field = "--config" if file is not None else "ZENOH_CONFIG"
-        raise InvalidInputError(_first_line(error), field=field) from None
-    return zenoh.Config()
+        raise InvalidInputError(f"{source}: {_complaint(error)}", field=field) from None
 
 
 def _insert(config: zenoh.Config, key: str, value: str, flag: str) -> None:
     try:
         config.insert_json5(key, value)
     except zenoh.ZError as error:
-        raise InvalidInputError(f"{key}: {_first_line(error)}", field=flag) from None
+        raise InvalidInputError(
+            f"{key}: {_complaint(error)}; got {_shown(value)}", field=flag
+        ) from None
+
+
+def _must_be_endpoint(endpoint: str, flag: str) -> None:
+    """Refuse what zenoh cannot be connected to, nor listen on."""
+    problem: str | None = None
+    try:
+        zenoh.Config().insert_json5("connect/endpoints", _json([endpoint]))
+    except zenoh.ZError:
+        problem = "no protocol/address"
+    protocol, _, address = endpoint.partition("/")
+    port = address.partition("?")[0].partition("#")[0].rpartition(":")[2]
+    if protocol in ("tcp", "udp", "tls", "quic") and problem is None:
+        if ":" not in address:
+            problem = "no port"
+        elif not (port.isascii() and port.isdigit() and int(port) < 2**16):
+            problem = f"{port!r} is no port"
+    if problem is not None:
+        raise InvalidInputError(
+            f"{_shown(endpoint)} is no endpoint ({problem}); valid is such as {EXAMPLE}",
+            field=flag,
+        )
 
 
 def _json(value: object) -> str:
@@ -197,6 +237,25 @@ def _json(value: object) -> str:
 def _first_line(error: Exception) -> str:
     """Return zenoh's complaint without where in its source it was made."""
     return str(error).partition(" at /")[0].partition("\n")[0].strip()
+
+
+def _complaint(error: Exception) -> str:
+    """Return what zenoh has against a part of a configuration, without how it is made."""
+    said = re.search(r'(?:msg: |Str\()"((?:[^"\\]|\\.)*)"', str(error))
+    words = str(error) if said is None else said[1].replace(r"\n", "\n")
+    words = words.partition(" at /")[0]
+    # a parser's drawing of the place, and what was expected there
+    where, equals, expected = words.partition("= expected ")
+    if equals:
+        place = where.partition("-->")[2].split()
+        line, _, column = place[0].partition(":")
+        return f"JSON5, line {line}, column {column}: expected {' '.join(expected.split())}"
+    return " ".join(words.split())
+
+
+def _shown(text: str) -> str:
+    """Return what was given, not too long."""
+    return repr(text) if len(text) <= SHOWN else f"{text[:SHOWN]!r}…"
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -428,13 +428,27 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
     assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
 
 
+VALID = "valid is such as tcp/127.0.0.1:7447"
+
+
 @pytest.mark.parametrize(
     ("flags", "line"),
     [
-        (["--cfg", "colour:1"], "crux: --cfg: colour: "),
-        (["-c", "/nowhere.json5"], "crux: --config: "),
+        (["--cfg", "colour:1"], "crux: --cfg: colour: unknown key; got '1'"),
+        (["--cfg", "mode:["], "crux: --cfg: mode: JSON5, line 1, column 2: expected array,"),
+        (["--cfg", "mode:5"], "crux: --cfg: mode: invalid type: integer `5`, expected either"),
+        (["--cfg", "mode"], "crux: --cfg: KEY:VALUE is needed, such as mode:'client', got 'mode'"),
+        (["-c", "/nowhere.json5"], "crux: --config: /nowhere.json5: No such file or directory"),
+        (["-c", "/"], "crux: --config: /: Is a directory"),
+        (["-l", "foo"], f"crux: --listen: 'foo' is no endpoint (no protocol/address); {VALID}"),
+        (["-e", "foo"], f"crux: --connect: 'foo' is no endpoint (no protocol/address); {VALID}"),
+        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is no endpoint (no port); {VALID}"),
+        (["-e", "tcp/[::1]:y"], "crux: --connect: 'tcp/[::1]:y' is no endpoint ('y' is no port); "),
         (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
-        (["--timeout", "0"], "crux: Invalid value for '--timeout'"),
+        *(
+            (["--timeout", value], f"crux: Invalid value for '--timeout': {value} is not in the")
+            for value in ("0.0", "-1.0", "nan", "inf")
+        ),
     ],
 )
 def test_bad_flags(
