@@ -9,16 +9,14 @@ the limb lifts (a stance without that hand); then it takes the new hold:
 from __future__ import annotations
 
 import math
-import multiprocessing
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final, Literal
 
 from hand_models.base import InvalidInputError, Pose
 from planner.prepare import settle_hand
+from planner.processes import Lost, Workers, cores
 from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.result import Plan
 from planner.robots import UnreachableError
@@ -216,7 +214,8 @@ def evaluate(
     ----------
     route : Route
     workers : int, optional
-        Processes; as many as there are cores where the route is long enough to be worth it.
+        Processes, this one among them; as many as there are cores where the route is long enough
+        to be worth it.
     progress : callable, optional
         Called with (stages done, stages in all).
 
@@ -227,7 +226,7 @@ def evaluate(
     """
     todo = tuple(stages(route))
     if workers is None:
-        workers = (os.cpu_count() or 1) if len(todo) >= WORTH_A_PROCESS else 1
+        workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
 
     def done(stage: RouteStage, answer: Plan | OutOfReach) -> None:
@@ -235,46 +234,32 @@ def evaluate(
         if progress is not None:
             progress(len(plans), len(todo))
 
-    if workers > 1:
-        _in_processes(todo, workers, done)
+    others = min(workers, len(todo)) - 1
+    if others > 0:
+        with Workers(partial(_planning, todo), others) as processes:
+            for i, answer in processes.each(range(len(todo)), _planning(todo)):
+                if isinstance(answer, InvalidInputError):
+                    raise answer
+                # a stage that has cost a process is planned here
+                done(todo[i], _plan_stage(todo[i]) if isinstance(answer, Lost) else answer)
     for stage in todo:
         if stage.index not in plans:
             done(stage, _plan_stage(stage))
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 
-def _in_processes(
-    todo: Sequence[RouteStage], workers: int, done: Callable[[RouteStage, Plan | OutOfReach], None]
-) -> None:
-    """Plan stages in processes; those of a process that dies are left to the caller."""
-    context = multiprocessing.get_context("spawn")
-    # sent to each process once, so that there, too, hands share their rock
-    with ProcessPoolExecutor(
-        min(workers, len(todo)), mp_context=context, initializer=_begin, initargs=(todo,)
-    ) as pool:
-        futures: dict[Future[Plan | OutOfReach], RouteStage] = {}
+def _planning(
+    todo: Sequence[RouteStage],
+) -> Callable[[int], Plan | OutOfReach | InvalidInputError]:
+    """Return what plans a stage, in each process."""
+
+    def answer(index: int) -> Plan | OutOfReach | InvalidInputError:
         try:
-            for stage in todo:
-                futures[pool.submit(_plan_known, stage.index)] = stage
-            for future in as_completed(futures):
-                done(futures[future], future.result())
-        except BrokenProcessPool:
-            return
-        except InvalidInputError:
-            pool.shutdown(cancel_futures=True)
-            raise
+            return _plan_stage(todo[index])
+        except InvalidInputError as error:
+            return error
 
-
-_todo: list[RouteStage] = []
-"""What a process may be asked to plan."""
-
-
-def _begin(todo: Sequence[RouteStage]) -> None:
-    _todo[:] = todo
-
-
-def _plan_known(index: int) -> Plan | OutOfReach:
-    return _plan_stage(_todo[index])
+    return answer
 
 
 def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:

@@ -56,14 +56,9 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
     from service.answering import Robots
 
-__all__ = ["crux", "main", "run"]
+__all__ = ["crux", "run"]
 
 NAME: Final = "crux"
-
-
-def main() -> None:
-    """Run the command line of this process, and exit."""
-    sys.exit(run())
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -256,4 +251,6 @@ for command in (batch, stream, rock, holds, wrench_space, body_space, serve, que
 
 
 if __name__ == "__main__":
+    from service.commands import main
+
     main()

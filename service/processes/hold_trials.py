@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from service.processes.workers import Lost, Workers, cores
+from planner.processes import Lost, Workers, cores
 
 if TYPE_CHECKING:
     from hand_models.fixed_wrist import FoundHold, Trial

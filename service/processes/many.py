@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
-from service.processes.workers import Lost, Workers, cores
+from planner.processes import Lost, Workers, cores
 from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import PLAN, Format, LostError, MalformedError, encode_error, identifier

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
+from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Final, Generic, TypeVar
 
-from service.processes.workers import one_thread
+from hand_models.base import begin_child, starting_children
+from planner.processes import one_thread
 
 __all__ = ["Lane", "Make", "Station", "resident"]
 
@@ -102,7 +101,7 @@ class Station(Generic[T, R]):
         pipes = [context.Pipe() for _ in range(lanes)]
         others = [other for _, other in pipes]
         self.process = context.Process(target=_answer_each, args=(others, memory), daemon=True)
-        with one_thread(), _unsignalled():
+        with one_thread(), starting_children():
             self.process.start()
         for other in others:
             # the process has the other ends alone, so that its death ends the pipes
@@ -147,33 +146,10 @@ def resident(pid: int | None) -> int | None:
         return None
 
 
-@contextmanager
-def _unsignalled() -> Iterator[None]:
-    """Let processes that are started here never see what ends the service: it is to tell them.
-
-    A terminal, or who runs the service, sends it to all of them, and while they start nothing else
-    could keep it from them.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    # which the first process starts as well, and lets the signals in again
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _answer_each(pipes: list[Connection], memory: int | None) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
-    # these are the service's to answer; with it, its processes end
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    threading.Thread(
-        target=_end_with, args=(multiprocessing.parent_process(),), daemon=True
-    ).start()
+    # what ends the service is for it to answer
+    begin_child(stays=True)
     sys.setswitchinterval(SWITCH)
     make = pipes[0].recv()
     answer = make()
@@ -197,12 +173,6 @@ def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
                 # nothing here can be trusted to go on
                 os._exit(OUT_OF_MEMORY)
             del question, result
-
-
-def _end_with(parent: Any) -> None:
-    """End this process when its parent ends, whatever it does."""
-    parent.join()
-    os._exit(1)
 
 
 def _keep_to(memory: int | None) -> None:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from planner.processes import cores
 from service.processes import Planners
-from service.processes.workers import cores
 from tests.benchmarks.measured_stances import request
 
 MANY = 200

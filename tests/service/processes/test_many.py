@@ -18,11 +18,11 @@ import trimesh
 
 from hand_models.base import InvalidInputError
 from hand_models.rock import read_mesh
+from planner.processes import Lost, Workers, cores
 from service.answering import dispatch, mesh_files
 from service.commands.cli import run
 from service.processes import Planners, plan_many, worth
 from service.processes.many import WORTH_A_PROCESS
-from service.processes.workers import Lost, Workers, cores
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import decode_request, schema
@@ -211,7 +211,7 @@ with Planners(2) as planners:
 """
     found = script(tmp_path, body)
     assert (found.returncode, found.stdout) == (0, "optimal\n")
-    assert found.stderr.count("a program that starts them needs its 'if __name__") == 1
+    assert found.stderr.count("a program that starts processes needs its 'if __name__") == 1
 
 
 # The command --------------------------------------------------------------------------------------

@@ -30,6 +30,16 @@ def nothing() -> Callable[[int], int]:
     raise AssertionError
 
 
+def fails() -> Callable[[int], int]:
+    """Cannot be made ready."""
+    raise ValueError("spoilt")
+
+
+def exits(_: object) -> None:
+    """Ends as a program does that starts processes while it is imported by one."""
+    raise SystemExit(1)
+
+
 def naps() -> Callable[[float], int]:
     """Sleeps as long as it is told [s], and says in which process."""
 

@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from service.processes.workers import NO_START, THREADS, Lost, Workers
+from planner.processes.workers import NO_GUARD, THREADS, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
+
+KILLED = "processes do not start: a worker was killed by signal 9"
 
 
 def logged(log: Path) -> Counter[int]:
@@ -53,7 +55,7 @@ def test_what_kills_its_process_is_tried_twice_and_costs_nothing_else(tmp_path):
         again = done(workers, [2, 3])
     lost = {i for i, result in found.items() if isinstance(result, Lost)}
     assert lost == {13}
-    assert found[13].reason == "its process died, twice"
+    assert found[13].reason == "its process died, twice; a worker was killed by signal 9"
     assert all(found[i] == i * i for i in found if i not in lost)
     # what dies once by chance is done again
     assert (logged(log)[13], logged(log)[7]) == (2, 2)
@@ -100,7 +102,23 @@ def test_who_stops_listening_leaves_no_work_behind(nappers):
 def test_where_no_process_starts_everything_is_lost_and_nothing_hangs():
     with Workers(workshop.nothing, 2) as workers:
         found = done(workers, list(range(20)))
-    assert {result.reason for result in found.values()} == {NO_START}
+    assert {result.reason for result in found.values()} == {KILLED}
+
+
+def test_the_guard_of_a_program_is_named_only_where_that_may_be_it(monkeypatch, caplog):
+    """A process that cannot be made ready is not one whose program has no guard."""
+    with Workers(workshop.fails, 2) as workers:
+        found = done(workers, [1, 2])
+    reason = "processes do not start: a worker ended with status 70"
+    assert {result.reason for result in found.values()} == {reason}
+    assert caplog.messages == [reason]
+    caplog.clear()
+    monkeypatch.setattr("planner.processes.workers._work", workshop.exits)
+    with Workers(workshop.naps, 2) as workers:
+        found = done(workers, [1, 2])
+    reason = f"processes do not start: a worker ended with status 1{NO_GUARD}"
+    assert {result.reason for result in found.values()} == {reason}
+    assert caplog.messages == [reason]
 
 
 def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monkeypatch):
@@ -114,11 +132,11 @@ def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monk
     monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", killed)
     with Workers(partial(workshop.squares, "x" * 5_000_000), 2) as workers:
         found = done(workers, [1, 2, 3])
-    assert {result.reason for result in found.values()} == {NO_START}
+    assert {result.reason for result in found.values()} == {KILLED}
 
 
 def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
-    monkeypatch.setattr("service.processes.workers.PATIENCE", 1e5)
+    monkeypatch.setattr("planner.processes.workers.PATIENCE", 1e5)
     with Workers(workshop.sleepers, 2) as workers:
         # well before any is ready
         found = dict(workers.each(list(range(5)), lambda item: -item))

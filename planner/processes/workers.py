@@ -10,9 +10,10 @@ import logging
 import math
 import multiprocessing
 import os
-import signal
+import sys
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -20,6 +21,8 @@ from multiprocessing.connection import Connection, wait
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
+
+from hand_models.base import begin_child, starting_children
 
 __all__ = ["Lost", "Worker", "Workers", "cores", "one_thread"]
 
@@ -44,9 +47,15 @@ PATIENCE: Final = 1.0
 STARTS: Final = 2
 """Processes in a row that may die before they are ready; after that no more are started."""
 
-NO_START: Final = (
-    "processes do not start; a program that starts them needs its 'if __name__ == \"__main__\":'"
+NO_GUARD: Final = (
+    " while it started; a program that starts processes needs its 'if __name__ == \"__main__\":'"
 )
+
+UNCAUGHT: Final = 1
+"""Status of a process whose program ends with an error."""
+
+UNREADY: Final = 70
+"""Status of a process that cannot be made ready for its work."""
 
 THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What keeps a library of linear algebra to one thread, before it is loaded."""
@@ -95,6 +104,8 @@ class Workers(Generic[T, R]):
         self._count = max(1, count)
         self.running: list[Worker[T, R]] = []
         self.stillborn = 0
+        self._unborn = ""
+        """Why."""
 
     def __enter__(self) -> Self:
         self._hire()
@@ -108,7 +119,7 @@ class Workers(Generic[T, R]):
     ) -> None:
         for worker in self.running:
             worker.pipe.close()
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + (PATIENCE if error is None else 0.0)
         for worker in self.running:
             worker.end(until)
         self.running.clear()
@@ -117,7 +128,7 @@ class Workers(Generic[T, R]):
         """Wait until all processes that have been started are ready, or have died."""
         for worker in [worker for worker in self.running if not worker.ready]:
             if worker.take() is None:
-                self._dismiss(worker)
+                self._bury(worker)
             else:
                 self.stillborn = 0
 
@@ -141,7 +152,7 @@ class Workers(Generic[T, R]):
                 self._hire()
                 if not self.running and (here is None or not todo):
                     for i in (*todo, *again):
-                        yield i, Lost(NO_START)
+                        yield i, Lost(self._unborn)
                     return
                 for worker in self.running:
                     if worker.idle and again and not todo:
@@ -165,10 +176,10 @@ class Workers(Generic[T, R]):
                         self.stillborn = 0
                         yield from done
                         continue
-                    self._dismiss(worker)
+                    how = self._bury(worker)
                     for i in sorted(worker.hand):
                         if i in tried:
-                            yield i, Lost("its process died, twice")
+                            yield i, Lost(f"its process died, twice; {how}")
                         else:
                             tried.add(i)
                             again.append(i)
@@ -181,14 +192,35 @@ class Workers(Generic[T, R]):
         while len(self.running) < self._count and self.stillborn < STARTS:
             self.running.append(Worker(self._make))
 
+    def _bury(self, worker: Worker[T, R]) -> str:
+        """Dismiss a process that has died, and return how it did."""
+        worker.process.join(PATIENCE)
+        status = worker.process.exitcode
+        how = _ending(status)
+        if not worker.ready:
+            self.stillborn += 1
+            # nothing of this house is at work before a process is, but the program's own beginning
+            hint = NO_GUARD if status == UNCAUGHT else ""
+            self._unborn = f"processes do not start: {how}{hint}"
+            if self.stillborn == STARTS:
+                log.warning(self._unborn)
+        self._dismiss(worker)
+        return how
+
     def _dismiss(self, worker: Worker[T, R]) -> None:
         self.running.remove(worker)
-        self.stillborn += not worker.ready
-        if self.stillborn == STARTS and not worker.ready:
-            log.warning(NO_START)
         worker.pipe.close()
         worker.process.kill()
         worker.process.join()
+
+
+def _ending(status: int | None) -> str:
+    """Return in words how a process ended."""
+    if status is None:
+        return "a worker did not answer"
+    if status < 0:
+        return f"a worker was killed by signal {-status}"
+    return f"a worker ended with status {status}"
 
 
 class Worker(Generic[T, R]):
@@ -214,7 +246,7 @@ class Worker(Generic[T, R]):
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
         self.process = context.Process(target=_work, args=(other,), daemon=True)
-        with one_thread():
+        with one_thread(), starting_children():
             self.process.start()
         # the process has the other end alone, so that its death ends the pipe
         other.close()
@@ -264,13 +296,16 @@ class Worker(Generic[T, R]):
 
 def _work(pipe: Connection) -> None:
     """Do chunks of work until nobody sends any more; what a process of `Workers` runs."""
-    # Ctrl-C is the caller's to answer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    begin_child()
     try:
         make: Callable[[], Callable[[Any], Any]] = pipe.recv()
     except (EOFError, OSError):
         return
-    turn = make()
+    try:
+        turn = make()
+    except BaseException:
+        traceback.print_exc()
+        sys.exit(UNREADY)
     chunks: SimpleQueue[list[tuple[int, Any]] | None] = SimpleQueue()
     # who sends must not wait for the chunk before to be done, nor for its results to be taken
     threading.Thread(target=_receive, args=(pipe, chunks), daemon=True).start()

@@ -1,0 +1,102 @@
+"""What SIGINT and SIGTERM do to a command: it ends in one line, and its processes with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final
+
+__all__ = ["Interrupted", "interruptible"]
+
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+
+GRACE: Final = 5.0
+"""How long a command that is interrupted may take to keep what is done, and to end [s]."""
+
+STATUS: Final = 1
+"""Of a command that is interrupted."""
+
+IMPORTING: Final = "<frozen importlib._bootstrap>"
+"""Whose frames are below a module that is being imported."""
+
+SHOW_CURSOR: Final = "\x1b[?25h"
+
+
+class Interrupted(BaseException):
+    """SIGINT or SIGTERM has come; what is kept of the work, if that is to be told."""
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Answer signals while the work lasts; afterwards they end this process at once."""
+    for number in SIGNALS:
+        # one that is ignored is not for this process
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+    sys.unraisablehook = _unraisable
+    try:
+        yield
+    except Interrupted as error:
+        _tell(str(error))
+        sys.exit(STATUS)
+    finally:
+        for number in SIGNALS:
+            if signal.getsignal(number) == _interrupt:
+                signal.signal(number, _end)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Answer the first signal: let the command end by itself, but not for ever."""
+    for each in SIGNALS:
+        signal.signal(each, _end)
+    if _importing(frame):
+        # extension modules turn what is raised into errors of their own, or print it
+        _end()
+    timer = threading.Timer(GRACE, _end)
+    timer.daemon = True
+    timer.start()
+    raise Interrupted
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == IMPORTING:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _end(number: int = 0, frame: FrameType | None = None) -> None:
+    """End here and now, and all processes that were started."""
+    try:
+        # it may be half imported, and then there are none
+        children = getattr(sys.modules.get("multiprocessing"), "active_children", None)
+        for process in children() if children is not None else ():
+            process.kill()
+        if os.isatty(2):
+            os.write(2, SHOW_CURSOR.encode())
+        _tell("")
+    finally:
+        os._exit(STATUS)
+
+
+_told: list[str] = []
+
+
+def _tell(kept: str) -> None:
+    """Say once on standard error that the command was interrupted, and what is kept."""
+    if not _told:
+        _told.append(kept)
+        os.write(2, f"crux: {': '.join(filter(None, ('interrupted', kept)))}\n".encode())
+
+
+def _unraisable(what: sys.UnraisableHookArgs) -> None:
+    """End where an interruption would be swallowed."""
+    if issubclass(what.exc_type, Interrupted):
+        _end()
+    sys.__unraisablehook__(what)
