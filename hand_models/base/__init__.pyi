@@ -19,3 +19,4 @@ from .frames import (
     wrench_transports as wrench_transports,
 )
 from .progress import Progress as Progress
+from .whole_files import whole_file as whole_file

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+from hand_models.base import whole_file
+
 __all__ = ["Claim", "StudyResult", "save_picture"]
 
 
@@ -61,5 +63,6 @@ class StudyResult:
 
 def save_picture(figure: Figure, path: Path) -> Path:
     """Write a figure of a study as PNG."""
-    figure.savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
     return path

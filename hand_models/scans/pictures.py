@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, Indices, whole_file
 from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
@@ -56,7 +56,8 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
         )
     axes.legend(loc="upper right")
     figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
-    figure.savefig(path, dpi=150)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=150)
 
 
 def plot_holds(
@@ -95,7 +96,8 @@ def plot_holds(
         )
         axes.legend(loc="upper right")
     figure.colorbar(shown, ax=axes, shrink=0.7, label="largest pull-off of any hand there [N]")
-    figure.savefig(path, dpi=150)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=150)
 
 
 def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarMappable:

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from trimesh.exchange.ply import export_ply
 
-from hand_models.base import Array, Indices, Pose
+from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import FilledCells
 
 __all__ = ["Hole", "ScannedRock", "write_rock"]
@@ -84,4 +84,5 @@ class ScannedRock:
 
 def write_rock(rock: ScannedRock, path: Path) -> None:
     """Write rock as a PLY file, which a mesh hold may name."""
-    path.write_bytes(rock.ply())
+    with whole_file(path) as part:
+        part.write_bytes(rock.ply())

@@ -16,7 +16,7 @@ from typing import Any, Final, Protocol, cast
 
 import msgspec
 
-from hand_models.base import InvalidInputError, Progress
+from hand_models.base import InvalidInputError, Progress, whole_file
 from hand_models.experiments import StudyResult
 from hand_models.parameters import ParameterTable, hand_table
 
@@ -104,5 +104,6 @@ def run_study(
     result = replace(study.run(progress, hand), hand=msgspec.to_builtins(changed))
     file = folder / "result.json"
     text = json.dumps(as_json(result), indent=2, ensure_ascii=False, allow_nan=False)
-    file.write_text(text + "\n", encoding="utf-8")
+    with whole_file(file) as part:
+        part.write_text(text + "\n", encoding="utf-8")
     return result, [file, *study.plot(result, folder)]

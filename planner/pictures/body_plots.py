@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array
+from hand_models.base import Array, whole_file
 from planner.capability import COMPONENTS, BodySection, BodySpace, Polygon
 
 if TYPE_CHECKING:
@@ -95,7 +95,8 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     if not space.exact:
         about += "; floating hands' sets linearised where the plan puts their wrists"
     figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=11)
-    figure.savefig(path, dpi=120, facecolor="white")
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=120, facecolor="white")
 
 
 def _accelerations(space: BodySpace, view: _View) -> Polygon | None:

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from scipy.spatial import ConvexHull, QhullError
 
-from hand_models.base import Array
+from hand_models.base import Array, whole_file
 from hand_models.finger import PHALANGES, Contact, SettledFinger
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
@@ -115,7 +115,8 @@ def plot_wrench_space(
             rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
         for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
             _draw_projection(axes, vertices, i, j)
-    figure.savefig(path, dpi=110, facecolor="white")
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110, facecolor="white")
 
 
 def _listed(tensions: Array) -> str:

@@ -21,7 +21,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from hand_models.base import Array
+from hand_models.base import Array, whole_file
 from planner.pictures.plan_scene import Scene, ViewDirections, scene_of, view_directions
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
@@ -82,7 +82,8 @@ def plot_plan(plan: Plan, question: Question, path: Path) -> None:
     path : Path
         PNG, PDF or SVG.
     """
-    draw_plan(plan, question).savefig(path, dpi=130, facecolor="white")
+    with whole_file(path) as part:
+        draw_plan(plan, question).savefig(part, dpi=130, facecolor="white")
 
 
 def draw_plan(plan: Plan, question: Question) -> Figure:

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
+from hand_models.base import whole_file
 from planner.pictures.route_plots import plot_route
 from planner.result import LimitName, Plan
 from planner.route import OutOfReach, RouteResult, RouteStage
@@ -45,14 +46,18 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
         "picture": folder / "margin.png",
         "summary": folder / "summary.json",
     }
-    with files["table"].open("w", newline="", encoding="utf-8") as stream:
+    with (
+        whole_file(files["table"]) as part,
+        part.open("w", newline="", encoding="utf-8") as stream,
+    ):
         writer = csv.DictWriter(stream, COLUMNS)
         writer.writeheader()
         for stage, plan in zip(result.stages, result.plans, strict=True):
             writer.writerow(_row(stage, plan))
     plot_route(result, files["picture"])
     text = json.dumps(summary(result), indent=2, ensure_ascii=False)
-    files["summary"].write_text(text + "\n", encoding="utf-8")
+    with whole_file(files["summary"]) as part:
+        part.write_text(text + "\n", encoding="utf-8")
     return files
 
 

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from hand_models.base import whole_file
 from planner.route import RouteResult
 
 __all__ = ["draw_route", "plot_route"]
@@ -31,7 +32,8 @@ PHASE_COLOURS: Final = {
 
 def plot_route(result: RouteResult, path: Path) -> None:
     """Write the picture of a climb, as `draw_route` draws it."""
-    draw_route(result).savefig(path, dpi=130, bbox_inches="tight", facecolor="white")
+    with whole_file(path) as part:
+        draw_route(result).savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
 
 
 def draw_route(result: RouteResult) -> Figure:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import statistics
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
-from typing import IO, TYPE_CHECKING, Final
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Final, Self
 
 import click
 import msgspec
 
-from hand_models.base import InvalidInputError
+from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
+from service.commands.interruption import Interrupted
 from service.commands.options import hand_option, json_option, robot_option
 from service.commands.terminal import (
     BAD_INPUT,
@@ -26,11 +28,13 @@ from service.commands.terminal import (
     note,
     progress,
     say,
+    unwritten,
+    writing,
 )
 from service.processes import Answered, Planners, worth
 from service.replies import ErrorDetail, Time
 from service.tables import console, table_of
-from service.wire import REQUEST_KINDS
+from service.wire import REQUEST_KINDS, Format, identifier
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -44,6 +48,7 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 class _Told(msgspec.Struct):
     """What the summary needs to know of an answer."""
 
+    id: str | None = None
     status: str | None = None
     time: Time | None = None
     error: ErrorDetail | None = None
@@ -54,6 +59,57 @@ class _Told(msgspec.Struct):
         if self.error is not None:
             return BAD_INPUT if self.error.kind in REQUEST_KINDS else FAILED
         return EXIT_STATUS.get(str(self.status), FAILED)
+
+
+class _Replies:
+    """Where replies are written, one a line: a file, standard output, or nowhere.
+
+    A file has whole lines at any time but while one of them is being written.
+    """
+
+    def __init__(self, file: Path | None, as_json: bool, resume: bool) -> None:
+        self._file, self._mode = file, "ab" if resume else "wb"
+        self._out: IO[bytes] | None = None
+        if file is None and as_json:
+            self._out = sys.stdout.buffer
+
+    def __enter__(self) -> Self:
+        if self._file is not None:
+            try:
+                self._out = self._file.open(self._mode, buffering=0)
+            except OSError as error:
+                raise unwritten(error, self._file, "-o") from None
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._file is not None and self._out is not None:
+            self._out.close()
+
+    def write(self, payload: bytes) -> None:
+        """Write a reply."""
+        if self._out is None:
+            return
+        line = payload + b"\n"
+        if self._file is None:
+            self._out.write(line)
+            self._out.flush()
+            return
+        written = 0
+        try:
+            while written < len(line):
+                written += self._out.write(line[written:])
+        except BaseException as error:
+            # a line that is cut off would be read by nobody
+            with suppress(OSError):
+                self._out.truncate(self._file.stat().st_size - written)
+            if isinstance(error, OSError):
+                raise unwritten(error, self._file, "-o") from None
+            raise
 
 
 @click.command()
@@ -67,6 +123,11 @@ class _Told(msgspec.Struct):
     help="Where the replies go, one a line.",
 )
 @click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
+)
+@click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
 @hand_option
@@ -75,6 +136,7 @@ class _Told(msgspec.Struct):
 def batch(
     requests: str,
     file: Path | None,
+    resume: bool,
     workers: int | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
@@ -91,24 +153,35 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
+    if resume and file is None:
+        raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
     numbers, lines = _lines(requests)
     folder = Path() if requests == "-" else Path(requests).parent
-    told: list[_Told] = []
-    begun = perf_counter()
-    with (
-        _written(file, as_json) as out,
-        Planners(worth(len(lines), workers), robot=robot, hand=hand, folder=folder) as many,
-        progress(f"planning {requests}") as tell,
-    ):
-        for answer in _in_order(many.answers(lines)):
-            if out is not None:
-                out.write(answer.payload + b"\n")
-            told.append(msgspec.json.decode(answer.payload, type=_Told))
-            tell(len(told), len(lines))
+    told = _answered(file, lines) if resume and file is not None else []
+    before, begun = len(told), perf_counter()
+    try:
+        with (
+            _Replies(file, as_json, resume) as out,
+            Planners(
+                worth(len(lines) - before, workers), robot=robot, hand=hand, folder=folder
+            ) as many,
+            progress(f"planning {requests}") as tell,
+        ):
+            tell(before, len(lines))
+            for answer in _in_order(many.answers(lines[before:])):
+                out.write(answer.payload)
+                told.append(msgspec.json.decode(answer.payload, type=_Told))
+                tell(len(told), len(lines))
+    except Interrupted:
+        raise Interrupted(_kept(told, lines, file)) from None
+    except InvalidInputError:
+        raise
+    except CruxError as error:
+        raise CruxError(f"{error.message}; {_kept(told, lines, file)}") from None
     elapsed = perf_counter() - begun
     _complain(numbers, told)
     if not as_json:
-        _print(told, elapsed, file)
+        _print(told, before, elapsed, file)
     elif file is not None:
         say(_summary(told, elapsed) | {"file": str(file)})
     return min((one.exit_status for one in told), key=WORST_FIRST.index, default=DONE)
@@ -124,17 +197,44 @@ def _lines(source: str) -> tuple[list[int], list[bytes]]:
     return [i for i, _ in kept], [line for _, line in kept]
 
 
-@contextlib.contextmanager
-def _written(file: Path | None, as_json: bool) -> Iterator[IO[bytes] | None]:
-    """Yield where replies are written: a file, standard output, or nowhere."""
-    if file is None:
-        yield sys.stdout.buffer if as_json else None
-        return
+def _answered(file: Path, lines: Sequence[bytes]) -> list[_Told]:
+    """Return what the whole lines of a file tell, and drop a last one that is cut off."""
     try:
-        with file.open("wb") as out:
-            yield out
+        data = file.read_bytes() if file.exists() else b""
     except OSError as error:
-        raise InvalidInputError(f"cannot write {file}: {error.strerror}", field="-o") from None
+        raise unwritten(error, file, "-o") from None
+    whole = data.rfind(b"\n") + 1
+    replies = data[:whole].split(b"\n")[:-1]
+    if len(replies) > len(lines):
+        raise InvalidInputError(
+            f"{file} has {len(replies)} replies, and there are {len(lines)} requests; "
+            "is it of another batch?",
+            field="--resume",
+        )
+    told = []
+    for number, (reply, line) in enumerate(zip(replies, lines, strict=False), start=1):
+        try:
+            one = msgspec.json.decode(reply, type=_Told)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise InvalidInputError(f"{file}, line {number}: no reply", field="--resume") from None
+        asked = identifier(line, Format.JSON)
+        if one.id != asked:
+            raise InvalidInputError(
+                f"{file}, line {number}: answers {one.id!r}, and the request is {asked!r}; "
+                "is it of another batch?",
+                field="--resume",
+            )
+        told.append(one)
+    if whole < len(data):
+        with writing(file, "-o"), file.open("r+b") as stream:
+            stream.truncate(whole)
+    return told
+
+
+def _kept(told: Sequence[_Told], lines: Sequence[bytes], file: Path | None) -> str:
+    """Say how much of a batch that is broken off is done."""
+    done = f"{len(told)} of {len(lines)} requests are answered"
+    return done if file is None else f"{done} in {file}; --resume goes on"
 
 
 def _in_order(answers: Iterator[tuple[int, Answered]]) -> Iterator[Answered]:
@@ -185,7 +285,7 @@ def _summary(told: Sequence[_Told], elapsed: float) -> dict[str, object]:
     }
 
 
-def _print(told: Sequence[_Told], elapsed: float, file: Path | None) -> None:
+def _print(told: Sequence[_Told], before: int, elapsed: float, file: Path | None) -> None:
     out = console()
     statuses, kinds = _counts(told)
     table = table_of("answer")
@@ -198,7 +298,9 @@ def _print(told: Sequence[_Told], elapsed: float, file: Path | None) -> None:
     for kind, count in sorted(kinds.items()):
         table.add_row(f"error: {kind}", str(count), "-", "-")
     out.print(table)
-    rate = len(told) / elapsed if elapsed > 0.0 else 0.0
-    out.print(f"{len(told)} requests in {elapsed:.1f} s, {rate:.0f} a second", markup=False)
+    done = len(told) - before
+    rate = done / elapsed if elapsed > 0.0 else 0.0
+    known = f", {before} were answered before" if before else ""
+    out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}", markup=False)
     if file is not None:
         out.print(f"replies: {file}", markup=False, soft_wrap=True)

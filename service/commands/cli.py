@@ -65,6 +65,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, and return its exit status."""
     try:
         status = crux.main(args=arguments, prog_name=NAME, standalone_mode=False)
+        sys.stdout.flush()
         return status if isinstance(status, int) else DONE
     except click.ClickException as error:
         return _complain(error.format_message().rstrip(".") + _hint(error), BAD_INPUT)
@@ -74,11 +75,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except click.Abort:
         return _complain("interrupted", FAILED)
     except BrokenPipeError:
-        # nobody reads any more; keep Python from saying so at its exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # nobody reads any more
+        _drop_output()
         return FAILED
     except OSError as error:
-        return _complain(str(error), FAILED)
+        if error.filename is not None:
+            return _complain(str(error), FAILED)
+        _drop_output()
+        return _complain(f"cannot write standard output: {error.strerror or error}", FAILED)
+
+
+def _drop_output() -> None:
+    """Keep Python from writing at its exit what cannot be written."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str, status: int) -> int:

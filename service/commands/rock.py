@@ -140,10 +140,8 @@ def rock(
     with progress(f"meshing {file.name}") as tell:
         scan = read_scan(file, **reading)
         made = mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)
-        try:
+        with writing(output, "--output"):
             write_rock(made, output)
-        except OSError as error:
-            raise InvalidInputError(f"{error.strerror}: {output}", field="--output") from None
         if picture is not None:
             with writing(picture):
                 plot_rock(made, picture, file.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import click
 import msgspec
 
-from hand_models.base import InvalidInputError
+from hand_models.base import CruxError, InvalidInputError
 from service.replies import BriefPlanReply, PlanReply
 from service.requests import PlanRequest
 from service.tables import console, print_plan
@@ -30,6 +31,7 @@ __all__ = [
     "progress",
     "say",
     "show",
+    "unwritten",
     "waiting",
     "writing",
 ]
@@ -41,6 +43,9 @@ OVERLOADED: Final = 3
 
 EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": OVERLOADED}
 """By a plan's status; any other is `FAILED`."""
+
+NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What is no fault of the file's name."""
 
 
 def note(message: str) -> None:
@@ -71,12 +76,14 @@ def draw_plan(answer: Planned, picture: Path) -> None:
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn what goes wrong in writing a picture into one line about the option."""
+def writing(path: Path, field: str = "--plot") -> Iterator[None]:
+    """Turn what goes wrong in writing a file into one line, about the option if that is wrong."""
     try:
         yield
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"cannot write {path}: {error}", field="--plot") from None
+    except OSError as error:
+        raise unwritten(error, path, field) from None
+    except ValueError as error:
+        raise InvalidInputError(f"cannot write {path}: {error}", field=field) from None
 
 
 @contextmanager
@@ -85,7 +92,15 @@ def filling_folder() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {error.filename}", field="DIR") from None
+        raise unwritten(error, error.filename, "DIR") from None
+
+
+def unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError:
+    """Return the error of a file that cannot be written: bad input, but where the disk is full."""
+    message = f"cannot write {path}: {error.strerror or error}"
+    if error.errno in NO_ROOM:
+        return CruxError(message)
+    return InvalidInputError(message, field=field)
 
 
 @contextmanager
