@@ -8,7 +8,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Pose
+from hand_models.base import (
+    Array,
+    EmptySetError,
+    InvalidInputError,
+    LimitError,
+    Pose,
+    Progress,
+)
 from hand_models.finger import NONE
 from hand_models.fixed_wrist.placing import UP, approach_frame
 from hand_models.fixed_wrist.seat_scatter import robustness
@@ -87,6 +94,8 @@ def grid_of_trials(
     approach: tuple[float, float, float] | None = None,
     *,
     radius: float,
+    most: int | None = None,
+    tell: Progress | None = None,
 ) -> list[Trial]:
     """Return places on a grid across z of a rock's frame.
 
@@ -103,11 +112,15 @@ def grid_of_trials(
         Of all hands; by default across the mean plane of the rock about the point.
     radius : float
         Half the side of the square about a point in which that is found [m].
+    most : int, optional
+        Places that there may be, before it is known which of them are on rock.
+    tell : callable, optional
+        Called with (points done, points in all).
 
     Raises
     ------
     InvalidInputError
-        If a number is impossible.
+        If a number is impossible; a `LimitError` if there would be more than ``most``.
     """
     if not 1e-3 <= spacing < math.inf:
         raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
@@ -118,13 +131,25 @@ def grid_of_trials(
     low, high = (end(rock.triangles.vertices, axis=0) for end in (np.min, np.max))
     above = float(low[2]) - spacing
     beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, RAYS)] * 2), axis=-1)
+    each_way = [math.floor((b - a) / spacing) + 1 for a, b in zip(low[:2], high[:2], strict=True)]
+    count = math.prod(each_way) * angles * len(rotations)
+    if most is not None and count > most:
+        raise LimitError(
+            f"{spacing:g} m makes up to {count:,} places to try (a grid of {each_way[0]:,} by "
+            f"{each_way[1]:,} points, {angles * len(rotations)} at each), and at most {most:,} "
+            "are tried; make it wider",
+            field="spacing",
+        )
     # in the middle of what is left over
     sides = [
-        a + 0.5 * ((b - a) % spacing) + spacing * np.arange(math.floor((b - a) / spacing) + 1)
-        for a, b in zip(low[:2], high[:2], strict=True)
+        a + 0.5 * ((b - a) % spacing) + spacing * np.arange(number)
+        for a, b, number in zip(low[:2], high[:2], each_way, strict=True)
     ]
     found: list[Trial] = []
-    for x, y in np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist():
+    points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
+    for number, (x, y) in enumerate(points):
+        if tell is not None:
+            tell(number, len(points))
         depth = rock.entry((x, y, above), INTO)
         if not math.isfinite(depth):
             continue

@@ -84,7 +84,8 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
         image = Image.open(path, formats=["TIFF"])
     except UnidentifiedImageError:
         raise InvalidInputError(
-            f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}",
+            f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}; 64-bit "
+            "floats are to be made 32-bit ones, as by gdal_translate -ot Float32",
             field="file",
         ) from None
     with image:

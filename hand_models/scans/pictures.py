@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +13,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Indices, whole_file
+from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
@@ -28,6 +29,9 @@ NAMED: Final = 12
 """Holes whose width is written beside them."""
 
 COLOURS: Final = "viridis"
+
+ARROW: Final = 0.06
+"""Length of a hand's arrow, as part of the rock's longer side."""
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
@@ -61,9 +65,15 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
 
 
 def plot_holds(
-    rock: Triangles, points: Array, values: Array, refused: Array, path: Path, title: str
+    rock: Triangles,
+    points: Array,
+    values: Array,
+    refused: Array,
+    best: Sequence[Pose],
+    path: Path,
+    title: str,
 ) -> None:
-    """Draw rock, and on it how much a hand holds at points.
+    """Draw rock, and on it how much a hand holds at points, and which way the best hands point.
 
     Parameters
     ----------
@@ -74,6 +84,8 @@ def plot_holds(
         [N]
     refused : ndarray, shape (m, 3)
         Points where no hand can be, or where it holds nothing [m].
+    best : sequence of Pose
+        H of the best hands in the rock's frame, the best first.
     path : Path
     title : str
     """
@@ -94,10 +106,36 @@ def plot_holds(
         axes.plot(
             refused[:, 1], refused[:, 0], "x", color="tab:cyan", markersize=5, label="no hold"
         )
-        axes.legend(loc="upper right")
+    _rank(axes, best, ARROW * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
+    if len(refused) or best:
+        figure.legend(loc="outside lower center", ncols=2)
     figure.colorbar(shown, ax=axes, shrink=0.7, label="largest pull-off of any hand there [N]")
     with whole_file(path) as part:
         figure.savefig(part, dpi=150)
+
+
+def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
+    """Draw which way the inner fingers of hands point, with the hands' ranks at the tips."""
+    for rank, pose in enumerate(best, start=1):
+        start, way = pose.position, length * pose.rotation[:, 0]
+        axes.annotate(
+            "",
+            (start[1] + way[1], start[0] + way[0]),
+            (start[1], start[0]),
+            arrowprops={"arrowstyle": "-|>", "color": "red", "shrinkA": 0.0, "shrinkB": 0.0},
+        )
+        axes.text(
+            start[1] + 1.35 * way[1],
+            start[0] + 1.35 * way[0],
+            str(rank),
+            color="white",
+            fontsize=8,
+            ha="center",
+            va="center",
+            bbox={"boxstyle": "circle,pad=0.15", "facecolor": "red", "edgecolor": "none"},
+        )
+    if best:
+        axes.plot([], [], color="red", label="the best, ranked: x of H, where inner fingers point")
 
 
 def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarMappable:

@@ -291,6 +291,13 @@ def blocking_sentence(names: Sequence[LimitName]) -> str:
     return ", ".join(told)
 
 
+def _farther(stretch: float) -> str:
+    """Say how many times as far something is, or how much farther where that is less than twice."""
+    if stretch >= 2.0:
+        return f"{stretch:.2g} times as far as"
+    return f"{max(100.0 * (stretch - 1.0), 0.1):.2g} % farther than"
+
+
 def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
     """Return what is odd about a stance that can be planned all the same."""
     found: list[str] = []
@@ -300,7 +307,7 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
     for h, (place, hand, stretch) in enumerate(zip(stance.hands, settled, stretches, strict=True)):
         if stretch > 1.0:
             found.append(
-                f"{place.limb}: out of reach, {stretch:.2g} times as far as its limb goes; "
+                f"{place.limb}: out of reach, {_farther(stretch)} its limb goes; "
                 "positions in metres, quaternions as [x, y, z, w]?"
             )
         most = hand.surface.strongest_tile

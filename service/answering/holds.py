@@ -43,6 +43,8 @@ def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
     """
     found: dict[str, SharedRock] = {}
     for name, each in message.rocks.items():
+        if not name:
+            raise InvalidInputError("a rock needs a name, got ''", field="rocks")
         try:
             if each.pose_in_hand is not None:
                 raise InvalidInputError(

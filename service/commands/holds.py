@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
@@ -14,15 +15,18 @@ import msgspec
 import numpy as np
 from rich.console import Console
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, whole_file
 from hand_models.parameters import ParameterTable
+from service.commands.interruption import Interrupted
 from service.commands.options import FiniteRange, hand_option, json_option, plot_option
 from service.commands.terminal import progress, say, writing
 from service.tables import console, table_of
 
 if TYPE_CHECKING:
     from hand_models.fixed_wrist import FoundHold, Trial
+    from service.processes import RockTrials
 
+    Outcome = FoundHold | InvalidInputError
     Pair = tuple[Trial, FoundHold]
 
 __all__ = ["holds"]
@@ -35,6 +39,12 @@ REASONS: Final = 3
 
 OUTPUT: Final = ".json"
 
+MOST: Final = 100_000
+"""Places that are tried: about four hours of one core, forty times that with the seat best."""
+
+UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
+"""Of the file."""
+
 
 def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     if path.suffix.lower() != OUTPUT:
@@ -42,15 +52,6 @@ def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     if not path.parent.is_dir():
         raise click.BadParameter(f"{path}: no such folder")
     return path
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """Turn what goes wrong in writing into one line about the option."""
-    try:
-        yield
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {path}", field="--output") from None
 
 
 @click.command()
@@ -62,7 +63,7 @@ def _writing(path: Path) -> Iterator[None]:
     required=True,
     callback=_check_output,
     metavar="JSON",
-    help="Where the holds go, the best first.",
+    help="Where the holds go, the best first, in metres and radians.",
 )
 @click.option(
     "--spacing",
@@ -132,43 +133,68 @@ def holds(
     from hand_models.parameters import hand_table, own_hand
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
-    from service.processes import RockTrials, try_everywhere
+    from service.processes import RockTrials
 
     Surface.named(surface)
     numbers = hand_table() if hand is None else own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
-    trials = grid_of_trials(mesh, spacing, angles, rotations, radius=radius)
+    with progress("laying the grid") as tell:
+        trials = grid_of_trials(
+            mesh, spacing, angles, rotations, radius=radius, most=MOST, tell=tell
+        )
     if not trials:
         raise InvalidInputError(
             "no point of the grid is on rock that faces −z of its frame; is it turned over, or "
             "smaller than the grid?",
             field="--spacing",
         )
-    part = output.with_name(output.name + ".part")
-    with _writing(output):
-        part.touch()
+    # before the work is done
+    with writing(output, "--output"):
+        TemporaryFile(dir=output.parent).close()
     how = RockTrials(mesh, surface, seat, hand=numbers)
-    with progress(f"trying {len(trials):,} places") as tell:
-        outcomes = try_everywhere(how, trials, tell, workers)
+    outcomes: dict[int, Outcome] = {}
+    scattered: dict[int, Outcome] = {}
+    best: list[Pair] = []
+    broken = False
+    try:
+        _try(f"trying {len(trials):,} places", how, trials, workers, outcomes)
+        best = _sorted(trials, outcomes)[:robust]
+        _try(
+            f"scattering the best {len(best)}",
+            how._replace(robust=True),
+            [trial for trial, _ in best],
+            workers,
+            scattered,
+        )
+    except Interrupted:
+        if not outcomes:
+            raise
+        broken = True
     found = _sorted(trials, outcomes)
-    best = [trial for trial, _ in found[:robust]]
-    if best:
-        with progress(f"scattering the best {len(best)}") as tell:
-            again = try_everywhere(how._replace(robust=True), best, tell, workers)
-        found[:robust] = _sorted(best, again)
-    refused = Counter(_reason(each) for each in outcomes if isinstance(each, InvalidInputError))
+    found[: len(best)] = _sorted(
+        [trial for trial, _ in best], dict(enumerate(each for _, each in best)) | scattered
+    )
+    refused = Counter(
+        _reason(each) for each in outcomes.values() if isinstance(each, InvalidInputError)
+    )
     result = {
         "v": 1,
         "rock": str(rock),
+        "units": UNITS,
         "trials": len(trials),
+        "tried": len(outcomes),
         "refused": refused.total(),
         "warnings": list(mesh.oddities),
         "holds": [_entry(trial, each) for trial, each in found],
     }
-    with _writing(output):
+    with writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
-        part.replace(output)
+    if broken:
+        raise Interrupted(
+            f"{len(outcomes):,} of {len(trials):,} places were tried, {len(scattered)} of the best "
+            f"scattered; what they hold is in {output}"
+        )
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:
@@ -177,11 +203,30 @@ def holds(
         _print(trials, found, refused, mesh.oddities, output, console())
 
 
-def _sorted(trials: list[Trial], outcomes: list[FoundHold | InvalidInputError]) -> list[Pair]:
+def _try(
+    title: str,
+    how: RockTrials,
+    trials: list[Trial],
+    workers: int | None,
+    outcomes: dict[int, Outcome],
+) -> None:
+    """Try places; what comes of each is kept at once, in case that the rest is broken off."""
+    from service.processes import try_everywhere
+
+    if not trials:
+        return
+    with progress(title) as tell, closing(try_everywhere(how, trials, workers)) as found:
+        tell(0, len(trials))
+        for i, each in found:
+            outcomes[i] = each
+            tell(len(outcomes), len(trials))
+
+
+def _sorted(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[Pair]:
     """Return the trials whose hands hold something, the largest pull-off first."""
     pairs = [
-        (trial, each)
-        for trial, each in zip(trials, outcomes, strict=True)
+        (trials[i], each)
+        for i, each in sorted(outcomes.items())
         if not isinstance(each, InvalidInputError) and math.isfinite(each.support[0])
     ]
     return sorted(pairs, key=lambda pair: -pair[1].support[0])
@@ -235,8 +280,11 @@ def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: s
         [point for point in dict.fromkeys(t.point for t in trials) if point not in most]
     )
     points, values = np.array(list(most)).reshape(-1, 3), np.array(list(most.values()))
+    best = [each.pose for _, each in found[:SHOWN]]
     with writing(path):
-        plot_holds(mesh.triangles, points, values, none.reshape(-1, 3), path, f"holds on {name}")
+        plot_holds(
+            mesh.triangles, points, values, none.reshape(-1, 3), best, path, f"holds on {name}"
+        )
 
 
 def _print(
@@ -276,4 +324,4 @@ def _print(
         out.print(f"warning: {words}", markup=False)
     for reason, count in refused.most_common(REASONS):
         out.print(f"{count:,} refused: {reason}", markup=False)
-    out.print(str(output), markup=False, soft_wrap=True)
+    out.print(f"{output} (in m, rad, N)", markup=False, soft_wrap=True)

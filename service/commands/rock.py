@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from click.core import ParameterSource
 from rich.console import Console
 
 from hand_models.base import InvalidInputError, Pose
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["rock"]
 
 OUTPUT: Final = ".ply"
+
+STEEP: Final = 0.9
+"""Vertical part of a view from which on the rock is ground, or a roof."""
 
 NAMED: Final = 5
 """Holes whose width is told."""
@@ -82,7 +86,7 @@ def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     type=click.Choice(list(UPS)),
     default="z",
     show_default=True,
-    help="The file's axis that points up.",
+    help="The file's axis that points up; of a wall that was seen along z another is to be given.",
 )
 @click.option(
     "--view",
@@ -145,10 +149,13 @@ def rock(
         if picture is not None:
             with writing(picture):
                 plot_rock(made, picture, file.name)
+    source = click.get_current_context().get_parameter_source("up")
+    assumed = source is not ParameterSource.COMMANDLINE
     if as_json:
-        say(_summary(made) | {"file": str(output)})
+        told = {"up": reading["up"], "up_assumed": assumed, "file": str(output)}
+        say(_summary(made) | told)
     else:
-        _print_rock(made, hole, output, console())
+        _print_rock(made, hole, reading["up"], assumed, output, console())
 
 
 def _summary(made: ScannedRock) -> dict[str, Any]:
@@ -172,7 +179,9 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
     }
 
 
-def _print_rock(made: ScannedRock, hole: float, output: Path, out: Console) -> None:
+def _print_rock(
+    made: ScannedRock, hole: float, up: str, assumed: bool, output: Path, out: Console
+) -> None:
     """Print how many points and triangles there are, how large the rock is, and what is open."""
     table = table_of("")
     table.show_header = False
@@ -183,12 +192,20 @@ def _print_rock(made: ScannedRock, hole: float, output: Path, out: Console) -> N
     table.add_row("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart")
     table.add_row("triangles", f"{len(made.faces):,}", "")
     table.add_row("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z")
+    ground = abs(float(made.pose.rotation[2, 2])) >= STEEP
+    table.add_row("up", up, "of the file's axes" + (", assumed" if assumed else ""))
     widths = ", ".join(f"{1e3 * found.width:.0f}" for found in made.holes[:NAMED])
     more = ", …" if len(made.holes) > NAMED else ""
     told = f"wider than {1e3 * hole:g} mm" + (f": {widths}{more} mm" if widths else "")
     table.add_row("holes", str(len(made.holes)), told)
     out.print(table)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
+    if assumed and ground:
+        out.print(
+            f"warning: with {up} up this is ground, or a roof; of a wall that was seen along {up}, "
+            "tell with --up which axis points up",
+            markup=False,
+        )
     for each in made.filled:
         out.print(
             f"warning: {each.cells:,} points are at exactly {each.value:g} m, with cliffs around "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
@@ -55,40 +55,31 @@ class RockTrials(NamedTuple):
 
 
 def try_everywhere(
-    how: RockTrials,
-    trials: Sequence[Trial],
-    tell: Callable[[int, int], None],
-    workers: int | None = None,
-) -> Found:
-    """Try all places, on all cores unless told otherwise.
+    how: RockTrials, trials: Sequence[Trial], workers: int | None = None
+) -> Generator[tuple[int, FoundHold | InvalidInputError], None, None]:
+    """Yield each place's index, and what a hand holds there, as they are done.
 
     Parameters
     ----------
     how : RockTrials
     trials : sequence of Trial
-    tell : callable
-        Called with (places done, places in all).
     workers : int, optional
-        Processes, this one among them.
+        Processes, this one among them; by default one a core.
 
-    Returns
-    -------
-    list of FoundHold or InvalidInputError
-        In order; an error in place of a hand that cannot be there, or whose process died.
+    Yields
+    ------
+    index : int
+    found : FoundHold or InvalidInputError
+        An error in place of a hand that cannot be there, or whose process died.
     """
     # one that is searched for, or scattered, is many already
     size = TOGETHER if how.seat == "rest" and not how.robust else 1
     chunks = [list(trials[i : i + size]) for i in range(0, len(trials), size)]
-    found: list[Found] = [[] for _ in chunks]
-    count, done = cores() if workers is None else workers, 0
-    tell(0, len(trials))
+    count = cores() if workers is None else workers
     here, processes = how.trying(), min(count, len(chunks)) - 1
     with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
         pairs = enumerate(map(here, chunks)) if others is None else others.each(chunks, here)
         for i, results in pairs:
             if isinstance(results, Lost):
                 results = [InvalidInputError(results.reason) for _ in chunks[i]]
-            found[i] = results
-            done += len(results)
-            tell(done, len(trials))
-    return [each for results in found for each in results]
+            yield from enumerate(results, start=size * i)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 import trimesh
 
+from service import processes
 from service.commands.cli import run
-from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
+from service.commands.interruption import Interrupted
+from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
+from tests.suite.helpers.processes import begun, ended, until, watched, workers
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.rocks import fractal_wall
 
@@ -35,7 +40,10 @@ def test_holds_are_written_sorted_told_and_drawn(
     assert picture.read_bytes().startswith(b"\x89PNG")
     told = json.loads(output.read_text(encoding="utf-8"))
     held = told["holds"]
-    assert told["trials"] == 16
+    assert (told["trials"], told["tried"]) == (16, 16)
+    assert told["units"] == {"length": "m", "angle": "rad", "force": "N"}
+    assert "x, y, z mm" in out
+    assert out.splitlines()[-1] == f"{output} (in m, rad, N)"
     assert len(held) + told["refused"] <= 16
     reaches = [hold["support"]["-fz"] for hold in held]
     assert reaches == sorted(reaches, reverse=True)
@@ -71,6 +79,41 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(
     assert list(reply["poses"]) == [hand["limb"]]
 
 
+def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
+    rock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = tmp_path / "holds.json"
+    real = processes.try_everywhere
+
+    def broken(how: object, trials: Sequence, workers: int | None) -> Iterator:
+        for done, each in enumerate(real(how, trials, 1)):
+            if done == 8:
+                raise Interrupted
+            yield each
+
+    monkeypatch.setattr(processes, "try_everywhere", broken)
+    with pytest.raises(Interrupted, match="8 of 16 places were tried, 0 of the best scattered; "):
+        run(["holds", str(rock), "-o", str(output), *COARSE])
+    told = json.loads(output.read_text(encoding="utf-8"))
+    assert (told["trials"], told["tried"]) == (16, 8)
+    reaches = [hold["support"]["-fz"] for hold in told["holds"]]
+    assert reaches
+    assert reaches == sorted(reaches, reverse=True)
+
+
+@watched
+def test_an_interruption_ends_the_search(rock: Path, tmp_path: Path) -> None:
+    output = tmp_path / "holds.json"
+    process = begun("holds", str(rock), "-o", str(output), "--workers", "2")
+    until(lambda: workers(process), process)
+    process.send_signal(signal.SIGTERM)
+    status, error = ended(process)
+    assert (status, error.count("\n")) == (FAILED, 1)
+    assert error.startswith("crux: interrupted")
+    assert output.exists() == ("places were tried" in error)
+    assert {path.name for path in tmp_path.iterdir()} <= {output.name}
+
+
 def test_what_cannot_be_is_told_in_a_line(
     rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -79,6 +122,12 @@ def test_what_cannot_be_is_told_in_a_line(
         ([str(tmp_path / "none.ply"), "-o", output], "no such file"),
         ([str(rock), "-o", output, "--surface", "cheese"], "cheese"),
         ([str(rock), "-o", output, "--spacing", "0"], "spacing"),
+        ([str(rock), "-o", output, "--spacing", "nan"], "spacing: must be at least 0.001 m"),
+        (
+            [str(rock), "-o", output, "--spacing", "0.001"],
+            "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each), and at most "
+            "100,000 are tried",
+        ),
         ([str(rock), "-o", str(tmp_path / "x" / "holds.json")], "no such folder"),
         ([str(rock), "-o", str(tmp_path / "holds.txt")], "must end in .json"),
     ):

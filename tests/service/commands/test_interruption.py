@@ -1,0 +1,173 @@
+"""Signals, kills and full disks: how commands end then, and what is left."""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+from pathlib import Path
+
+import pytest
+
+from hand_models.base import whole_file
+from service.commands.cli import run
+from service.commands.interruption import Interrupted
+from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint, result
+from tests.suite.helpers.processes import begun, ended, loaded, until, watched, workers
+from tests.suite.helpers.requests import HEAVY, wall_request
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+COUNT = 24
+
+
+@pytest.fixture
+def lines(tmp_path: Path) -> Path:
+    """Requests that take a while each."""
+    path = tmp_path / "requests.jsonl"
+    asked = [wall_request(HEAVY + i) | {"id": f"r{i}"} for i in range(COUNT)]
+    path.write_text("".join(json.dumps(each) + "\n" for each in asked), encoding="utf-8")
+    return path
+
+
+def count(path: Path) -> int:
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def told(path: Path) -> list[dict]:
+    """Replies without their times."""
+    replies = [json.loads(line) for line in path.read_bytes().splitlines()]
+    return [{key: reply[key] for key in reply if key != "time"} for reply in replies]
+
+
+@watched
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_route_ends_with_its_processes(number: int, tmp_path: Path) -> None:
+    process = begun("route", "six-moves", "-o", str(tmp_path), "--workers", "3")
+    until(lambda: workers(process), process)
+    process.send_signal(number)
+    assert ended(process) == (FAILED, "crux: interrupted\n")
+
+
+@watched
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_batch_keeps_what_is_answered(number: int, lines: Path, tmp_path: Path) -> None:
+    output = tmp_path / "replies.jsonl"
+    process = begun("batch", str(lines), "-o", str(output), "--workers", "2")
+    until(lambda: count(output) >= 2, process)
+    process.send_signal(number)
+    status, error = ended(process)
+    replies = told(output)
+    kept = f"{len(replies)} of {COUNT} requests are answered in {output}; --resume goes on"
+    assert (status, error) == (FAILED, f"crux: interrupted: {kept}\n")
+    assert [reply["id"] for reply in replies] == [f"r{i}" for i in range(len(replies))]
+
+
+@watched
+@pytest.mark.parametrize("library", ["_multiarray_umath", "clarabel", "_ckdtree"])
+def test_a_signal_while_modules_are_imported(library: str) -> None:
+    process = begun("plan", "wall", "--robust")
+    until(lambda: loaded(process, library), process)
+    process.send_signal(signal.SIGINT)
+    assert ended(process) == (FAILED, "crux: interrupted\n")
+
+
+@watched
+def test_processes_end_soon_after_the_command_is_killed(lines: Path, tmp_path: Path) -> None:
+    output = tmp_path / "replies.jsonl"
+    process = begun("batch", str(lines), "-o", str(output), "--workers", "2")
+    until(lambda: count(output) >= 1, process)
+    process.kill()
+    status, error = ended(process)
+    assert (status, error) == (-signal.SIGKILL, "")
+
+
+def test_a_batch_that_was_killed_goes_on_where_it_ended(
+    lines: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    output, whole = tmp_path / "replies.jsonl", tmp_path / "whole.jsonl"
+    process = begun("batch", str(lines), "-o", str(output), "--workers", "1")
+    until(lambda: count(output) >= 2, process)
+    process.kill()
+    process.communicate()
+    first = output.read_bytes()
+    before = first.count(b"\n")
+    assert 2 <= before < COUNT
+    # a line that is cut off is done again
+    output.write_bytes(first[: first.rfind(b"\n") + 1] + b'{"v":1,"id":"r')
+    more = ["--resume", "--json", "--workers", "1"]
+    assert run(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
+    assert result(capfd)["overloaded"] == COUNT
+    assert output.read_bytes().startswith(first[: first.rfind(b"\n") + 1])
+    assert run(["batch", str(lines), "-o", str(whole), "--json", "--workers", "1"]) == OVERLOADED
+    result(capfd)
+    assert told(output) == told(whole)
+    # there is nothing left to do
+    assert run(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
+    assert result(capfd)["overloaded"] == COUNT
+    assert told(output) == told(whole)
+
+
+def test_a_batch_does_not_go_on_with_the_replies_of_another(
+    lines: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "replies.jsonl"
+    for content, words in (
+        (b'{"v": 1, "id": "other"}\n{"v"', "answers 'other', and the request is 'r0'"),
+        (b"x\n", "line 1: no reply"),
+        (b"{}\n" * (COUNT + 1), f"has {COUNT + 1} replies, and there are {COUNT} requests"),
+    ):
+        output.write_bytes(content)
+        assert run(["batch", str(lines), "-o", str(output), "--resume"]) == BAD_INPUT
+        assert words in complaint(capfd)
+        assert output.read_bytes() == content
+    assert run(["batch", str(lines), "--resume"]) == BAD_INPUT
+    assert "needs the FILE of -o" in complaint(capfd)
+
+
+def limited(*arguments: str, size: int) -> tuple[int, str]:
+    """A command whose files cannot grow beyond a size."""
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))  # noqa: E731
+    process = begun(*arguments, preexec_fn=limit)
+    return ended(process)
+
+
+def test_a_full_disk_leaves_whole_lines_of_a_batch(lines: Path, tmp_path: Path) -> None:
+    output = tmp_path / "replies.jsonl"
+    status, error = limited("batch", str(lines), "-o", str(output), size=100_000)
+    kept = f"{len(told(output))} of {COUNT} requests are answered in {output}; --resume goes on"
+    assert (status, error) == (FAILED, f"crux: cannot write {output}: File too large; {kept}\n")
+
+
+def test_a_full_disk_leaves_no_half_file(tmp_path: Path) -> None:
+    picture = tmp_path / "plan.png"
+    status, error = limited("plan", "wall", "--plot", str(picture), size=10_000)
+    assert (status, error) == (FAILED, f"crux: cannot write {picture}: File too large\n")
+    status, error = limited("route", "six-moves", "-o", str(tmp_path), size=10_000)
+    picture = tmp_path / "margin.png"
+    assert (status, error) == (FAILED, f"crux: cannot write {picture}: File too large\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["stages.csv"]
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_standard_output_that_is_full(more: list[str]) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("needs /dev/full")
+    with full.open("wb") as out:
+        found = ended(begun("schema", *more, stdout=out))
+    assert found == (FAILED, "crux: cannot write standard output: No space left on device\n")
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path, link = tmp_path / "a.json", tmp_path / "link.json"
+    path.write_text("old", encoding="utf-8")
+    link.symlink_to(path)
+    with pytest.raises(Interrupted), whole_file(link) as part:
+        part.write_text("half", encoding="utf-8")
+        raise Interrupted
+    assert path.read_text(encoding="utf-8") == "old"
+    with whole_file(link) as part:
+        part.write_text("new", encoding="utf-8")
+    assert link.is_symlink()
+    assert path.read_text(encoding="utf-8") == "new"
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,0 +1,73 @@
+"""The ``crux`` command in a session of its own, to be watched and interrupted."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
+
+PROC = Path("/proc")
+
+watched = pytest.mark.skipif(not (PROC / "self/stat").exists(), reason="needs /proc")
+
+
+def begun(*arguments: str, **more: object) -> subprocess.Popen[bytes]:
+    """A command that has just been started."""
+    return subprocess.Popen(
+        [sys.executable, "-c", "from service.commands import main; main()", *arguments],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
+        start_new_session=True,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more,
+    )
+
+
+def until(true: Callable[[], object], process: subprocess.Popen[bytes]) -> None:
+    """Wait for something that comes before the process ends."""
+    end = time.monotonic() + PATIENCE
+    while not true():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def alive(session: int) -> list[str]:
+    """Command lines of the processes of a session that have not ended."""
+    found = []
+    for entry in PROC.glob("[0-9]*"):
+        try:
+            state, _, _, own = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
+            words = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+        except (OSError, ValueError):
+            continue
+        if int(own) == session and state != "Z":
+            found.append(words)
+    return found
+
+
+def workers(process: subprocess.Popen[bytes]) -> list[str]:
+    """Processes that work for a command."""
+    return [words for words in alive(process.pid) if "spawn_main" in words]
+
+
+def loaded(process: subprocess.Popen[bytes], library: str) -> bool:
+    """Whether a process has a library in its memory."""
+    return library in (PROC / str(process.pid) / "maps").read_text()
+
+
+def ended(process: subprocess.Popen[bytes]) -> tuple[int, str]:
+    """Its status, and what it says on standard error, once all its processes have ended."""
+    _, error = process.communicate(timeout=PATIENCE)
+    end = time.monotonic() + PATIENCE
+    while alive(process.pid):
+        assert time.monotonic() < end, alive(process.pid)
+        time.sleep(0.01)
+    return process.returncode, error.decode()
