@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 
 import numpy as np
@@ -241,3 +242,16 @@ def test_a_missing_package_is_named_with_what_installs_it(module, name, tmp_path
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(InvalidInputError, match=r"pip install 'crux\[scans\]'"):
         read_scan(tmp_path / name)
+
+
+def test_what_64_bit_floats_are_to_be_made_is_said(tmp_path):
+    """The smallest TIFF of them, which no version of pillow reads."""
+    heights = np.zeros((4, 4), dtype="<f8").tobytes()
+    tags = [(256, 3, 4), (257, 3, 4), (258, 3, 64), (259, 3, 1), (262, 3, 1), (273, 4, 8)]
+    tags += [(277, 3, 1), (278, 3, 4), (279, 4, len(heights)), (339, 3, 3)]
+    entries = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    head = b"II*\0" + struct.pack("<I", 8 + len(heights))
+    path = tmp_path / "wide.tif"
+    path.write_bytes(head + heights + struct.pack("<H", len(tags)) + entries + bytes(4))
+    with pytest.raises(InvalidInputError, match="gdal_translate -ot Float32"):
+        read_scan(path, cell=CELL)

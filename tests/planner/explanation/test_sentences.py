@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -128,8 +129,13 @@ def test_a_hand_out_of_reach_is_warned_of_and_one_within_is_not():
     far = replace(hand, pose=Pose(hand.pose.position + 2.0 * up, hand.pose.rotation))
     answer = plan(ask(replace(stance, hands=(far, *stance.hands[1:]))))
     assert len(answer.warnings) == 1
-    assert answer.warnings[0].startswith(f"{hand.limb}: out of reach")
+    told = re.match(f"{hand.limb}: out of reach, ([0-9.]+) times as far as", answer.warnings[0])
+    assert told is not None
+    assert float(told[1]) >= 2.0
     assert answer.warnings[0].endswith("; positions in metres, quaternions as [x, y, z, w]?")
+    near = replace(hand, pose=Pose(hand.pose.position + 0.8 * up, hand.pose.rotation))
+    (warning,) = plan(ask(replace(stance, hands=(near, *stance.hands[1:])))).warnings
+    assert re.match(f"{hand.limb}: out of reach, [0-9.]+ % farther than its limb goes;", warning)
 
 
 def test_no_tile_of_a_bundled_hand_is_inside_its_rock():

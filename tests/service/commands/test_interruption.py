@@ -162,9 +162,14 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path, link = tmp_path / "a.json", tmp_path / "link.json"
     path.write_text("old", encoding="utf-8")
     link.symlink_to(path)
-    with pytest.raises(Interrupted), whole_file(link) as part:
-        part.write_text("half", encoding="utf-8")
-        raise Interrupted
+
+    def interrupted() -> None:
+        with whole_file(link) as part:
+            part.write_text("half", encoding="utf-8")
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        interrupted()
     assert path.read_text(encoding="utf-8") == "old"
     with whole_file(link) as part:
         part.write_text("new", encoding="utf-8")

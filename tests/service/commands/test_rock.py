@@ -24,6 +24,27 @@ def scanned(folder: Path) -> str:
     return str(write_cloud(folder / "wall.xyz", 1e3 * points))
 
 
+def test_it_is_said_which_axis_was_taken_for_up(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A wall seen along z is ground unless it is told what is up."""
+    x, y, z = wall(0.01, 0.2, 0.0).T
+    cloud = str(write_cloud(tmp_path / "cloud.xyz", np.column_stack([x, z, y])))
+    output = ["-o", str(tmp_path / "rock.ply")]
+    assert run(["rock", cloud, *output]) == DONE
+    out = " ".join(capfd.readouterr().out.split())
+    assert "up z of the file's axes, assumed" in out
+    assert "warning: with z up this is ground, or a roof;" in out
+    assert run(["rock", cloud, *output, "--up", "y"]) == DONE
+    out = " ".join(capfd.readouterr().out.split())
+    assert "up y of the file's axes holes" in out
+    assert "ground" not in out
+    for more, up, assumed in (([], "z", True), (["--up", "z"], "z", False)):
+        assert run(["rock", cloud, *output, *more, "--json"]) == DONE
+        told = result(capfd)
+        assert (told["up"], told["up_assumed"]) == (up, assumed)
+
+
 def test_the_table_tells_what_was_read_and_what_is_open(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -150,6 +150,7 @@ ROCK = ("stance", "rocks", "wall")
             "stance.rocks.wall.pose.orientation",
             "norm",
         ),
+        ((*ROCK[:-1], ""), WALL, "stance.rocks", "a rock needs a name"),
         ((*ROCK, "file"), "wall.ply", "stance.rocks.wall.file", "only the command line"),
         ((*ROCK, "faces"), [[0, 1, 9999]], "stance.rocks.wall.faces[0]", "must name vertices"),
         (
