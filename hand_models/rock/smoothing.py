@@ -107,7 +107,11 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     ndarray, shape (m, 2), or None
         None if the polyline is debris.
     """
-    points = _corners(_distinct(points))
+    points = _distinct(points)
+    if len(points) < 2:
+        # a cut that only touches the rock
+        return None
+    points = _corners(points)
     lengths = np.hypot(*np.diff(points, axis=0).T)
     total = float(lengths.sum())
     if total < scale.bridged_gap:

@@ -33,6 +33,12 @@ COLOURS: Final = "viridis"
 ARROW: Final = 0.06
 """Length of a hand's arrow, as part of the rock's longer side."""
 
+BEYOND: Final = 1.35
+"""Where its rank is written, as part of the arrow."""
+
+NEAR: Final = 0.5
+"""Distance below which ranks are written together, as part of the arrow."""
+
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     """Draw rock as the scanner saw it, holes left white, and write the picture.
@@ -116,23 +122,31 @@ def plot_holds(
 
 def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
     """Draw which way the inner fingers of hands point, with the hands' ranks at the tips."""
+    labels: list[tuple[Array, list[str]]] = []
     for rank, pose in enumerate(best, start=1):
-        start, way = pose.position, length * pose.rotation[:, 0]
+        start, way = pose.position[[1, 0]], length * pose.rotation[[1, 0], 0]
         axes.annotate(
             "",
-            (start[1] + way[1], start[0] + way[0]),
-            (start[1], start[0]),
+            tuple(start + way),
+            tuple(start),
             arrowprops={"arrowstyle": "-|>", "color": "red", "shrinkA": 0.0, "shrinkB": 0.0},
         )
+        tip = start + BEYOND * way
+        near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < NEAR * length]
+        if near:
+            near[0].append(str(rank))
+        else:
+            labels.append((tip, [str(rank)]))
+    for (x, y), ranks in labels:
         axes.text(
-            start[1] + 1.35 * way[1],
-            start[0] + 1.35 * way[0],
-            str(rank),
+            x,
+            y,
+            ", ".join(ranks),
             color="white",
             fontsize=8,
             ha="center",
             va="center",
-            bbox={"boxstyle": "circle,pad=0.15", "facecolor": "red", "edgecolor": "none"},
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "red", "edgecolor": "none"},
         )
     if best:
         axes.plot([], [], color="red", label="the best, ranked: x of H, where inner fingers point")

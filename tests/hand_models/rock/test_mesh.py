@@ -434,3 +434,8 @@ def test_what_is_no_mesh_is_refused(tmp_path, name, content, words):
         read_mesh(path)
     assert caught.value.field == "file"
     assert any(each in caught.value.message for each in words.split("|"))
+
+
+def test_a_cut_that_only_touches_the_rock_is_no_rock():
+    assert smooth(np.full((3, 2), 0.01), Scale.of()) is None
+    assert smooth(np.array([[0.0, 0.0]]), Scale.of()) is None
