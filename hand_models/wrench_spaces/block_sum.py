@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices, UnsupportedError
+from hand_models.base import Array, Indices, LimitError
 from hand_models.wrench_spaces import zonotope
 from hand_models.wrench_spaces.half_spaces import Facets, affine_hull
 from hand_models.wrench_spaces.minkowski_sums import (
     Summand,
+    about_facets,
     extreme_points,
     sum_normals,
     sum_vertices,
@@ -22,10 +23,41 @@ from hand_models.wrench_spaces.minkowski_sums import (
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull_facets
 from hand_models.wrench_spaces.scaled_wrench import SCALE
 
-__all__ = ["BlockSum"]
+__all__ = ["Block", "BlockSum", "Sizes"]
 
 MOST_CANDIDATES: Final = 500_000
 """How many sums of the blocks' vertices are looked through; that many take some 20 s."""
+
+
+class Block(NamedTuple):
+    """The polytope of a few coupled columns.
+
+    Attributes
+    ----------
+    columns : ndarray of int, shape (d,)
+    vertices : ndarray, shape (n, d)
+    normals : ndarray, shape (k, d)
+        Of its facets, in more than two columns.
+    """
+
+    columns: Indices
+    vertices: Array
+    normals: Array
+
+
+class Sizes(NamedTuple):
+    """How many vertices and half-spaces are gone through for a set's, known beforehand.
+
+    Attributes
+    ----------
+    vertices : int
+        Candidates, of which some are vertices.
+    half_spaces : int
+        About so many half-spaces, or candidates for vertices where these are needed, too.
+    """
+
+    vertices: int
+    half_spaces: int
 
 
 class BlockSum:
@@ -37,20 +69,17 @@ class BlockSum:
         o [N, N·m].
     generators : ndarray, shape (6, m)
         V.
-    blocks : sequence of tuple
-        Columns of each block and the vertices of its polytope, (indices, (n, d)).
+    blocks : sequence of Block
     """
 
-    def __init__(
-        self, origin: Array, generators: Array, blocks: Sequence[tuple[Indices, Array]]
-    ) -> None:
+    def __init__(self, origin: Array, generators: Array, blocks: Sequence[Block]) -> None:
         self.origin, self.generators, self.blocks = origin, generators, blocks
 
     @cached_property
     def _summands(self) -> tuple[Summand, ...]:
         """The blocks' images that are more than a point, about `base`."""
         summands = []
-        for columns, vertices in self.blocks:
+        for columns, vertices, _ in self.blocks:
             image = (vertices @ self.generators[:, columns].T) * SCALE
             summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
@@ -70,6 +99,18 @@ class BlockSum:
         edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
         return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
 
+    @property
+    def sizes(self) -> Sizes:
+        """How many vertices and half-spaces are gone through for the sum's."""
+        parts, r = [s for s in self._summands if s.dimension], len(self.axes[1])
+        candidates = math.prod(len(part.points) for part in parts)
+        if self._whole is not None:
+            return Sizes(candidates, len(self._whole.normals))
+        if all(part.dimension <= 2 for part in parts):
+            return Sizes(candidates, about_facets(parts, r))
+        # as many as a hull of so many points can have
+        return Sizes(candidates, candidates ** (r // 2))
+
     @cached_property
     def _parts(self) -> list[Summand]:
         """The summands that are more than a point, about `base`, in the coordinates of `axes`."""
@@ -77,13 +118,24 @@ class BlockSum:
         summands = [s for s in self._summands if s.dimension]
         candidates = math.prod(len(s.points) for s in summands)
         if candidates > MOST_CANDIDATES:
-            raise UnsupportedError(
+            raise LimitError(
                 f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
                 "use fewer half_planes, or leave lateral out"
             )
         return [
             Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands
         ]
+
+    @property
+    def _whole(self) -> Block | None:
+        """The block of more than two columns of which the sum is the one to one image, if any."""
+        own = [
+            block
+            for block, summand in zip(self.blocks, self._summands, strict=True)
+            if summand.dimension
+        ]
+        alone = len(own) == 1 and 2 < len(own[0].columns) == len(self.axes[1])
+        return own[0] if alone else None
 
     @property
     def rounding(self) -> float:
@@ -94,7 +146,7 @@ class BlockSum:
     def extreme(self, slopes: Array) -> Array:
         """Return the loads y, shape (m,), with the largest slopes · y in the sum."""
         y = np.zeros(self.generators.shape[1])
-        for columns, vertices in self.blocks:
+        for columns, vertices, _ in self.blocks:
             y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
         return y
 
@@ -104,6 +156,13 @@ class BlockSum:
         parts, r = self._parts, len(self.axes[1])
         if r == 0:
             return Facets(np.zeros((0, 0)), np.zeros(0))
+        if self._whole is not None:
+            columns, _, normals = self._whole
+            directions, reach = self.axes
+            image = directions @ (self.generators[:, columns] * SCALE[:, None]) / reach[:, None]
+            normals = np.linalg.solve(image.T, normals.T).T
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            return Facets(normals, (normals @ parts[0].points.T).max(axis=1))
         if all(part.dimension == 1 for part in parts):
             return zonotope.facets(np.array([part.points[1] for part in parts]))
         if all(part.dimension <= 2 for part in parts):

@@ -8,6 +8,8 @@ are the facets. Other summands go through a hull of the sums of their vertices.
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -17,7 +19,14 @@ from hand_models.base import Array, Indices
 from hand_models.wrench_spaces.cross_products import Expansion, cross_products, expansion
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull
 
-__all__ = ["Summand", "extreme_points", "sum_normals", "sum_vertices", "sums"]
+__all__ = [
+    "Summand",
+    "about_facets",
+    "extreme_points",
+    "sum_normals",
+    "sum_vertices",
+    "sums",
+]
 
 
 class Summand(NamedTuple):
@@ -49,6 +58,19 @@ def extreme_points(image: Array, columns: int) -> Summand:
     if rank == columns > 2:
         return Summand(image, rank)
     return Summand(image[hull(flat).vertices], rank)
+
+
+def about_facets(parts: Sequence[Summand], r: int) -> int:
+    """Return about how many facets a sum of segments and polygons has, from their sizes alone.
+
+    A choice of r − 1 edges spans two facets; an edge of a polygon is extreme along one normal in
+    two. So it is in general position; parallel edges make it fewer.
+    """
+    choices = np.ones(1)
+    for part in parts:
+        own = [1.0, 1.0] if part.dimension == 1 else [1.0, 0.5 * len(part.points), 1.0]
+        choices = np.convolve(choices, own)
+    return math.ceil(2.0 * choices[r - 1]) if 1 <= r <= len(choices) else 0
 
 
 def sum_normals(parts: list[Summand], r: int, rounding: float) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import linprog
@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
 from hand_models.base import Array, Indices, SolverError
 
-__all__ = ["TOLERANCE", "distinct", "hull", "hull_facets", "polytope_vertices"]
+__all__ = ["TOLERANCE", "Polytope", "distinct", "hull", "hull_facets", "polytope"]
 
 TOLERANCE: Final = 1e-9
 """Relative tolerance of the geometry of polytopes."""
@@ -28,10 +28,24 @@ SLIVER: Final = 1e-6
 BEYOND: Final = 1e-6
 """By how much a row must clear a bounding box to be left out at once."""
 
+CHUNK: Final = 2_000_000
+"""Numbers of a table that is worked through part by part."""
 
-def polytope_vertices(A: Array, b: Array) -> Array:
-    """Return the vertices (n, d) of { y : A y ≤ b }, bounded; none if it is empty."""
+
+class Polytope(NamedTuple):
+    """A bounded set { y : A y ≤ b }: its vertices (n, d), none if it is empty, and its facets.
+
+    ``facets``: which rows are enough for it; in more than two dimensions none that could go.
+    """
+
+    vertices: Array
+    facets: Indices
+
+
+def polytope(A: Array, b: Array) -> Polytope:
+    """Return { y : A y ≤ b }, bounded, by its vertices and facets."""
     d = A.shape[1]
+    everything = np.arange(len(b))
     norms = np.linalg.norm(A, axis=1)
     A, b = A / norms[:, None], b / norms
     unbounded = SolverError(f"a block of {d} columns is not bounded")
@@ -42,28 +56,17 @@ def polytope_vertices(A: Array, b: Array) -> Array:
         lower = -b[A[:, 0] < 0.0].min()
         slack = TOLERANCE * (1.0 + abs(lower) + abs(upper))
         if lower > upper + slack:
-            return np.zeros((0, 1))
-        return np.array([[lower], [upper]]) if upper > lower + slack else np.array([[lower]])
+            return Polytope(np.zeros((0, 1)), everything)
+        ends = [[lower], [upper]] if upper > lower + slack else [[lower]]
+        return Polytope(np.array(ends), everything)
     if d == 2:
         turns = np.sort(np.arctan2(A[:, 1], A[:, 0]))
         if np.diff(turns, append=turns[0] + math.tau).max() >= math.pi:
             raise unbounded
-        first, second = np.triu_indices(len(b), 1)
-        det = A[first, 0] * A[second, 1] - A[first, 1] * A[second, 0]
-        crossing = np.abs(det) > TOLERANCE
-        first, second, det = first[crossing], second[crossing], det[crossing]
-        points = np.column_stack(
-            [
-                (b[first] * A[second, 1] - b[second] * A[first, 1]) / det,
-                (A[first, 0] * b[second] - A[second, 0] * b[first]) / det,
-            ]
-        )
-        # each row by its own size: one that is far away must not loosen the others
-        points = points[(points @ A.T <= b + TOLERANCE * (1.0 + np.abs(b))).all(axis=1)]
-        return distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
+        return Polytope(_corners(A, b), everything)
     box = _bounding_box(A, b)
     if box is None:
-        return np.zeros((0, d))
+        return Polytope(np.zeros((0, d)), everything)
     middle, half = box
     if not (half > 0.0).all():
         raise SolverError(f"a block of {d} columns has no interior")
@@ -88,7 +91,47 @@ def polytope_vertices(A: Array, b: Array) -> Array:
     if ball.x[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
     cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
-    return middle + half * distinct(cut.intersections, TOLERANCE)
+    return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
+
+
+def _corners(A: Array, b: Array) -> Array:
+    """Return the corners (n, 2) of { y : A y ≤ b }, bounded; rows of unit length."""
+    # each row by its own size: one that is far away must not loosen the others
+    loosened = b + TOLERANCE * (1.0 + np.abs(b))
+    found = []
+    first, second = _meeting(A, b, loosened)
+    for start in range(0, len(first), max(1, CHUNK // len(b))):
+        one, two = (each[start : start + max(1, CHUNK // len(b))] for each in (first, second))
+        det = A[one, 0] * A[two, 1] - A[one, 1] * A[two, 0]
+        points = np.column_stack(
+            [
+                (b[one] * A[two, 1] - b[two] * A[one, 1]) / det,
+                (A[one, 0] * b[two] - A[two, 0] * b[one]) / det,
+            ]
+        )
+        found.append(points[(points @ A.T <= loosened).all(axis=1)])
+    points = np.vstack([np.zeros((0, 2)), *found])
+    return distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
+
+
+def _meeting(A: Array, b: Array, loosened: Array) -> tuple[Indices, Indices]:
+    """Return the pairs of rows whose lines cross on what the others leave of the first, or nearly.
+
+    So n² numbers tell which crossings may be corners, and not n³.
+    """
+    first, second = np.triu_indices(len(b), 1)
+    # along the line of row i, b_i A_i + t (−A_i1, A_i0), row j asks for slope_ij t ≤ room_ij
+    slope = A[:, :1] * A[:, 1] - A[:, 1:] * A[:, 0]
+    across = A @ A.T * b[:, None]
+    slanted = np.abs(slope) > TOLERANCE
+    steep = np.where(slanted, slope, 1.0)
+    room = (loosened + TOLERANCE * (1.0 + np.abs(b)) - across) / steep
+    upper = np.where(slanted & (slope > 0.0), room, np.inf).min(axis=1)
+    lower = np.where(slanted & (slope < 0.0), room, -np.inf).max(axis=1)
+    t = ((b - across) / steep)[first, second]
+    size = TOLERANCE * (1.0 + np.abs(t))
+    left = slanted[first, second] & (t >= lower[first] - size) & (t <= upper[first] + size)
+    return first[left], second[left]
 
 
 def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
@@ -195,6 +238,10 @@ def _planes(points: Array, found: ConvexHull) -> Array:
     normals[inside] *= -1.0
     offsets[inside] *= -1.0
     spans = sizes[:, -1] > SLIVER * sizes[:, 0]
-    beyond = np.max(normals @ points.T, axis=1) - offsets
+    chunk = max(1, CHUNK // len(points))
+    reach = [
+        np.max(normals[k : k + chunk] @ points.T, axis=1) for k in range(0, len(normals), chunk)
+    ]
+    beyond = np.concatenate(reach) - offsets
     spans &= beyond <= TOLERANCE * np.abs(points).max()
     return np.column_stack([normals, -offsets])[spans]

@@ -21,7 +21,6 @@ from typing import Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -30,20 +29,21 @@ from hand_models.base import (
     EmptySetError,
     Indices,
     InvalidInputError,
-    SolverError,
+    LimitError,
     finite_vector,
 )
-from hand_models.wrench_spaces.block_sum import BlockSum
+from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes
 from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import FLATNESS, Facets, HalfSpaces, lifted
-from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope_vertices
+from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope
+from hand_models.wrench_spaces.reaches import ends_along, farthest
 from hand_models.wrench_spaces.row import Row
 from hand_models.wrench_spaces.scaled_wrench import SCALE
 
 __all__ = ["WrenchSpace"]
 
-EXACT: Final = 1e-9
-"""Tolerance of the linear program of a support function [N]."""
+MOST_ROWS: Final = 250
+"""Rows of more than two coupled columns whose polytope is listed: each takes a linear program."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +154,8 @@ class WrenchSpace:
     # Views at u = 1 -----------------------------------------------------------------------------
 
     @cached_property
-    def _blocks(self) -> tuple[tuple[Indices, Array], ...]:
-        """Columns of each block and the vertices of its polytope, (indices, (n, d))."""
+    def _coupled(self) -> tuple[tuple[Indices, Array, Array], ...]:
+        """Columns that rows couple, and these rows: (indices, A, b) of each block."""
         apart = len(self.s) - len(self.D)
         A = np.vstack([self.L[:apart], self.H])
         b = np.concatenate([(self.s - self.l0)[:apart], self.h])
@@ -171,15 +171,29 @@ class WrenchSpace:
         if count == 1:
             # rows of the whole wrench couple nothing that is not coupled already
             A, b, used = self.A, self.b, np.abs(self.A) > 0.0
-        blocks: list[tuple[Indices, Array]] = []
+        blocks = []
         for label in range(count):
             columns: Indices = np.flatnonzero(labels == label)
             mine = used[:, columns].any(axis=1)
-            vertices = polytope_vertices(A[np.ix_(mine, columns)], b[mine])
+            blocks.append((columns, A[np.ix_(mine, columns)], b[mine]))
+        return tuple(blocks)
+
+    @cached_property
+    def _blocks(self) -> tuple[Block, ...]:
+        """The polytope of each block."""
+        blocks = []
+        for columns, A, b in self._coupled:
+            vertices, facets = polytope(A, b)
             if not len(vertices):
                 raise self._empty(columns)
-            blocks.append((columns, vertices))
+            blocks.append(Block(columns, vertices, A[facets]))
         return tuple(blocks)
+
+    @cached_property
+    def _most_rows(self) -> int:
+        """Rows of the largest block of more than two columns; zero without one."""
+        sizes = [len(b) for columns, _, b in self._coupled if len(columns) > 2]
+        return max(sizes, default=0)
 
     @cached_property
     def _sum(self) -> BlockSum:
@@ -203,7 +217,7 @@ class WrenchSpace:
         """Wrench rows beyond which the sum of the blocks reaches."""
         slopes = self.D @ self.generators
         reach = self.D @ self.origin
-        for columns, vertices in self._blocks:
+        for columns, vertices, _ in self._blocks:
             reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
         cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
         # where the sum reaches least far along the cuts is most often a wrench of the set
@@ -224,19 +238,8 @@ class WrenchSpace:
 
     def _farthest(self, direction: Array) -> float | None:
         """Return max { d · w } over all rows at u = 1, by linear programming; None if empty."""
-        result = linprog(
-            -(self.generators.T @ direction),
-            A_ub=self.A,
-            b_ub=self.b,
-            bounds=[(None, None)] * len(self.columns),
-            method="highs",
-            options={"primal_feasibility_tolerance": EXACT, "dual_feasibility_tolerance": EXACT},
-        )
-        if result.status == 2:
-            return None
-        if result.status != 0 or result.x is None:
-            raise SolverError(f"support: {result.message}")
-        return float(direction @ self.wrench(result.x))
+        y = farthest(self.generators.T @ direction, self.A, self.b)
+        return None if y is None else float(direction @ self.wrench(y))
 
     @cached_property
     def _clipped(self) -> tuple[Array, Facets]:
@@ -258,6 +261,26 @@ class WrenchSpace:
     def _facets(self) -> Facets:
         """In the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
         return self._clipped[1] if len(self._cuts) else self._sum.facets
+
+    def sizes(self) -> Sizes:
+        """Return how many vertices and half-spaces `vertices` and `half_spaces` go through.
+
+        Told before these are computed, at far less cost.
+
+        Raises
+        ------
+        EmptySetError
+            If nothing is left at u = 1.
+        LimitError
+            If even this is too dear to know.
+        """
+        if self._most_rows > MOST_ROWS:
+            raise LimitError(
+                f"{self._most_rows} rows of loads that are coupled are too many (at most "
+                f"{MOST_ROWS})"
+            )
+        sizes = self._sum.sizes
+        return sizes._replace(half_spaces=max(sizes)) if len(self._cuts) else sizes
 
     def half_spaces(self) -> HalfSpaces:
         """Return the set at u = 1 as inequalities and, where it is flat, equations.
@@ -299,13 +322,14 @@ class WrenchSpace:
             If a linear program fails.
         """
         d = finite_vector(direction, 6, "direction")
-        y = self._sum.extreme(self.generators.T @ d)
-        if not len(self._cuts) or self._obeys(y):
-            return float(d @ self.wrench(y))
-        farthest = self._farthest(d)
-        if farthest is None:
+        if self._most_rows <= MOST_ROWS:
+            y = self._sum.extreme(self.generators.T @ d)
+            if not len(self._cuts) or self._obeys(y):
+                return float(d @ self.wrench(y))
+        reach = self._farthest(d)
+        if reach is None:
             raise self._empty()
-        return farthest
+        return reach
 
     def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
         """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.
@@ -334,34 +358,9 @@ class WrenchSpace:
             If the linear program fails.
         """
         d = finite_vector(direction, 6, "direction")
-        m = len(self.columns)
-        equations = np.hstack([self.generators, -d[:, None]]) * SCALE[:, None]
-        bounds = [(None, None)] * (m + 1)
-        rows = np.hstack([self.A, np.zeros((len(self.b), 1))])
-        ends = []
-        for sign in (1.0, -1.0):
-            cost = np.zeros(m + 1)
-            cost[-1] = sign
-            # the presolve of an older HiGHS leaves some of these undecided
-            for presolve in (True, False):
-                result = linprog(
-                    cost,
-                    A_ub=rows,
-                    b_ub=self.b,
-                    A_eq=equations,
-                    b_eq=-self.origin * SCALE,
-                    bounds=bounds,
-                    method="highs",
-                    options={"presolve": presolve},
-                )
-                if result.status in (0, 2):
-                    break
-            if result.status == 2:
-                return None
-            if result.status != 0 or result.x is None:
-                raise SolverError(f"capability: {result.message}")
-            ends.append(float(result.x[-1]))
-        return ends[0], ends[1]
+        return ends_along(
+            d * SCALE, self.origin * SCALE, self.generators * SCALE[:, None], self.A, self.b
+        )
 
     def volume(self) -> tuple[float, int]:
         """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.

@@ -11,10 +11,11 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
-from hand_models.base import SolverError, UnsupportedError
+from hand_models.base import LimitError, SolverError
 from hand_models.wrench_spaces import SCALE, Row, hull_facets
 from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import Facets
+from hand_models.wrench_spaces.polytopes import polytope
 from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
@@ -267,11 +268,72 @@ def test_an_unbounded_block_is_an_error_and_not_a_number(A):
         made.vertices()
 
 
+@pytest.mark.parametrize("count", [3, 40, 460])
+def test_a_polygon_of_many_rows_has_the_corners_of_its_rows(count):
+    rng = np.random.default_rng(count)
+    turns = np.append(rng.uniform(0.0, math.tau, count), [0.0, 2.0, 4.0])
+    A = np.column_stack([np.cos(turns), np.sin(turns)]) * rng.uniform(0.1, 10.0, (count + 3, 1))
+    b = np.linalg.norm(A, axis=1) * rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)], count + 3)
+    # the same again, and one through a corner, change nothing
+    found = polytope(np.vstack([A, A]), np.tile(b, 2)).vertices
+    expected = HalfspaceIntersection(np.column_stack([A, -b]), np.zeros(2)).intersections
+    gaps = np.linalg.norm(found[:, None] - expected, axis=2)
+    assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-7
+    corner = found[0]
+    tighter = np.vstack([A, corner])
+    assert len(polytope(tighter, np.append(b, corner @ corner)).vertices) == len(found)
+
+
+def test_sizes_told_beforehand_are_those_that_are_found():
+    for seed in range(12):
+        made, sums, _ = random_sum(seed)
+        sizes = made.sizes()
+        assert sizes.vertices == len(sums)
+        assert len(made.vertices()) <= sizes.vertices
+        found = len(made.half_spaces().offsets)
+        assert 0.6 * found <= sizes.half_spaces <= 1.6 * found, (seed, sizes)
+
+
+def test_sizes_of_one_block_are_exact_and_too_many_of_its_rows_are_refused_beforehand():
+    rng = np.random.default_rng(3)
+    A = np.vstack([np.eye(6), -np.eye(6), rng.normal(size=(6, 6))])
+    made = space(A, np.ones(18), np.eye(6))
+    assert made.sizes() == (len(made.vertices()), len(made.half_spaces().offsets))
+    sphere = rng.normal(size=(300, 6))
+    sphere /= np.linalg.norm(sphere, axis=1)[:, None]
+    many = space(sphere, np.ones(300), np.eye(6))
+    with pytest.raises(LimitError, match="300 rows"):
+        many.sizes()
+    for direction in rng.normal(size=(4, 6)):
+        assert many.support(direction) == pytest.approx(highest(many, direction))
+    with pytest.raises(EmptySetError):
+        space(np.vstack([sphere, -sphere]), np.tile(-np.ones(300), 2), np.eye(6)).support(sphere[0])
+
+
+def test_half_spaces_of_a_sum_that_wrench_rows_cut_take_its_vertices_too():
+    made = space(block_diag(BOX, BOX), np.ones(8), np.eye(6)[:, :4])
+    assert made.sizes().half_spaces == 8
+    cut = WrenchSpace(
+        origin=made.origin,
+        generators=made.generators,
+        columns=made.columns,
+        rows=(Row(None, None, "held", "limit", "held"), *made.rows),
+        L=made.generators[:1],
+        l0=np.zeros(1),
+        s=np.array([0.5]),
+        H=made.H,
+        h=made.h,
+        D=np.eye(6)[:1],
+    )
+    assert cut.sizes() == (16, 16)
+    assert len(cut.vertices()) == 16
+
+
 def test_too_many_candidates_are_refused_before_they_fill_the_memory():
     turns = np.arange(130) * math.tau / 130
     A = np.column_stack([np.cos(turns), np.sin(turns)])
     made = space(block_diag(A, A, A), np.ones(390), np.random.default_rng(0).normal(size=(6, 6)))
-    with pytest.raises(UnsupportedError, match="half_planes"):
+    with pytest.raises(LimitError, match="half_planes"):
         made.half_spaces()
 
 
