@@ -8,6 +8,9 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from hand_models.base import Array, Indices, LimitError
 from hand_models.wrench_spaces import zonotope
@@ -23,7 +26,7 @@ from hand_models.wrench_spaces.minkowski_sums import (
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull_facets
 from hand_models.wrench_spaces.scaled_wrench import SCALE
 
-__all__ = ["Block", "BlockSum", "Sizes"]
+__all__ = ["Block", "BlockSum", "Sizes", "coupled_columns"]
 
 MOST_CANDIDATES: Final = 500_000
 """How many sums of the blocks' vertices are looked through; that many take some 20 s."""
@@ -36,13 +39,23 @@ class Block(NamedTuple):
     ----------
     columns : ndarray of int, shape (d,)
     vertices : ndarray, shape (n, d)
-    normals : ndarray, shape (k, d)
-        Of its facets, in more than two columns.
+    A, b : ndarray, shapes (k, d), (k,)
+        Rows that are enough for it; in more than two columns those of its facets.
     """
 
     columns: Indices
     vertices: Array
-    normals: Array
+    A: Array
+    b: Array
+
+
+def coupled_columns(used: NDArray[np.bool_]) -> list[Indices]:
+    """Return the columns in groups that rows couple, from which row (k, m) uses which column."""
+    if not used.shape[1]:
+        return []
+    incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
+    count, labels = connected_components(incidence, directed=False)
+    return [np.flatnonzero(labels == label) for label in range(count)]
 
 
 class Sizes(NamedTuple):
@@ -79,7 +92,7 @@ class BlockSum:
     def _summands(self) -> tuple[Summand, ...]:
         """The blocks' images that are more than a point, about `base`."""
         summands = []
-        for columns, vertices, _ in self.blocks:
+        for columns, vertices, *_ in self.blocks:
             image = (vertices @ self.generators[:, columns].T) * SCALE
             summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
@@ -105,7 +118,7 @@ class BlockSum:
         parts, r = [s for s in self._summands if s.dimension], len(self.axes[1])
         candidates = math.prod(len(part.points) for part in parts)
         if self._whole is not None:
-            return Sizes(candidates, len(self._whole.normals))
+            return Sizes(candidates, len(self._whole.b))
         if all(part.dimension <= 2 for part in parts):
             return Sizes(candidates, about_facets(parts, r))
         # as many as a hull of so many points can have
@@ -146,7 +159,7 @@ class BlockSum:
     def extreme(self, slopes: Array) -> Array:
         """Return the loads y, shape (m,), with the largest slopes · y in the sum."""
         y = np.zeros(self.generators.shape[1])
-        for columns, vertices, _ in self.blocks:
+        for columns, vertices, *_ in self.blocks:
             y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
         return y
 
@@ -157,10 +170,10 @@ class BlockSum:
         if r == 0:
             return Facets(np.zeros((0, 0)), np.zeros(0))
         if self._whole is not None:
-            columns, _, normals = self._whole
             directions, reach = self.axes
-            image = directions @ (self.generators[:, columns] * SCALE[:, None]) / reach[:, None]
-            normals = np.linalg.solve(image.T, normals.T).T
+            own = self.generators[:, self._whole.columns] * SCALE[:, None]
+            image = directions @ own / reach[:, None]
+            normals = np.linalg.solve(image.T, self._whole.A.T).T
             normals /= np.linalg.norm(normals, axis=1)[:, None]
             return Facets(normals, (normals @ parts[0].points.T).max(axis=1))
         if all(part.dimension == 1 for part in parts):

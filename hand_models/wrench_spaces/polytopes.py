@@ -35,7 +35,8 @@ CHUNK: Final = 2_000_000
 class Polytope(NamedTuple):
     """A bounded set { y : A y ≤ b }: its vertices (n, d), none if it is empty, and its facets.
 
-    ``facets``: which rows are enough for it; in more than two dimensions none that could go.
+    ``facets``: which rows are enough for it; in more than two dimensions none that could go, in one
+    or two all that touch it.
     """
 
     vertices: Array
@@ -58,12 +59,12 @@ def polytope(A: Array, b: Array) -> Polytope:
         if lower > upper + slack:
             return Polytope(np.zeros((0, 1)), everything)
         ends = [[lower], [upper]] if upper > lower + slack else [[lower]]
-        return Polytope(np.array(ends), everything)
+        return _touching(np.array(ends), A, b)
     if d == 2:
         turns = np.sort(np.arctan2(A[:, 1], A[:, 0]))
         if np.diff(turns, append=turns[0] + math.tau).max() >= math.pi:
             raise unbounded
-        return Polytope(_corners(A, b), everything)
+        return _touching(_corners(A, b), A, b)
     box = _bounding_box(A, b)
     if box is None:
         return Polytope(np.zeros((0, d)), everything)
@@ -92,6 +93,13 @@ def polytope(A: Array, b: Array) -> Polytope:
         raise SolverError(f"a block of {d} columns has no interior")
     cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
     return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
+
+
+def _touching(vertices: Array, A: Array, b: Array) -> Polytope:
+    """Return a polytope with all rows that touch it; with all of them if it is empty."""
+    slack = BEYOND * (1.0 + np.abs(b) + np.max(np.abs(vertices), initial=0.0))
+    reach = np.max(vertices @ A.T, axis=0, initial=-np.inf)
+    return Polytope(vertices, np.flatnonzero((reach >= b - slack) | (len(vertices) == 0)))
 
 
 def _corners(A: Array, b: Array) -> Array:

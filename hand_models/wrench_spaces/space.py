@@ -21,8 +21,6 @@ from typing import Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from hand_models.base import (
     Array,
@@ -32,7 +30,7 @@ from hand_models.base import (
     LimitError,
     finite_vector,
 )
-from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes
+from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes, coupled_columns
 from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import FLATNESS, Facets, HalfSpaces, lifted
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope
@@ -163,20 +161,15 @@ class WrenchSpace:
         idle = ~used.any(axis=1)
         if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
             raise self._empty()
-        m = len(self.columns)
-        if not m:
-            return ()
-        incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
-        count, labels = connected_components(incidence, directed=False)
-        if count == 1:
+        groups = coupled_columns(used)
+        if len(groups) == 1:
             # rows of the whole wrench couple nothing that is not coupled already
             A, b, used = self.A, self.b, np.abs(self.A) > 0.0
-        blocks = []
-        for label in range(count):
-            columns: Indices = np.flatnonzero(labels == label)
-            mine = used[:, columns].any(axis=1)
-            blocks.append((columns, A[np.ix_(mine, columns)], b[mine]))
-        return tuple(blocks)
+        mine = [used[:, columns].any(axis=1) for columns in groups]
+        return tuple(
+            (columns, A[np.ix_(rows, columns)], b[rows])
+            for columns, rows in zip(groups, mine, strict=True)
+        )
 
     @cached_property
     def _blocks(self) -> tuple[Block, ...]:
@@ -186,14 +179,31 @@ class WrenchSpace:
             vertices, facets = polytope(A, b)
             if not len(vertices):
                 raise self._empty(columns)
-            blocks.append(Block(columns, vertices, A[facets]))
+            blocks.append(Block(columns, vertices, A[facets], b[facets]))
         return tuple(blocks)
 
     @cached_property
     def _most_rows(self) -> int:
         """Rows of the largest block of more than two columns; zero without one."""
-        sizes = [len(b) for columns, _, b in self._coupled if len(columns) > 2]
-        return max(sizes, default=0)
+        return max((len(b) for columns, _, b in self._coupled if len(columns) > 2), default=0)
+
+    @property
+    def listed(self) -> bool:
+        """Whether rows couple few enough others for their loads' polytopes to be listed."""
+        return self._most_rows <= MOST_ROWS
+
+    @cached_property
+    def _enough(self) -> tuple[Array, Array]:
+        """Rows that are enough for the set at u = 1, as `A` and `b`."""
+        if not self.listed:
+            return self.A, self.b
+        wide = len(self.s) - len(self.D), len(self.s)
+        A, b = [self.L[slice(*wide)]], [self.b[slice(*wide)]]
+        for block in self._blocks:
+            A.append(np.zeros((len(block.b), len(self.columns))))
+            A[-1][:, block.columns] = block.A
+            b.append(block.b)
+        return np.vstack(A), np.concatenate(b)
 
     @cached_property
     def _sum(self) -> BlockSum:
@@ -217,7 +227,7 @@ class WrenchSpace:
         """Wrench rows beyond which the sum of the blocks reaches."""
         slopes = self.D @ self.generators
         reach = self.D @ self.origin
-        for columns, vertices, _ in self._blocks:
+        for columns, vertices, *_ in self._blocks:
             reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
         cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
         # where the sum reaches least far along the cuts is most often a wrench of the set
@@ -236,10 +246,10 @@ class WrenchSpace:
         """Capacities of the wrench rows, shape (nd,)."""
         return self.s[len(self.s) - len(self.D) :]
 
-    def _farthest(self, direction: Array) -> float | None:
-        """Return max { d · w } over all rows at u = 1, by linear programming; None if empty."""
-        y = farthest(self.generators.T @ direction, self.A, self.b)
-        return None if y is None else float(direction @ self.wrench(y))
+    def _farthest(self, direction: Array) -> Array | None:
+        """Return the wrench farthest along d over all rows at u = 1, by linear programming."""
+        y = farthest(self.generators.T @ direction, *self._enough)
+        return None if y is None else self.wrench(y)
 
     @cached_property
     def _clipped(self) -> tuple[Array, Facets]:
@@ -274,7 +284,7 @@ class WrenchSpace:
         LimitError
             If even this is too dear to know.
         """
-        if self._most_rows > MOST_ROWS:
+        if not self.listed:
             raise LimitError(
                 f"{self._most_rows} rows of loads that are coupled are too many (at most "
                 f"{MOST_ROWS})"
@@ -312,7 +322,11 @@ class WrenchSpace:
         return self._clipped[0] if len(self._cuts) else self._sum.vertices
 
     def support(self, direction: ArrayLike) -> float:
-        """Return max { d · w : w in the set at u = 1 }, for d of shape (6,).
+        """Return max { d · w : w in the set at u = 1 }, d of shape (6,); raises as `extreme`."""
+        return float(finite_vector(direction, 6, "direction") @ self.extreme(direction))
+
+    def extreme(self, direction: ArrayLike) -> Array:
+        """Return a wrench w of the set at u = 1 with the largest d · w, for d of shape (6,).
 
         Raises
         ------
@@ -322,14 +336,14 @@ class WrenchSpace:
             If a linear program fails.
         """
         d = finite_vector(direction, 6, "direction")
-        if self._most_rows <= MOST_ROWS:
+        if self.listed:
             y = self._sum.extreme(self.generators.T @ d)
             if not len(self._cuts) or self._obeys(y):
-                return float(d @ self.wrench(y))
-        reach = self._farthest(d)
-        if reach is None:
+                return self.wrench(y)
+        found = self._farthest(d)
+        if found is None:
             raise self._empty()
-        return reach
+        return found
 
     def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
         """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.

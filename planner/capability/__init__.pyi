@@ -4,5 +4,5 @@ from .body_space import (
     BodySpace as BodySpace,
     End as End,
 )
-from .polygon import Polygon as Polygon
+from .polygon import Polygon as Polygon, SupportPoint as SupportPoint, enclose as enclose
 from .wrist_survey import Survey as Survey, survey as survey

@@ -20,7 +20,8 @@ from hand_models.base import Array, whole_file
 from hand_models.finger import PHALANGES, Contact, SettledFinger
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
-from hand_models.wrench_spaces import WrenchSpace
+from hand_models.wrench_spaces import SCALE, WrenchSpace
+from planner.capability import SupportPoint, enclose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,6 +69,9 @@ SHADES: Final = 15
 FLAT: Final = 1e-6
 """A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
 
+MOST_ENDS: Final = 40
+"""Directions in which a set is asked how far it reaches where its vertices are too many."""
+
 AROUND: Final = 0.19
 """Half the side of the view from above [m]."""
 
@@ -78,6 +82,8 @@ def plot_wrench_space(
     path: Path,
     title: str,
     preload: Array | None = None,
+    *,
+    outlined: bool = False,
 ) -> None:
     """Draw a hand on its hold, and three projections of what it can carry.
 
@@ -92,6 +98,8 @@ def plot_wrench_space(
     preload : ndarray, shape (4,), optional
         Of a floating hand, the tensions at which its motors stand still [N]; ``space`` is then its
         set linearised at rest.
+    outlined : bool, optional
+        Whether projections are drawn by how far the set reaches, as its vertices are too many.
     """
     tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
     figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
@@ -110,11 +118,12 @@ def plot_wrench_space(
         f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}"
     )
     if space is not None:
-        vertices = space.vertices()
+        vertices = None if outlined else space.vertices()
         if preload is not None:
             rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
         for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
-            _draw_projection(axes, vertices, i, j)
+            points = _outline(space, i, j) if vertices is None else vertices[:, [i, j]]
+            _draw_projection(axes, points, i, j)
     with whole_file(path) as part:
         figure.savefig(part, dpi=110, facecolor="white")
 
@@ -354,8 +363,21 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
 # The wrench space ---------------------------------------------------------------------------------
 
 
-def _draw_projection(axes: Axes, vertices: Array, i: int, j: int) -> None:
-    points = vertices[:, [i, j]]
+def _outline(space: WrenchSpace, i: int, j: int) -> Array:
+    """Return points, shape (n, 2), of which the hull is a set's projection or all but that."""
+    units = SCALE[[i, j]]
+
+    def touching(normal: Array) -> SupportPoint:
+        direction = np.zeros(6)
+        direction[[i, j]] = normal * units
+        point = space.extreme(direction)[[i, j]] * units
+        return SupportPoint(point, float(normal @ point))
+
+    polygon = enclose(touching, MOST_ENDS)
+    return np.zeros((1, 2)) if polygon is None else polygon.inner / units
+
+
+def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     try:
         outline = points[ConvexHull(points).vertices]
     except QhullError:

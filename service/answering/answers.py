@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from msgspec import UNSET
 
-from hand_models.base import Array, EmptySetError
+from hand_models.base import Array
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, TensionLimit
 from hand_models.hand import FINGERS, NearbyClosure, SettledHand, Tile, closing_sequence
 from hand_models.wrench_spaces import WrenchSpace
-from planner import deadline
 from planner.result import LimitName, Plan, Price, TensionPath, WristPlan
 from service import replies
 from service.answering.hand_answers import (
     hand_reply,
     seating_reply,
     vector,
-    vectors,
     wrench_set_reply,
     wrist_reply,
 )
+from service.answering.set_views import SetViews
 from service.replies import AXES
 
 __all__ = [
@@ -41,7 +40,6 @@ SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 
 BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
 
-VIEWS: Final = "it was known how far the hand's set reaches"
 """What a deadline may come before."""
 
 
@@ -93,29 +91,13 @@ def wrench_space_reply(
     limb: str,
     settled: SettledHand,
     space: WrenchSpace,
+    views: SetViews,
     limits: Iterable[TensionLimit],
     nearby: Iterable[NearbyClosure],
     wrist: WristPlan | None = None,
     robust: Robustness | None = None,
 ) -> replies.WrenchSpaceReply:
-    """Return one hand's wrench space as a reply, with its views at utilisation 1.
-
-    Where nothing is left at utilisation 1 there are no vertices, and the other views are null.
-
-    Raises
-    ------
-    SolverError
-        If a view could not be computed.
-    """
-    try:
-        views = _Views(
-            vertices=vectors(space.vertices()),
-            half_spaces=_half_spaces(space),
-            dimension=space.dimension,
-            capability=_capability(space),
-        )
-    except EmptySetError:
-        views = _Views([], None, None, None)
+    """Return one hand's wrench space as a reply, with its views at utilisation 1."""
     parts = wrench_set_reply(space)
     return replies.WrenchSpaceReply(
         robot=robot,
@@ -174,25 +156,6 @@ def _stop(settled: SettledHand, tile: Tile) -> str | None:
         return None
     finger = settled.fingers[FINGERS.index(tile.finger)]
     return finger.contacts[PHALANGES.index(tile.phalanx)].stop
-
-
-class _Views(NamedTuple):
-    """What a reply says of a set at utilisation 1."""
-
-    vertices: list[list[float]]
-    half_spaces: replies.HalfSpaces | None
-    dimension: int | None
-    capability: dict[str, replies.AxisCapability] | None
-
-
-def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
-    deadline.check(VIEWS)
-    faces = space.half_spaces()
-    return replies.HalfSpaces(
-        vectors(faces.normals),
-        vector(faces.offsets),
-        replies.HalfSpaceEquations(vectors(faces.equation_normals), vector(faces.equation_offsets)),
-    )
 
 
 def number(value: float | None) -> float | None:
@@ -267,14 +230,3 @@ def _path(path: TensionPath) -> replies.TensionPath:
         largest_change=float(path.largest_change),
         limiting=[limit_reply(name) for name in path.limiting],
     )
-
-
-def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
-    reaches = {}
-    for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
-        deadline.check(VIEWS)
-        ends = space.capability(direction)
-        low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))
-        for sign, pure, way in (("+", high, direction), ("-", low, -direction)):
-            reaches[f"{sign}{axis}"] = replies.AxisCapability(pure, float(space.support(way)))
-    return reaches

@@ -27,6 +27,7 @@ from service.answering.mesh_files import MeshFiles
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question, stance
+from service.answering.set_views import set_views
 from service.answering.streams import STREAMS, Streams
 from service.replies import (
     BodySpaceReply,
@@ -135,14 +136,15 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     Raises
     ------
     InvalidInputError
-        If the request is impossible.
+        If the request is impossible, or would cost too much.
     """
     asked = stance(request.stance, robots)
     _mind_time()
     hand = prepare.resting_hand(asked, request.limb)
     _mind_time()
+    views = set_views(hand.space, request.want)
     robust = None
-    if "robust" in request.want:
+    if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
         robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS, between=_mind_time)
@@ -152,6 +154,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         request.limb,
         hand.settled,
         hand.space,
+        views,
         tension_limits(hand.settled),
         nearby_closures(hand.settled),
         wrist,

@@ -77,9 +77,11 @@ def wrench_space(
         v=1,
         stance=asked(read_request(stance), hand, robot).stance,
         limb=limb,
-        want=["robust"] if robust else [],
     )
     reply = answering.wrench_space(request, robots)
+    if robust:
+        alone = msgspec.structs.replace(request, want=["robust"])
+        reply.robust = answering.wrench_space(alone, robots).robust
     found = None
     if per_axis is not None:
         wrist = prepare.floating_wrist(answering.stance(request.stance, robots), limb)
@@ -90,21 +92,28 @@ def wrench_space(
 
         drawn = answering.stance(request.stance, robots)
         settled, space = prepare.hand_space(drawn, limb)
-        shown, preload = space if reply.vertices else None, None
+        shown, preload = space if reply.capability else None, None
         if reply.wrist.mode == "floating":
             preload = prepare.floating_wrist(drawn, limb).hand.preload
         with writing(picture):
-            pictures.plot_wrench_space(settled, shown, picture, f"{limb} of {stance}", preload)
+            pictures.plot_wrench_space(
+                settled,
+                shown,
+                picture,
+                f"{limb} of {stance}",
+                preload,
+                outlined=reply.vertices is None,
+            )
     if as_json:
         searched = {} if found is None else {"search": survey_json(found)}
         say(msgspec.to_builtins(reply) | searched)
     else:
         print_wrench_space(reply, console())
-        if isinstance(reply.robust, RobustCapability) and reply.vertices:
+        if isinstance(reply.robust, RobustCapability) and reply.capability:
             print_robust(reply.robust, console())
         if found is not None:
             print_survey(found, console())
-    return DONE if reply.vertices else OVERLOADED
+    return DONE if reply.capability else OVERLOADED
 
 
 def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]:

@@ -116,7 +116,12 @@ class RobustCapability(Struct, kw_only=True):
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):
-    """What one hand can carry, at utilisation 1: if nothing, no vertices, and null for the rest."""
+    """What one hand can carry, at utilisation 1: if nothing, ``capability`` is null.
+
+    ``vertices`` and ``half_spaces`` are null where they were not asked for, or where they were left
+    out, as ``warnings`` tell. ``dimension`` is null where nothing is left, or where even that would
+    cost too much.
+    """
 
     robot: str
     limb: str
@@ -128,8 +133,9 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     origin: Vector
     generators: list[Generator]
     rows: list[Row]
-    vertices: list[Vector]
+    vertices: list[Vector] | None
     half_spaces: HalfSpaces | None
     dimension: int | None
     capability: dict[str, AxisCapability] | None
+    warnings: list[str] = []
     robust: RobustCapability | UnsetType = UNSET

@@ -32,6 +32,7 @@ from .route import RouteRequest as RouteRequest
 from .spaces import (
     Axis as Axis,
     BodySpaceRequest as BodySpaceRequest,
+    SpaceWant as SpaceWant,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .stance import Grasp as Grasp, Hand as Hand, Place as Place, Stance as Stance

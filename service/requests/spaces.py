@@ -13,11 +13,13 @@ from service.requests.stance import Stance
 __all__ = [
     "Axis",
     "BodySpaceRequest",
+    "SpaceWant",
     "WrenchSpaceRequest",
 ]
 
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
+SpaceWant = Literal["robust", "half_spaces", "vertices"]
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
@@ -26,12 +28,15 @@ class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
     stance: Stance
     limb: Name
     want: Annotated[
-        list[Literal["robust"]],
+        list[SpaceWant] | None,
         Meta(
-            max_length=1,
-            description="robust: the least that it can carry over a scatter of its place, too",
+            description="what is told beside rows and capability, each at most once; an error of "
+            "kind limit where it would cost too much, as many half_planes may. By default "
+            "half_spaces and vertices where they are cheap. robust: the least that it can carry "
+            "over a scatter of its place",
+            extra_json_schema={"uniqueItems": True},
         ),
-    ] = []
+    ] = None
 
 
 class BodySpaceRequest(Query, frozen=True, kw_only=True):

@@ -131,13 +131,20 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
         tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
         tensions.add_row(limit.finger, limit.phalanx or "-", tension)
     _show("tendon tension at which the finger's first tile lets go", tensions, out)
-    if reply.half_spaces is None or reply.capability is None:
+    if reply.capability is None:
         out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
         return
-    out.print(
-        f"{len(reply.vertices)} vertices, {len(reply.half_spaces.offsets)} half-spaces, "
-        f"dimension {reply.dimension}"
-    )
+    counts = []
+    if reply.vertices is not None:
+        counts.append(f"{len(reply.vertices)} vertices")
+    if reply.half_spaces is not None:
+        counts.append(f"{len(reply.half_spaces.offsets)} half-spaces")
+    if reply.dimension is not None:
+        counts.append(f"dimension {reply.dimension}")
+    if counts:
+        out.print(", ".join(counts))
+    for warning in reply.warnings:
+        out.print(warning, markup=False)
     _print_capability(reply.capability, out)
 
 

@@ -270,6 +270,22 @@ def test_a_picture_of_a_wrench_space(stance_file, tmp_path: Path) -> None:
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_wrench_space_of_too_many_vertices_is_drawn_all_the_same(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = wall_request()
+    for hand in request["stance"]["hands"]:
+        hand["surface"] = {"shear_limit": 60.0, "half_planes": 8}
+    picture = tmp_path / "space.png"
+    path = stance_file(request)
+    arguments = ["wrench-space", path, "--hand", "front_left", "--plot", str(picture)]
+    assert run(arguments) == DONE
+    out = capfd.readouterr().out
+    assert "vertices left out: " in out
+    assert "dimension 6" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_picture_of_a_hand_that_can_carry_nothing(stance_file, tmp_path: Path) -> None:
     request = flat_request()
     # a tile of this surface is overloaded as soon as the finger closes
