@@ -40,8 +40,6 @@ SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 
 BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
 
-"""What a deadline may come before."""
-
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
     """Return a plan as a reply.

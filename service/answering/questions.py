@@ -20,6 +20,7 @@ from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.route import Move, Route
 from service import requests
+from service.answering.costs import check_costs
 from service.answering.holds import Rocks, placed, pose_of, rocks_of
 from service.answering.own_robot import ROBOTS, Robots, builder_of
 
@@ -108,6 +109,7 @@ def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
 
 def _stance(message: requests.Stance, robots: Robots) -> tuple[Stance, Rocks]:
     with _within("stance"):
+        check_costs(message)
         build = builder_of(message.robot, robots)
         with _within("hand"):
             own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))

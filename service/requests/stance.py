@@ -164,4 +164,11 @@ class Stance(Strict, frozen=True, kw_only=True):
             description="by name, for hands that refer to them; a mesh's frame may begin anywhere",
         ),
     ] = {}
-    hands: Annotated[list[Hand], Meta(max_length=16)]
+    hands: Annotated[
+        list[Hand],
+        Meta(
+            max_length=16,
+            description="together with at most 256 half_planes, those of a floating hand counted "
+            "four times, and 40000 points of profiles; more is an error of kind limit",
+        ),
+    ]
