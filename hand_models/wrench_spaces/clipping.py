@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from scipy.sparse import csr_array, hstack, vstack
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, Indices, LimitError
 from hand_models.wrench_spaces.half_spaces import Facets
 from hand_models.wrench_spaces.polytopes import distinct
 
@@ -15,6 +15,18 @@ __all__ = ["clipped"]
 
 SPANNING: Final = 1e-13
 """Squares of unit normals that span a direction sum to more than this in it."""
+
+MOST_PAIRS: Final = 100_000
+"""Pairs of vertices that a cut looks through for edges that it crosses, or `A_VERTEX` for each
+vertex if that is more. A set of 20,000 vertices has some 60,000."""
+
+A_VERTEX: Final = 5
+
+MOST_VERTICES: Final = 20_000
+"""Vertices that cuts may leave, or `GROWTH` times those before if that is more. There are twice as
+many at most, unless rounding takes diagonals of a facet for edges."""
+
+GROWTH: Final = 3
 
 
 def clipped(
@@ -39,9 +51,16 @@ def clipped(
     -------
     tuple or None
         None if nothing, or nothing with an interior, is left.
+
+    Raises
+    ------
+    LimitError
+        If so many vertices lie on the same facets that rounding hides which ones edges join.
     """
     if not len(cuts.offsets):
         return vertices, faces
+    most_pairs = max(MOST_PAIRS, A_VERTEX * len(vertices))
+    most_vertices = max(MOST_VERTICES, GROWTH * len(vertices))
     slack = 10.0 * rounding * (1.0 + float(np.abs(faces.offsets).max()))
     lies = _incidence(vertices, faces, slack)
     beyond = vertices @ cuts.normals.T > cuts.offsets
@@ -54,11 +73,15 @@ def clipped(
             continue
         if not len(inside):
             return None
-        near, far = _edges(lies, inside, outside, faces)
+        near, far = _edges(lies, inside, outside, faces, most_pairs)
         part = (height[near] / (height[near] - height[far]))[:, None]
         crossings = distinct(vertices[near] + part * (vertices[far] - vertices[near]), slack)
         kept = height <= slack
         vertices = np.vstack([vertices[kept], crossings])
+        if len(vertices) > most_vertices:
+            raise LimitError(
+                f"{len(vertices)} vertices after a cut are too many (at most {most_vertices})"
+            )
         on_cut = np.append(height[kept] >= -slack, np.ones(len(crossings)))[:, None]
         lies = vstack([lies[kept], _incidence(crossings, faces, slack)])
         lies = hstack([lies, csr_array(on_cut)], format="csr")
@@ -70,7 +93,7 @@ def clipped(
 
 
 def _edges(
-    lies: csr_array, starts: Indices, ends: Indices, faces: Facets
+    lies: csr_array, starts: Indices, ends: Indices, faces: Facets, most_pairs: int
 ) -> tuple[Indices, Indices]:
     """Return the ends of all edges that lead from some vertices to some others."""
     r = faces.normals.shape[1]
@@ -79,6 +102,10 @@ def _edges(
     one, other = lies[starts], lies[ends]
     shared = (one @ other.T).tocoo()
     enough = shared.data >= r - 1
+    if (pairs := int(enough.sum())) > most_pairs:
+        raise LimitError(
+            f"{pairs} pairs of vertices on common facets are too many (at most {most_pairs})"
+        )
     i, j = shared.row[enough], shared.col[enough]
     squares = np.einsum("kr,ks->krs", faces.normals, faces.normals).reshape(-1, r * r)
     spans = np.linalg.eigvalsh((one[i].multiply(other[j]) @ squares).reshape(-1, r, r))

@@ -17,7 +17,7 @@ from service.requests import SpaceWant
 
 __all__ = ["SetViews", "set_views"]
 
-VIEWS: Final = ("vertices", "half_spaces")
+VIEWS: Final = {"vertices": WrenchSpace.vertices, "half_spaces": WrenchSpace.half_spaces}
 
 REACH: Final = "it was known how far the hand's set reaches"
 
@@ -73,34 +73,41 @@ def set_views(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> SetViews:
             field="want",
         )
     try:
-        dear = _dear(space)
-        told = [view for view in VIEWS if (want is None or view in want) and view not in dear]
-        if want is not None:
-            for view in (view for view in want if view in dear):
-                raise LimitError(f"{view}: {dear[view]}, or leave it out", field="want")
+        found, warnings = _listed(space, want)
         return SetViews(
-            vertices=vectors(space.vertices()) if "vertices" in told else None,
-            half_spaces=_half_spaces(space) if "half_spaces" in told else None,
+            vertices=None if "vertices" not in found else vectors(space.vertices()),
+            half_spaces=None if "half_spaces" not in found else _half_spaces(space),
             dimension=space.dimension if space.listed else None,
             capability=_capability(space),
-            warnings=[f"{view} left out: {why}" for view, why in dear.items() if want is None],
+            warnings=warnings,
         )
     except EmptySetError:
         vertices: list[list[float]] | None = [] if want is None or "vertices" in want else None
         return SetViews(vertices, None, None, None, [])
 
 
-def _dear(space: WrenchSpace) -> dict[str, str]:
-    """Return which views would take more than `MOST`, and why, known before they are computed."""
-    try:
-        sizes = space.sizes()._asdict()
-    except LimitError as error:
-        return dict.fromkeys(VIEWS, f"{error.message}; {LESS}")
-    return {
-        view: f"{sizes[view]} candidates to go through are too many (at most {MOST}); {LESS}"
-        for view in VIEWS
-        if sizes[view] > MOST
-    }
+def _listed(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> tuple[list[str], list[str]]:
+    """Return which of vertices and half-spaces are told, and warnings of those left out.
+
+    Those that are told have been computed.
+    """
+    found, warnings = [], []
+    for view, compute in VIEWS.items():
+        if want is not None and view not in want:
+            continue
+        try:
+            size = getattr(space.sizes(), view)
+            if size > MOST:
+                raise LimitError(f"{size} candidates to go through are too many (at most {MOST})")
+            compute(space)
+            found.append(view)
+        except LimitError as error:
+            if want is not None:
+                raise LimitError(
+                    f"{view}: {error.message}; {LESS}, or leave it out", field="want"
+                ) from None
+            warnings.append(f"{view} left out: {error.message}; {LESS}")
+    return found, warnings
 
 
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:

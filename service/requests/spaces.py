@@ -62,5 +62,8 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
     ] = "needed"
     directions: Annotated[
         list[Direction],
-        Meta(max_length=100, description="along which the largest acceleration is wanted, in W"),
+        Meta(
+            max_length=100,
+            description="along which the largest acceleration is wanted, in W: one program each",
+        ),
     ] = []

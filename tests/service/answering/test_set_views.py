@@ -87,6 +87,21 @@ def test_without_lateral_many_half_planes_have_their_views() -> None:
         assert highest_corner == pytest.approx(highest(reply, direction), rel=1e-6)
 
 
+def test_a_cut_that_turns_out_too_dear_is_left_out_or_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hand_models.wrench_spaces.clipping.MOST_PAIRS", 1000)
+    monkeypatch.setattr("hand_models.wrench_spaces.clipping.A_VERTEX", 0)
+    assert answered(asked(2))["warnings"] == []  # nothing cuts this one
+    reply = answered(asked(3))
+    assert [reply[view] for view in VIEWS] == [None, None]
+    assert all("pairs of vertices" in warning for warning in reply["warnings"])
+    assert len(reply["warnings"]) == 2
+    assert reply["capability"] is not None
+    error = answered(asked(3, want=["half_spaces"]))["error"]
+    assert (error["kind"], error["field"]) == ("limit", "want")
+
+
 def test_what_is_wanted_is_wanted_once() -> None:
     error = answered(asked(1, want=["vertices", "vertices"]))["error"]
     assert (error["kind"], error["field"]) == ("invalid", "want[1]")
