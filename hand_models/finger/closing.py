@@ -29,15 +29,14 @@ what a finger would come to that is tightened slowly.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
+from hand_models.finger.contact_states import RESTS, ROUNDING, contact_states, forces_on
 from hand_models.finger.path_state import (
-    CATCHING,
     CAUGHT,
-    EYE,
     FIRST_STRIDE,
     HELD,
     JOINTS,
@@ -48,26 +47,20 @@ from hand_models.finger.path_state import (
     ON,
     PULLED,
     Around,
-    Codes,
     Drive,
     State,
     choose,
-    largest,
     put,
     take,
     times,
 )
 from hand_models.finger.phalanx_gaps import PhalanxShape
 from hand_models.sections import Flags, Outlines
-from hand_models.tile import pull_strength
 
 __all__ = ["Path"]
 
 MOST_STEPS: Final = 2400
 """On a path."""
-
-SWITCHES: Final = 20
-"""Of contacts and stops, at an increment."""
 
 INCREMENT: Final = 2.0 / 37.0
 """Most of the tension in an increment, in parts of the closing tension."""
@@ -75,25 +68,16 @@ INCREMENT: Final = 2.0 / 37.0
 LEAST_INCREMENT: Final = 1e-4
 """By how much it grows where a contact changes, in the same parts."""
 
-RESTS, RESTS_DAMPED = 1e-10, 1e-7
-"""Of an increment at the end of the path, and with damping [rad]."""
+RESTS_DAMPED: Final = 1e-7
+"""Of an increment at the end of the path, with damping [rad]."""
 
 DAMPING, LEAST_DAMPING, TOUGH = 0.1, 0.025, 4.0
 """D at first and at last where it is needed, in parts of the torque of the proximal joint at the
 closing tension over a turn of one radian; and by how much it grows."""
 
-GIVES: Final = 1.0 / 4800.0
-"""By how much gaps may grow before their spines hold, in parts of a tile's length."""
-
-SLOWER: Final = 4.0
-"""How much damping takes off the forces of contacts that come back to the rock."""
-
 EXACT, AGREES, FARTHEST = 0.003, 0.03, 0.3
 """By how much torques may differ from their linearisation, in parts of the proximal joint's at the
 closing tension: for larger strides, on the path, and in parts of what is left by damping."""
-
-STIFF: Final = 10.0
-"""Of damping, in the same parts, with which joints are slow."""
 
 MOST_DAMPING: Final = 1e3
 """Of damping, in the same parts."""
@@ -110,21 +94,6 @@ LIFTED: Final = 1.0 / 240.0
 
 BALANCED: Final = 1e-8, 5e-7
 """Torque left by damping at the end, in the same parts: as a rule, and where rest takes long."""
-
-SOFT: Final = 1e-11
-"""Of contacts, so that those that coincide have forces [m/N]."""
-
-ROUNDING: Final = 1e-9
-"""Of forces [N] and torques [N·m]."""
-
-
-class _Forces(NamedTuple):
-    """What acts on fingers, and how it changes: torques [N·m], their slopes in f, and −∂/∂q."""
-
-    torque: Array
-    slope: Array
-    stiffness: Array
-    shears: Array
 
 
 class Path:
@@ -168,91 +137,23 @@ class Path:
             there = Around.of(rock, self._shape, drive, after.q)
             state, around = self._judged(drive, state, around, after, there)
 
-    def _forces(
-        self, drive: Drive, state: State, around: Around, mode: Codes, spines: Codes
-    ) -> _Forces:
-        """Return the torques of springs, tendons and drag in a contact state."""
-        caught, f = spines == CAUGHT, np.minimum(state.s, drive.closing)[:, None]
-        closing = (state.s < drive.closing)[:, None]
-        catching = CATCHING * drive.closing[:, None]
-        dragged = state.been | (mode == ON)
-        # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
-        bears = (mode != OFF) | (state.stop == 0)
-        across = (state.s - drive.closing)[:, None].clip(0.0) / catching
-        part = np.where(dragged, 1.0, across) * bears
-        drag = np.where(caught, drive.drag * part, 0.0)
-        shears = drag * around.share * f
-        d_shears = (drag * f)[..., None] * around.d_share
-        # per newton of s
-        late = caught & bears & ~dragged
-        grows = np.where(closing, drag, np.where(late, drive.drag * f / catching, 0.0))
-        grows = grows * around.share
-        normals = np.where(mode != OFF, state.normals, 0.0)
-        stiffness = (
-            EYE * drive.stiffness[:, None, :]
-            + np.einsum("nj,nijk->nik", normals, around.d_b)
-            - np.einsum("nj,nijk->nik", shears, around.d_a)
-            - around.a @ d_shears
-        )
-        springs = drive.preload + drive.stiffness * state.q
-        torque = f * drive.pull - springs + times(around.a, shears)
-        slope = np.where(closing, drive.pull, 0.0) + times(around.a, grows)
-        return _Forces(torque, slope, stiffness, shears)
-
     def _increment(
         self, drive: Drive, state: State, around: Around, balanced: float
     ) -> tuple[State, Flags]:
         """Return where fingers come to next, and which of them are at their ends."""
-        stride, gives, slack = state.stride, GIVES * self._length, self._shape.closes
+        stride, slack = state.stride, self._shape.closes
         caught = (state.spines == CAUGHT) & (around.share > 0.0)
         # how far a phalanx may be off the rock
         near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
         least = np.where(caught, np.minimum(state.least, near), np.inf)
-        state = state._replace(least=np.where(state.spines == CAUGHT, least, state.least))
         # spines hold no longer than rock is within their travel
         mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
-        stop, spines = state.stop, state.spines
-        for _ in range(SWITCHES):
-            forces = self._forces(drive, state, around, mode, spines)
-            damped = forces.stiffness + state.damping[:, None, None] * EYE
-            active, held = mode != OFF, stop != 0
-            apart = around.gap - np.where(mode == HELD, least, 0.0)
-            turn, normals = self._solve(drive, state, around, forces, damped, active, stop, apart)
-            size = np.abs(turn[..., 0]).max(axis=1)
-            part = np.minimum(1.0, stride / np.maximum(size, RESTS))[:, None]
-            # contacts that would pull more than they hold, or push across a gap
-            caught = (spines == CAUGHT) & (around.share > 0.0)
-            over = self._over(drive, around, active, caught, forces.shears, normals[..., 0])
-            over = np.where(caught & (part < 1.0), 0.0, over)
-            pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
-            # gaps that would close, or grow beyond what spines let them
-            change = times(around.d_gap, turn[..., 0])
-            gap = around.gap + part * change
-            # damped joints may be slow in leaving where they should not be
-            slow = (state.damping > STIFF * drive.torque)[:, None]
-            closes = ~active & (gap < -slack) & ((change < 0.0) | ~slow)
-            grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
-            balance = forces.torque - times(damped, turn[..., 0])
-            balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
-            frees = held & (stop * balance < -ROUNDING * drive.torque[:, None])
-            there = state.q + part * turn[..., 0]
-            high, low = there > drive.upper + RESTS, there < drive.lower - RESTS
-            high, low = ~held & high, ~held & low
-            # contacts that joints cannot bring to the rock, as others or stops are in the way
-            cannot = np.where(active & (mode == ON), SOFT * normals[..., 0] - gives, 0.0)
-            switches = (over > 0.0) | pushes | closes | grows | frees | high | low | (cannot > 0.0)
-            settled = ~switches.any(axis=1)
-            if settled.all():
-                break
-            # of contacts one at a time, the worst
-            one = largest(over)
-            spines = np.where(one & caught, PULLED, spines).astype(np.int8)
-            mode = np.where((one & ~caught) | (one & (mode == HELD)) | pushes, OFF, mode)
-            mode = np.where(largest(cannot), OFF, mode)
-            one = largest(np.where(closes, -gap, np.where(grows, gap - least, 0.0)))
-            mode = np.where(one, np.where(closes, ON, HELD), mode).astype(np.int8)
-            spines = np.where(one & closes & (spines == LOST), CAUGHT, spines).astype(np.int8)
-            stop = np.where(frees, 0, np.where(high, 1, np.where(low, -1, stop))).astype(np.int8)
+        kept = np.where(state.spines == CAUGHT, least, state.least)
+        state = state._replace(least=kept)
+        begun = state._replace(mode=mode)
+        now = contact_states(drive, begun, around, least, self._length, slack)
+        mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
+        damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
         move, grow = turn[..., 0], turn[..., 1]
         # spines that were pulled off, and where
         pulled = (spines == PULLED) & (state.spines != PULLED)
@@ -260,7 +161,7 @@ class Path:
         lost = (spines == PULLED) & (around.gap > least + LIFTED * self._length)
         spines = np.where(lost, LOST, spines).astype(np.int8)
         curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
-        waits = curved | ~settled
+        waits = curved | ~now.settled
         waits &= state.damping < MOST_DAMPING * drive.torque
         turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
         turns_back &= (size > 100.0 * RESTS) & ~waits
@@ -269,7 +170,9 @@ class Path:
         clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * self._shape.end)
         most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
         rate = times(around.d_gap, grow)
-        until = np.where(~active & (rate < 0.0), (gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
+        until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(
+            axis=1
+        )
         end = drive.end
         target = np.where(state.s < drive.closing, drive.closing, end)
         more = np.minimum(target - state.s, INCREMENT * drive.closing)
@@ -277,20 +180,20 @@ class Path:
         more = np.minimum(more, until.clip(0.0))
         # and no contact pushes across a gap, or pulls where nothing holds it
         force, rate = normals[..., 0], normals[..., 1]
-        ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~caught & (rate < 0.0))
+        ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
         until = np.where(ends, -force / rate, np.inf).min(axis=1)
         more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
         more = np.where(waits | turns_back | (size > most), 0.0, more)
         part = np.minimum(1.0, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
         step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
         normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
-        left = forces.torque + more[:, None] * forces.slope
-        left -= times(forces.stiffness, step) + times(around.b, normals)
+        left = now.torque + more[:, None] * now.slope
+        left -= times(now.stiffness, step) + times(around.b, normals)
         floor = LEAST_DAMPING * drive.torque
         shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
         damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
         tougher = _grows(state.damping, DAMPING, drive)
-        rests = (state.s >= end) & ~waits & settled
+        rests = (state.s >= end) & ~waits & now.settled
         rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
         rests &= state.damping * size < balanced * drive.torque
         s = state.s + more
@@ -314,61 +217,11 @@ class Path:
         stays = state._replace(damping=tougher, step=step, spines=spines, least=least)
         return choose(waits, stays, after), rests
 
-    def _solve(
-        self,
-        drive: Drive,
-        state: State,
-        around: Around,
-        forces: _Forces,
-        damped: Array,
-        active: Flags,
-        stop: Codes,
-        apart: Array,
-    ) -> tuple[Array, Array]:
-        """Return turns of joints and normals of contacts, (n, 3, 2): now, and per newton.
-
-        ``apart``: how far contacts are from where they should be [m].
-        """
-        n, held = len(state.s), (stop != 0)[..., None]
-        A, b = np.zeros((n, 2 * JOINTS, 2 * JOINTS)), np.zeros((n, 2 * JOINTS, 3))
-        A[:, :JOINTS, :JOINTS] = np.where(held, EYE, damped)
-        A[:, :JOINTS, JOINTS:] = np.where(held, 0.0, around.b * active[:, None, :])
-        A[:, JOINTS:, :JOINTS] = np.where(active[..., None], around.d_gap, 0.0)
-        part = drive.torque / (drive.torque + SLOWER * state.damping)
-        A[:, JOINTS:, JOINTS:] = np.where(active[..., None], -SOFT * part[:, None, None] * EYE, EYE)
-        limit = np.where(stop > 0, drive.upper, drive.lower)
-        b[:, :JOINTS, 0] = np.where(held[..., 0], limit - state.q, forces.torque)
-        b[:, :JOINTS, 1] = np.where(held[..., 0], 0.0, forces.slope)
-        # contacts come back to the rock at once, what damping needs for that is no force on them
-        b[:, JOINTS:, 2] = np.where(active, -apart, 0.0)
-        found = np.asarray(np.linalg.solve(A, b), dtype=float)
-        found[:, :JOINTS, 0] += found[:, :JOINTS, 2]
-        found[:, JOINTS:, 0] += part[:, None] * found[:, JOINTS:, 2]
-        return found[:, :JOINTS, :2], found[:, JOINTS:, :2]
-
-    def _over(
-        self,
-        drive: Drive,
-        around: Around,
-        active: Flags,
-        caught: Flags,
-        shears: Array,
-        normals: Array,
-    ) -> Array:
-        """Return by how much contacts pull more than they hold [N], not above 0 where they hold."""
-        pull = np.maximum(-normals, 0.0)
-        share = np.maximum(around.share, ROUNDING)
-        most, least, angle = (drive.limits[:, i, None] for i in range(3))
-        shear, pulls = shears / share, pull / share
-        strength = pull_strength(most, least, angle, np.arctan2(pulls, shear))
-        over = np.where(caught, share * (np.hypot(shear, pulls) - strength), pull)
-        return np.where(active & (pull > ROUNDING), over - ROUNDING, 0.0)
-
     def _judged(
         self, drive: Drive, state: State, around: Around, after: State, there: Around
     ) -> tuple[State, Around]:
         """Return fingers after an increment, or before it where its linearisation does not hold."""
-        forces = self._forces(drive, after, there, after.mode, after.spines)
+        forces = forces_on(drive, after, there)
         left = forces.torque - times(there.b, after.normals)
         left = np.where(after.stop != 0, 0.0, left)
         wrong = np.abs(left - after.left).max(axis=1)
