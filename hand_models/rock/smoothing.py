@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
-from scipy.signal import savgol_filter
+from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
+from scipy.signal import savgol_coeffs
 from scipy.spatial import cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError
@@ -126,10 +127,31 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     half = min(round(0.5 * scale.tile / (total / (count - 1))), (len(raw) - 1) // 2)
     curve = raw
     for part in (half, half // 2):
-        mode: Literal["wrap", "interp"] = "wrap" if closed else "interp"
-        curve = savgol_filter(curve, 2 * part + 1, min(2, 2 * part), axis=0, mode=mode)
+        curve = _fitted(curve, part, closed)
     curve = _raised(curve, np.vstack([raw, points]), half, closed)
     return np.vstack([curve, curve[:1]]) if closed else curve
+
+
+def _fitted(curve: Array, part: int, closed: bool) -> Array:
+    """Return the middles of parabolas over ``part`` points on both sides of each; at ends, theirs.
+
+    This is `scipy.signal.savgol_filter`, which works its weights out anew each time.
+    """
+    weights = _weights(part)
+    fitted = correlate1d(curve, weights[part], axis=0, mode="wrap" if closed else "nearest")
+    if not closed and part:
+        fitted[:part] = weights[:part] @ curve[: 2 * part + 1]
+        fitted[-part:] = weights[part + 1 :] @ curve[-2 * part - 1 :]
+    return np.asarray(fitted)
+
+
+@lru_cache(maxsize=64)
+def _weights(part: int) -> Array:
+    """Return the weights of 2 part + 1 points with which a parabola is fitted at each of them."""
+    length = 2 * part + 1
+    return np.array(
+        [savgol_coeffs(length, min(2, 2 * part), pos=i, use="dot") for i in range(length)]
+    )
 
 
 def _raised(curve: Array, raw: Array, half: int, closed: bool) -> Array:

@@ -141,11 +141,17 @@ def cut(
     vertices, faces = triangles
     normal = np.cross(s_axis, t_axis)
     # each vertex by itself, so that triangles that share it are told the same
-    x, y, z = (vertices[:, i][faces] for i in range(3))
-    heights = x * normal[0] + y * normal[1] + z * normal[2] - origin @ normal
-    beyond = heights >= 0.0
-    crossed = beyond.any(axis=1) & ~beyond.all(axis=1)
-    faces, heights, sides = faces[crossed], heights[crossed], beyond[crossed]
+    beyond = np.empty((3, len(faces)), dtype=bool)
+    heights = np.empty((3, len(faces)))
+    for i in range(3):
+        x, y, z = vertices.take(faces[:, i], axis=0).T
+        np.multiply(x, normal[0], out=heights[i])
+        heights[i] += y * normal[1]
+        heights[i] += z * normal[2]
+        heights[i] -= origin @ normal
+        np.greater_equal(heights[i], 0.0, out=beyond[i])
+    crossed = ((beyond[0] != beyond[1]) | (beyond[0] != beyond[2])).nonzero()[0]
+    faces, heights, sides = faces[crossed], heights[:, crossed].T, beyond[:, crossed].T
     flat = (vertices[faces] - origin) @ np.column_stack([s_axis, t_axis])
     near = ((flat.min(axis=1) <= reach) & (flat.max(axis=1) >= -reach)).all(axis=1)
     faces, heights, sides, flat = faces[near], heights[near], sides[near], flat[near]
