@@ -61,6 +61,9 @@ TRIES: Final = 24
 PARTS: Final = 17
 """Places tried at once within a bracket."""
 
+ABOUT: Final = np.array([-(2.0**-7), -(2.0**-11), 2.0**-11, 2.0**-7])
+"""Others, about where a straight line between its ends is zero, in parts of the bracket."""
+
 NARROW: Final = 1e-8
 """How wide a bracket is in the end [m]."""
 
@@ -283,10 +286,11 @@ def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seatin
         missed = np.full(len(places), math.nan)
         there = np.isfinite(places[:, 1])
         joints = x - places[there, 0] + 1j * (z - places[there, 1])
-        clear = [section.face_clearances(joints, *face, limits[0]) for section in under]
-        along = [section.rests(joints, *face, *limits)[1] for section in under]
+        rests = [section.rests(joints, *face, *limits) for section in under]
+        along = np.array([each.distance for each in rests])
         mean = np.where(np.isnan(along), model.joint_spacing, along).mean(axis=0)
-        missed[there] = np.where(np.min(clear, axis=0) <= 0.0, 0.0, mean) - hand.seated_contact
+        blocked = np.any([each.blocked for each in rests], axis=0)
+        missed[there] = np.where(blocked, 0.0, mean) - hand.seated_contact
         return missed
 
     def resting(along: Array, stand_off: Array) -> Array:
@@ -316,19 +320,28 @@ def _first(
 ) -> Array | None:
     """Return the place, nearest zero along its parameter, at which nothing is missed."""
     misses = miss(places(tries))
+    turns = np.flatnonzero(np.abs(np.diff(np.sign(misses))) > 0.0)
+    # how near zero a place in each bracket may be
+    least = np.abs(np.clip(0.0, tries[turns], tries[turns + 1]))
     best: tuple[float, Array] | None = None
-    for i in np.flatnonzero(np.abs(np.diff(np.sign(misses))) > 0.0).tolist():
-        ends, off = tries[i : i + 2], misses[i : i + 2]
+    for which in np.argsort(least, kind="stable").tolist():
+        if best is not None and best[0] <= least[which]:
+            break
+        ends, off = (values[turns[which] : turns[which] + 2] for values in (tries, misses))
         while ends[1] - ends[0] > NARROW:
-            between = np.linspace(ends[0], ends[1], PARTS)
+            # everywhere in the bracket, and about where a straight line has it
+            line = ends[0] - off[0] * (ends[1] - ends[0]) / (off[1] - off[0])
+            about = np.clip(line + ABOUT * (ends[1] - ends[0]), *ends)
+            between = np.unique(np.concatenate([np.linspace(ends[0], ends[1], PARTS), about]))
             missed = miss(places(between))
-            turns = np.flatnonzero(np.abs(np.diff(np.sign(missed))) > 0.0)
-            if not len(turns):
+            inside = np.flatnonzero(np.abs(np.diff(np.sign(missed))) > 0.0)
+            if not len(inside):
                 break
-            ends, off = (values[turns[0] : turns[0] + 2] for values in (between, missed))
+            ends, off = (values[inside[0] : inside[0] + 2] for values in (between, missed))
         root = ends[:1] - off[:1] * (ends[1] - ends[0]) / (off[1] - off[0])
         there = places(root)
         # where the contact jumps over c₁ there is no root
-        if abs(miss(there)[0]) < NEAR and (best is None or abs(root[0]) < best[0]):
+        met = np.abs(off).max() < NEAR or abs(miss(there)[0]) < NEAR
+        if met and (best is None or abs(root[0]) < best[0]):
             best = abs(root[0]), there[0]
     return None if best is None else best[1]

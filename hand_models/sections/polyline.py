@@ -15,7 +15,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.sections.boundary import Boundary
 from hand_models.sections.first_contact import TurningFaces
-from hand_models.sections.rows import Flags, Span
+from hand_models.sections.rows import Rests, Span
 from hand_models.sections.section import Complexes, Rest, Section, Vector2
 
 __all__ = ["PolylineSection"]
@@ -42,21 +42,24 @@ class PolylineSection(Section):
     def rest(
         self, joint: Vector2, start: float, end: float, height: float, low: float, high: float
     ) -> Rest | None:
-        found = self.rests(np.array([complex(*joint)]), start, end, height, low, high)
-        angle, distance, flat = (values.item() for values in found)
-        return None if math.isnan(angle) else Rest(angle, distance, bool(flat))
+        joints = np.array([complex(*joint)])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            sweep = self._sweep(joints, Span.of(start, end, height), low)
+            angle, distance, flat = sweep.contacts(np.array([high]), self.faceted)
+        if math.isnan(angle.item()):
+            return None
+        middle = 0.5 * (start + end)
+        return Rest(angle.item(), middle if flat.item() else distance.item(), flat.item())
 
     def rests(
         self, joints: Complexes, start: float, end: float, height: float, low: float, high: float
-    ) -> tuple[Array, Array, Flags]:
-        """Return what `rest` does for joints (n,): angles, distances, and whether faces lie flat.
-
-        NaN where they meet no rock.
-        """
+    ) -> Rests:
+        """Return what `rest` does for joints (n,)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             sweep = self._sweep(joints, Span.of(start, end, height), low)
-            angles, distances, flat = sweep.contacts(np.full(len(joints), high), self.faceted)
-        return angles, np.where(flat, 0.5 * (start + end), distances), flat
+            angle, distance, flat = sweep.contacts(np.full(len(joints), high), self.faceted)
+            distance = np.where(flat, 0.5 * (start + end), distance)
+            return Rests(angle, distance, flat, sweep.clearances() <= 0.0)
 
     def touch(
         self, joint: Vector2, along: float, height: float, low: float, high: float
@@ -71,14 +74,9 @@ class PolylineSection(Section):
         self, joint: Vector2, start: float, end: float, height: float, angle: float
     ) -> float:
         joints = np.array([complex(*joint)])
-        return float(self.face_clearances(joints, start, end, height, angle)[0])
-
-    def face_clearances(
-        self, joints: Complexes, start: float, end: float, height: float, angle: float
-    ) -> Array:
-        """Return what `face_clearance` does for joints (n,)."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self._sweep(joints, Span.of(start, end, height), angle).clearances()
+            sweep = self._sweep(joints, Span.of(start, end, height), angle)
+            return float(sweep.clearances()[0])
 
     def _sweep(self, joints: Complexes, span: Span, low: float) -> TurningFaces:
         return TurningFaces(self.boundary, joints, span, np.full(len(joints), low))
@@ -99,13 +97,24 @@ class PolylineSection(Section):
     def highest(self, low: Array, high: Array) -> Array:
         """Return the least t of the rock between values of s, (n,); infinite if there is none."""
         least = np.full(len(low), math.inf)
+        # what all windows hold is looked at once, and what none does not at all
+        inner, outer = (low.max(), high.min()), (low.min(), high.max())
         for piece in self.pieces:
             s, t = piece[:, 0], piece[:, 1]
-            between = (s >= low[:, None]) & (s <= high[:, None])
-            np.minimum(least, np.where(between, t, math.inf).min(axis=1), out=least)
+            always = (s >= inner[0]) & (s <= inner[1])
+            np.minimum(least, t[always].min(initial=math.inf), out=least)
+            some = (~always & (s >= outer[0]) & (s <= outer[1])).nonzero()[0]
+            between = (s[some] >= low[:, None]) & (s[some] <= high[:, None])
+            apart = np.where(between, t[some], math.inf).min(axis=1, initial=math.inf)
+            np.minimum(least, apart, out=least)
+            first, last = np.minimum(s[:-1], s[1:]), np.maximum(s[:-1], s[1:])
             for bound in (low, high):
-                below = s < bound[:, None]
-                window, first = (below[:, :-1] != below[:, 1:]).nonzero()
-                part = (bound[window] - s[first]) / (s[first + 1] - s[first])
-                np.minimum.at(least, window, t[first] + part * (t[first + 1] - t[first]))
+                crossed = ((last >= bound.min()) & (first < bound.max())).nonzero()[0]
+                after = crossed + 1
+                window, which = (
+                    (s[crossed] < bound[:, None]) != (s[after] < bound[:, None])
+                ).nonzero()
+                i, j = crossed[which], after[which]
+                part = (bound[window] - s[i]) / (s[j] - s[i])
+                np.minimum.at(least, window, t[i] + part * (t[j] - t[i]))
         return least
