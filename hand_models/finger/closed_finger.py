@@ -127,13 +127,17 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     places, most = _axes(shape, q), JOINTS * shape.end
     rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing, NEAREST)
 
-    def depth(lift: float) -> float:
+    def depth(lift: float, *, how_far: bool = False) -> float:
+        """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
         away = np.abs(lifted[..., None] - rock.points[0]).min(axis=-1)
+        near = float(shape.radius - away.min())
+        if near > 0.0 and not how_far:
+            return near
         inside = section.clearances(lifted) < 0.0
         return float(shape.radius - np.where(inside, -away, away).min())
 
-    now, low, high = max(depth(0.0), shape.closes), 0.0, most
+    now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
     if depth(high) > 0.0:
         return Refused(now, np.inf)
     for _ in range(HALVINGS):

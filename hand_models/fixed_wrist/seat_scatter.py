@@ -21,8 +21,8 @@ DRAWS: Final = 50
 TENTH: Final = 10.0
 """Percentile that is told beside the least."""
 
-AT_ONCE: Final = 40
-"""Hands that are closed together, by default: with more, each takes no less."""
+AT_ONCE: Final = 64
+"""Hands that are closed together, by default: all the draws of one, unless more are asked for."""
 
 
 FEW: Final = 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -17,8 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["RockTrials", "try_everywhere"]
 
-TOGETHER: Final = 8
-"""Trials that are closed in one batch."""
+TOGETHER: Final = 128
+"""Trials that are closed in one batch, at most: some fingers take ten times as long as most, and so
+do the batches that they are in, whatever else is in these."""
 
 Found = list["FoundHold | InvalidInputError"]
 
@@ -72,10 +74,13 @@ def try_everywhere(
     found : FoundHold or InvalidInputError
         An error in place of a hand that cannot be there, or whose process died.
     """
-    # one that is searched for, or scattered, is many already
-    size = TOGETHER if how.seat == "rest" and not how.robust else 1
-    chunks = [list(trials[i : i + size]) for i in range(0, len(trials), size)]
     count = cores() if workers is None else workers
+    # one that is searched for, or scattered, is many already
+    most = TOGETHER if how.seat == "rest" and not how.robust else 1
+    # as many for each process
+    rounds = max(math.ceil(len(trials) / (most * count)), 1)
+    size = max(math.ceil(len(trials) / (rounds * count)), 1)
+    chunks = [list(trials[i : i + size]) for i in range(0, len(trials), size)]
     here, processes = how.trying(), min(count, len(chunks)) - 1
     with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
         pairs = enumerate(map(here, chunks)) if others is None else others.each(chunks, here)
