@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,11 @@ class PolylineSection(Section):
     def __init__(self, pieces: Sequence[Array], *, faceted: bool = False) -> None:
         self.pieces = tuple(pieces)
         self.faceted = faceted
-        self.boundary = Boundary(pieces)
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """Where places are near it; a line that only `highest` is asked of needs none."""
+        return Boundary(self.pieces)
 
     def rest(
         self, joint: Vector2, start: float, end: float, height: float, low: float, high: float

@@ -22,6 +22,7 @@ from tests.benchmarks.batch_table import batch_tables, batches, rates
 from tests.benchmarks.centroidal_table import CASES, centroidal_tables
 from tests.benchmarks.growth import draw, growth, steps as growth_steps
 from tests.benchmarks.known_table import known_tables
+from tests.benchmarks.placement_table import placement_tables
 from tests.benchmarks.plan_table import plan_tables
 from tests.benchmarks.race import Race
 from tests.benchmarks.random_plans import answers, iteration_tables
@@ -80,6 +81,7 @@ def parts(size: Size, workers: int, batch_race: Callable[[Tick], Race]) -> list[
             size.rounds + size.few,
             lambda tick: set_tables(size.rounds, size.few, size.step, tick),
         ),
+        Part("placements", size.few, lambda tick: placement_tables(size.few, tick)),
         Part("centroidal", size.few * CASES, lambda tick: centroidal_tables(size.few, tick)),
         Part(
             "stances",
@@ -112,7 +114,7 @@ def _there(name: str) -> bool:
 @click.option(
     "--only",
     multiple=True,
-    type=click.Choice(["plans", "known", "batches", "sets", "centroidal", "stances"]),
+    type=click.Choice(["plans", "known", "batches", "sets", "placements", "centroidal", "stances"]),
     help="Leave the other parts out.",
 )
 @click.option("--stances", type=click.IntRange(1), help="Random stances to plan [300].")

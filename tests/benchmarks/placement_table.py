@@ -1,0 +1,125 @@
+"""What placing hands on a scan takes: all of it, and its parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hand_models import Grasp, SettledHand
+from hand_models.fixed_wrist import (
+    PULL_OFF,
+    approach_frame,
+    grid_of_trials,
+    robustness,
+    wrench_spaces,
+)
+from hand_models.hand import Placement, settle_hands
+from hand_models.rock import Mesh
+from hand_models.rock.smoothing import Scale, smoothed_outline
+from hand_models.rock.triangle_cells import TriangleCells
+from hand_models.sections import Section
+from tests.benchmarks.race import race
+from tests.benchmarks.results import Line, Table, span, times
+from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.rocks import fractal_wall
+
+__all__ = ["placement_tables"]
+
+HANDS = 32
+"""Placed together."""
+
+Plane = tuple[ArrayLike, ArrayLike, ArrayLike]
+
+
+class Watched(Mesh):
+    """A mesh that tells in which planes it was cut."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.planes: list[Plane] = []
+
+    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        self.planes.append((origin, s_axis, t_axis))
+        return super().section(origin, s_axis, t_axis)
+
+    def pieces(self, plane: Plane) -> list[np.ndarray]:
+        return self._pieces(*plane)
+
+
+def placement_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
+    """Measure, with so many rounds, hands all over a wall of 1 m² and 400,000 triangles."""
+    wall = Watched(*fractal_wall(0, size=1.0, count=448, height=0.01), anywhere=True)
+    trials = grid_of_trials(wall, 0.1, 4, (0.0, math.pi), radius=0.055)
+    chosen = np.random.default_rng(0).permutation(len(trials))[:HANDS]
+    placements = [
+        Placement(
+            wall,
+            ROCK,
+            Grasp(each.outer_rotation),
+            None,
+            approach_frame(each.point, each.approach, each.wrist_angle),
+        )
+        for each in (trials[i] for i in chosen)
+    ]
+    seats = [HAND.seat(each.hold, each.grasp, each.at) for each in placements]
+    wall.planes.clear()
+    hands = [each for each in settle_hands(HAND, placements) if isinstance(each, SettledHand)]
+    planes, scale = wall.planes, Scale.of()
+    pieces = [wall.pieces(plane) for plane in planes]
+    cells, reach = TriangleCells(wall.triangles), scale.reach
+    seated = [
+        each._replace(hold_in_hand=own.pose, at=None)
+        for each, own in zip(placements, seats, strict=True)
+    ]
+
+    def crop(plane: Plane) -> object:
+        origin, s, t = (np.asarray(values, dtype=float) for values in plane)
+        axes, beside = np.array([np.cross(s, t), s, t]), np.array([0.0, reach, reach])
+        return cells.within(axes, axes @ origin - beside, axes @ origin + beside)
+
+    def supports(hands: list[SettledHand]) -> list[float]:
+        # of copies, which nobody has asked yet
+        return [space.support(PULL_OFF) for space in wrench_spaces(list(map(replace, hands)))]
+
+    made = len(planes)
+    timed = race(
+        {
+            "all": lambda _: settle_hands(HAND, placements),
+            "crop": lambda _: [crop(plane) for plane in planes[:made]],
+            "cut": lambda _: [wall.pieces(plane) for plane in planes[:made]],
+            "smooth": lambda _: [smoothed_outline(each, scale) for each in pieces],
+            "seat": lambda _: [HAND.seat(each.hold, each.grasp, each.at) for each in placements],
+            "close": lambda _: settle_hands(HAND, seated),
+            "set": lambda _: supports(hands),
+            "robust": lambda k: robustness(HAND, hands[k % len(hands)], PULL_OFF, seed=k),
+        },
+        rounds,
+        tick,
+    )
+
+    def line(what: str, name: str) -> Line:
+        each = timed.median(name) / HANDS
+        return Line(what, (span(each), f"{1.0 / each:.0f}", times(timed.ratio(name, "all"))))
+
+    return [
+        Table(
+            f"Hands placed on a scan of 400,000 triangles, {HANDS} together, on one core",
+            ("median of each", "a second", "× placed"),
+            [
+                line("**placed: seated and closed**", "all"),
+                line("the triangles near its cuts (crop)", "crop"),
+                line("its cuts, crop and all", "cut"),
+                line("these smoothed", "smooth"),
+                line("seated, with the cuts that needs", "seat"),
+                line("closed where it is seated, with the cuts that needs", "close"),
+                line("its wrench set, and how far that reaches", "set"),
+            ],
+            f"{made / HANDS:.1f} cuts each. The 50 draws of one hand's robustness take "
+            f"{span(timed.median('robust'))}.",
+        )
+    ]
