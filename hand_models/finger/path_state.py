@@ -60,11 +60,14 @@ CATCHING: Final = 0.25
 """How much of the path it is that spines across gaps are drawn in, in parts of the closing tension.
 """
 
+TINY: Final = 1e-7
+"""By which joints are turned for derivatives [rad]."""
+
+POSES: Final = np.concatenate([np.zeros((1, JOINTS)), TINY * np.eye(JOINTS)])
+"""Turns of the joints at which a finger is looked at: itself, and with each joint turned."""
+
 LATER: Final = np.triu(np.ones((JOINTS, JOINTS)))
 """Which phalanges turn a joint, (i, j): its own and those beyond."""
-
-BETWEEN: Final = (LATER[..., None] * LATER.T[None] > 0.0) & (np.tri(JOINTS, k=-1).T[:, None] > 0.0)
-"""Whether joint k is beyond joint i, and phalanx j not before it, (i, j, k)."""
 
 EYE: Final = np.eye(JOINTS)
 
@@ -158,35 +161,21 @@ class Around(NamedTuple):
     def of(cls, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> Around:
         """Look at fingers turned by q."""
         points, lengths = nearest_points(rock, shape, q)
-        joints, u = fan_out(q, shape.end)
-        beside = shape.beside(points, lengths, joints, u, drive.depth)
-        place, push = beside.place, beside.push
-        # from joint i to joint j along the axes of phalanx j
-        between = LATER * (joints[:, None, :] - joints[:, :, None]) * u.conj()[:, None, :]
-
-        def turned(change: NDArray[Any]) -> NDArray[Any]:
-            """Return how numbers of phalanges j change as joints k turn, (n, j, k)."""
-            along, above = -between.imag.swapaxes(1, 2), between.real.swapaxes(1, 2)
-            turn, move, lift = (change[..., i, None] for i in range(3))
-            return np.asarray(LATER.T * (turn + along * move + above * lift))
-
-        d_gap, d_tile_gap, d_place, d_push = map(turned, beside[4:])
+        joints, u = fan_out(q[:, None] + POSES, shape.end)
+        beside = shape.beside(points[:, None], lengths[:, None], joints, u, drive.depth[:, None])
         # a phalanx that presses aside, with its end, has its spines beside the rock
-        near = engaged_share(beside.tile_gap, shape.travel)
-        share = engaged_share(1.0 - near * push.imag, 1.0)
-        grows = (beside.tile_gap > 0.0) & (near > 0.0)
-        d_near = np.where(grows[..., None], -d_tile_gap / shape.travel, 0.0)
-        grows = (share > 0.0) & (near * push.imag < 1.0)
-        d_share = d_near * push.imag[..., None] + near[..., None] * d_push.imag
-        d_share = np.where(grows[..., None], d_share, 0.0)
+        share = engaged_share(beside.tile_gap, shape.travel)
+        share = engaged_share(1.0 - share * beside.push.imag, 1.0)
         # from joint i to contact j, in the axes of its force
-        arms = LATER * (place[:, None, :] + between)
-        swings = np.where(BETWEEN, between.swapaxes(1, 2)[:, None] - between[..., None], 0.0)
-        d_arms = (LATER[..., None] * d_place[:, None] + 1j * swings) * push.conj()[:, None, :, None]
-        d_arms += arms[..., None] * d_push.conj()[:, None]
-        arms = arms * push.conj()[:, None, :]
-        a, b, d_a, d_b = -arms.real, -arms.imag, -d_arms.real, -d_arms.imag
-        return cls(beside.gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
+        arms = (joints + beside.place * u)[..., None, :] - joints[..., None]
+        arms = LATER * arms * (beside.push * u).conj()[..., None, :]
+        values = (beside.gap, share, -arms.real, -arms.imag)
+        gap, share, a, b = (value[:, 0] for value in values)
+        d_gap, d_share, d_a, d_b = (
+            np.moveaxis((value[:, 1:] - value[:, :1]) / TINY, 1, -1) for value in values
+        )
+        place, push = beside.place[:, 0], beside.push[:, 0]
+        return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
 
 
 class State(NamedTuple):

@@ -30,7 +30,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array
 from hand_models.finger.model import FingerModel
 from hand_models.sections import Complexes, Outlines
 
@@ -54,9 +54,6 @@ LEVEL: Final = 1e-12
 
 TINY: Final = 1e-30
 
-MOTIONS: Final = 3
-"""Of a phalanx in its plane."""
-
 Pressed = TypeVar("Pressed", float, NDArray[Any])
 
 
@@ -73,20 +70,12 @@ class Beside(NamedTuple):
         Where the force of a contact acts [m].
     push : ndarray of complex
         Unit vector toward the rock along which it acts.
-    d_gap, d_tile_gap : ndarray, shape (..., 3)
-    d_place, d_push : ndarray of complex, shape (..., 3)
-        How these change as the phalanx turns about its joint [1/rad], and as it moves along itself
-        and to its upper side [1/m].
     """
 
     gap: Array
     tile_gap: Array
     place: Complexes
     push: Complexes
-    d_gap: Array
-    d_tile_gap: Array
-    d_place: Complexes
-    d_push: Complexes
 
 
 class PhalanxShape(NamedTuple):
@@ -151,148 +140,51 @@ class PhalanxShape(NamedTuple):
         depth : ndarray, shape (...)
             How far their tiles are pressed in [m].
         """
-        shape = joint.shape
-        seen = ((points - joint[..., None]) * u.conj()[..., None]).reshape(-1, points.shape[-1])
-        from_tile, from_end = self._from_axis(seen)
-        depths = np.minimum(from_tile, from_end) - self.radius
-        lengths = np.broadcast_to(lengths, (*shape, lengths.shape[-1])).reshape(seen.shape)
-        depth = np.broadcast_to(depth, shape).ravel()
-        bed = self._bed(depths, lengths, depth)
-        gap = bed.level - self.fine
-        pressed = np.maximum((gap + depth)[bed.row] - bed.depth, 0.0) * bed.length
-        # of each point, where it is, the way out to it, and how much the foot of that moves
-        z = seen[bed.row, bed.column]
-        out, bends = self._out(z)
-        foot = z - bed.depth * out
-        total = np.maximum(bed.sums(pressed), TINY)
-        place, push = bed.sums(pressed * foot) / total, bed.sums(pressed * out) / total
-        # how points move off the axis, and along it, as the phalanx turns and moves
-        away, beside = _motions(z, out)
-        load = np.maximum(bed.level[bed.row] - bed.depth, 0.0) * bed.length
-        d_gap = bed.sums(load * away) / np.maximum(bed.sums(load), TINY)
-        d_pressed = np.where(pressed > 0.0, bed.length * (d_gap[:, bed.row] - away), 0.0)
-        d_out = 1j * out * beside * bends
-        d_foot = 1j * out * beside * (1.0 - bends * bed.depth)
-        d_total = bed.sums(d_pressed)
-        d_place = (bed.sums(d_pressed * foot + pressed * d_foot) - place * d_total) / total
-        d_push = (bed.sums(d_pressed * out + pressed * d_out) - push * d_total) / total
-        size = np.maximum(np.abs(push), TINY)
-        push = push / size
-        d_push = 1j * push * (d_push * push.conj()).imag / size
-        nearest = from_tile.argmin(axis=-1)
-        rows = np.arange(len(seen))
-        tile_gap, z = from_tile[rows, nearest] - self.radius, seen[rows, nearest]
-        d_tile_gap, _ = _motions(z, _unit(z - (z.real.clip(self.near, self.far) + 1j * self.lift)))
-
-        def rates(values: NDArray[Any]) -> NDArray[Any]:
-            return np.moveaxis(values, 0, -1).reshape(*shape, MOTIONS)
-
+        seen = (points - joint[..., None]) * u.conj()[..., None]
+        away, from_tile = self._from_axis(seen)
+        size = np.abs(away)
+        depths = size - self.radius
+        gap = self._level(depths, lengths) - self.fine
+        pressed = np.maximum((gap + depth)[..., None] - depths, 0.0) * lengths
+        total = np.maximum(pressed.sum(axis=-1), TINY)
+        out = away / np.maximum(size, TINY)
+        place = (pressed * (seen - away + self.radius * out)).sum(axis=-1) / total
+        push = (pressed * out).sum(axis=-1) / total
         return Beside(
-            gap.reshape(shape),
-            tile_gap.reshape(shape),
-            place.reshape(shape),
-            push.reshape(shape),
-            rates(d_gap),
-            rates(d_tile_gap),
-            rates(d_place),
-            rates(d_push),
+            gap,
+            from_tile.min(axis=-1) - self.radius,
+            place,
+            push / np.maximum(np.abs(push), TINY),
         )
 
-    def _from_axis(self, seen: Complexes) -> tuple[Array, Array]:
-        """Return how far points are from the axis under the tile, and from the rest of it [m]."""
-        x, y = np.ascontiguousarray(seen.real), seen.imag - self.lift
-        across = x - np.clip(x, self.near, self.far)
-        from_tile = np.sqrt(across * across + y * y)
-        x -= self.far
-        run, fall = self.end - self.far, -self.lift
-        part = np.clip((x * run + y * fall) / (run * run + fall * fall), 0.0, 1.0)
-        x -= part * run
-        y -= part * fall
-        return from_tile, np.sqrt(x * x + y * y)
-
-    def _out(self, z: Complexes) -> tuple[Complexes, Array]:
-        """Return unit vectors from the axis to points, and how much they turn as these move [1/m].
-
-        Beside the ends of the axis' parts they do, elsewhere not at all.
-        """
-        foot = z.real.clip(self.near, self.far) + 1j * self.lift
+    def _from_axis(self, seen: Complexes) -> tuple[Complexes, Array]:
+        """Return the way to points from the axis; and how far from under the tile they are [m]."""
+        from_tile = seen - (np.clip(seen.real, self.near, self.far) + 1j * self.lift)
         corner, step = complex(self.far, self.lift), complex(self.end - self.far, -self.lift)
-        part = ((z - corner) * step.conjugate()).real / abs(step) ** 2
-        beyond = corner + part.clip(0.0, 1.0) * step
-        under = np.abs(z - foot) <= np.abs(z - beyond)
-        along = np.where(
-            under, (z.real > self.near) & (z.real < self.far), (part > 0.0) & (part < 1.0)
-        )
-        away = z - np.where(under, foot, beyond)
-        return _unit(away), np.where(along, 0.0, 1.0 / np.maximum(np.abs(away), TINY))
+        part = ((seen - corner) * step.conjugate()).real / abs(step) ** 2
+        beyond = seen - (corner + np.clip(part, 0.0, 1.0) * step)
+        distance = np.abs(from_tile)
+        return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
 
-    def _bed(self, depths: Array, lengths: Array, depth: Array) -> _Bed:
-        """Return points that may be in beds, and the level to which these sink [m].
-
-        That is where ‖√w max(0, h − g)‖, which is convex in h, takes the energy. Beds are then
-        pressed in by ``depth``.
-        """
+    def _level(self, depths: Array, lengths: Array) -> Array:
+        """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
         root = self.fine * np.sqrt(self.far - self.near)
-        rows, least = np.arange(len(depths)), depths.argmin(axis=-1)
+        least = depths.argmin(axis=-1)[..., None]
         # no lower than with the nearest point alone
-        alone = root / np.sqrt(lengths[rows, least])
-        level = depths[rows, least] + np.minimum(alone, self.far)
-        row, column = (depths <= (level + depth)[:, None]).nonzero()
-        begin = np.searchsorted(row, rows)
-        bed = _Bed(row, column, begin, level, depths[row, column], lengths[row, column])
+        alone = np.take_along_axis(lengths, least, axis=-1)[..., 0]
+        level = np.take_along_axis(depths, least, axis=-1)[..., 0]
+        level = level + np.minimum(root / np.sqrt(alone), self.far)
         for _ in range(MOST_STEPS):
-            sunk = np.maximum(level[row] - bed.depth, 0.0)
-            load = bed.length * sunk
-            norm = np.sqrt(bed.sums(load * sunk))
-            step = (root - norm) * norm / np.maximum(bed.sums(load), TINY)
+            sunk = np.maximum(level[..., None] - depths, 0.0)
+            load = lengths * sunk
+            norm = np.sqrt((load * sunk).sum(axis=-1))
+            step = (root - norm) * norm / np.maximum(load.sum(axis=-1), TINY)
             # each as far as it needs, whatever others do
             going = np.abs(step) > LEVEL * self.far
             level = np.where(going, level + step, level)
             if not going.any():
                 break
-        return bed._replace(level=level)
-
-
-class _Bed(NamedTuple):
-    """Points near n phalanges, and the level of the bed on them.
-
-    Attributes
-    ----------
-    row, column : ndarray of int, shape (b,)
-        Phalanx and number of each, in order.
-    begin : ndarray of int, shape (n,)
-        Where those of each phalanx begin; each has one at least.
-    level : ndarray, shape (n,)
-        [m]
-    depth, length : ndarray, shape (b,)
-        [m]
-    """
-
-    row: Indices
-    column: Indices
-    begin: Indices
-    level: Array
-    depth: Array
-    length: Array
-
-    def sums(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the sums over the points of each phalanx."""
-        return np.add.reduceat(values, self.begin, axis=-1)
-
-
-def _unit(away: Complexes) -> Complexes:
-    return np.asarray(away / np.maximum(np.abs(away), TINY))
-
-
-def _motions(z: Complexes, out: Complexes) -> tuple[Array, Array]:
-    """Return the parts along ``out``, and across it, of how points move in a phalanx's axes.
-
-    As it turns by a radian about its joint and moves by a metre along itself, and to its upper
-    side; shape (3, ...).
-    """
-    turned = -1j * z * out.conj()
-    away = np.stack([turned.real, -out.real, -out.imag])
-    return away, np.stack([turned.imag, out.imag, -out.real])
+        return np.asarray(level)
 
 
 def middle_of_bed(reaches: Iterable[Pressed], bends: Iterable[float], depth: float) -> Pressed:
