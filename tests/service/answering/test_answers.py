@@ -169,7 +169,6 @@ def test_an_overloaded_stance_still_has_its_best_plan() -> None:
         (SolverError("no"), "internal"),
         (RuntimeError("no"), "internal"),
         (RecursionError("no"), "internal"),
-        (MemoryError("no"), "internal"),
     ],
 )
 def test_whatever_the_planner_does_the_caller_gets_an_error(
@@ -184,6 +183,15 @@ def test_whatever_the_planner_does_the_caller_gets_an_error(
     assert ("Traceback" in caplog.text) == (kind == "internal")
     if kind == "internal":
         assert type(error).__name__ in message
+
+
+def test_a_lack_of_memory_is_for_the_process_to_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(solving, "plan", fail)
+    with pytest.raises(MemoryError):
+        refusal(wall_request())
 
 
 # Wrench spaces ------------------------------------------------------------------------------------
