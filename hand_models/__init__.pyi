@@ -2,6 +2,7 @@ from .base import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
     InvalidInputError as InvalidInputError,
+    LimitError as LimitError,
     Pose as Pose,
 )
 from .compliance import CompliantHand as CompliantHand, FloatingWrist as FloatingWrist

@@ -299,6 +299,8 @@ class WrenchSpace:
         ------
         EmptySetError
             If nothing is left at u = 1.
+        LimitError
+            If the vertices to go through are too many, as `sizes`, or not to be told apart.
         """
         scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
@@ -306,13 +308,7 @@ class WrenchSpace:
         )
 
     def vertices(self) -> Array:
-        """Return the extreme wrenches of the set at u = 1, shape (n, 6).
-
-        Raises
-        ------
-        EmptySetError
-            If nothing is left at u = 1.
-        """
+        """Return the extreme wrenches of the set at u = 1 (n, 6); raises as `half_spaces`."""
         directions, reach = self._sum.axes
         return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / SCALE)
 

@@ -16,6 +16,7 @@ from hand_models import (
     EmptySetError,
     Grasp,
     InvalidInputError,
+    LimitError,
     Plane,
     Pose,
     Sphere,
@@ -60,6 +61,9 @@ def stress(hold, surface, grasp, pose):
             vertices, faces = space.vertices(), space.half_spaces()
         except EmptySetError:
             return "empty"
+        except LimitError:
+            assert np.isfinite([space.support(direction) for direction in np.eye(6)]).all()
+            return "held"
         assert len(vertices) >= 1
         assert np.isfinite(vertices).all()
         off = vertices @ faces.equation_normals.T - faces.equation_offsets
@@ -151,17 +155,8 @@ def test_a_joint_in_the_middle_of_a_ball_is_no_division_by_zero():
     assert stress(Sphere(1e-3), ROCK, Grasp(), pose) in ("held", "empty")
 
 
-MANY_VERTICES = (1e5, 6.5)
-"""Strength and closing tension with which one set has vertices for half a minute."""
-
-
-@pytest.mark.parametrize(
-    ("strength", "closing"),
-    [
-        pytest.param(*case, marks=pytest.mark.slow if case == MANY_VERTICES else ())
-        for case in itertools.product((1e-3, 1.0, 1e5), (6.5, 37.0, 700.0))
-    ],
-)
+@pytest.mark.parametrize("strength", [1e-3, 1.0, 1e5])
+@pytest.mark.parametrize("closing", [6.5, 37.0, 700.0])
 def test_strengths_and_closing_tensions_of_any_size(strength, closing):
     for half_planes, lateral in ((1, True), (3, False)):
         surface = Surface.from_values({"shear_limit": strength, "half_planes": half_planes})
