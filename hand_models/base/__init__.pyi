@@ -1,5 +1,4 @@
 from .bounded_store import BoundedStore as BoundedStore
-from .child_processes import begin_child as begin_child, starting_children as starting_children
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,

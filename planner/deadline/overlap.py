@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import ContextVar
-from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
 __all__ = ["Overlap", "begin_overlap", "waiting"]
@@ -40,12 +39,7 @@ class Overlap(Generic[T]):
         waiting.set(self)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         waiting.set(None)
 
     def result(self) -> T:

@@ -1,7 +1,7 @@
+from .child_processes import begin_child as begin_child, spawned as spawned
 from .workers import (
     Lost as Lost,
     Worker as Worker,
     Workers as Workers,
     cores as cores,
-    one_thread as one_thread,
 )

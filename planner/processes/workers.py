@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-import multiprocessing
 import os
 import sys
 import threading
@@ -16,15 +15,14 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
-from hand_models.base import begin_child, starting_children
+from planner.processes.child_processes import begin_child, spawned
 
-__all__ = ["Lost", "Worker", "Workers", "cores", "one_thread"]
+__all__ = ["Lost", "Worker", "Workers", "cores"]
 
 log = logging.getLogger(__name__)
 
@@ -56,9 +54,6 @@ UNCAUGHT: Final = 1
 
 UNREADY: Final = 70
 """Status of a process that cannot be made ready for its work."""
-
-THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""What keeps a library of linear algebra to one thread, before it is loaded."""
 
 
 class Lost:
@@ -111,12 +106,7 @@ class Workers(Generic[T, R]):
         self._hire()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         for worker in self.running:
             worker.pipe.close()
         until = time.monotonic() + (PATIENCE if error is None else 0.0)
@@ -243,16 +233,7 @@ class Worker(Generic[T, R]):
     """
 
     def __init__(self, make: Callable[[], Callable[[T], R]]) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, other = context.Pipe()
-        self.process = context.Process(target=_work, args=(other,), daemon=True)
-        with one_thread(), starting_children():
-            self.process.start()
-        # the process has the other end alone, so that its death ends the pipe
-        other.close()
-        # what it is to make may be large: by this pipe, of which a death is told
-        with suppress(OSError):
-            self.pipe.send(make)
+        self.process, (self.pipe,) = spawned(_work, make)
         self.ready = False
         self.hand: set[int] = set()
         self._last: set[int] = set()
@@ -294,9 +275,10 @@ class Worker(Generic[T, R]):
             self.process.join()
 
 
-def _work(pipe: Connection) -> None:
+def _work(pipes: list[Connection]) -> None:
     """Do chunks of work until nobody sends any more; what a process of `Workers` runs."""
     begin_child()
+    (pipe,) = pipes
     try:
         make: Callable[[], Callable[[Any], Any]] = pipe.recv()
     except (EOFError, OSError):
@@ -331,18 +313,3 @@ def _receive(pipe: Connection, chunks: SimpleQueue[Any]) -> None:
                 chunks.put(pipe.recv())
     finally:
         chunks.put(None)
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let processes that are started here do their linear algebra on one thread."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

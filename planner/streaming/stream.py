@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import wait
-from types import TracebackType
 from typing import Final, Self
 
 from numpy.typing import ArrayLike
@@ -113,12 +112,7 @@ class WrenchStream:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import msgspec
@@ -209,8 +207,7 @@ def set_points(
 class _Service(NamedTuple):
     """What is asked at a key, and who answers.
 
-    ``streams``: whether the answer is of one of the streams. ``waits``: whether it waits for its
-    turn; one that does not has to be safe beside any other.
+    ``streams``: whether the answer is of one of the streams.
     """
 
     request: (
@@ -222,7 +219,6 @@ class _Service(NamedTuple):
     )
     answer: Callable[..., msgspec.Struct]
     streams: bool = False
-    waits: bool = True
 
 
 SERVICES: Final[dict[str, _Service]] = {
@@ -230,7 +226,7 @@ SERVICES: Final[dict[str, _Service]] = {
     WRENCH_SPACE: _Service(WrenchSpaceRequest, wrench_space),
     BODY_SPACE: _Service(BodySpaceRequest, body_space),
     STREAM: _Service(StreamRequest, stream, streams=True),
-    SET_POINTS: _Service(SetPointsRequest, set_points, streams=True, waits=False),
+    SET_POINTS: _Service(SetPointsRequest, set_points, streams=True),
 }
 """By the last part of the key."""
 
@@ -243,7 +239,6 @@ def handle(
     robots: Robots = ROBOTS,
     *,
     started: float | None = None,
-    turn: threading.Lock | None = None,
     streams: Streams = STREAMS,
     files: MeshFiles | None = None,
 ) -> Answer:
@@ -263,8 +258,6 @@ def handle(
         Those that may be asked about.
     started : float, optional
         When a request's deadline began, on the clock of `time.perf_counter`; now by default.
-    turn : Lock, optional
-        Held while the request is answered; it is waited for no longer than the deadline.
     streams : Streams, optional
         Those that may be asked; by default those of this process that belong to no service.
     files : MeshFiles, optional
@@ -286,8 +279,7 @@ def handle(
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
         about = (request, robots, streams) if service.streams else (request, robots)
-        turn = turn if service.waits else None
-        with deadline.within(request.deadline, started=started), _taking(turn):
+        with deadline.within(request.deadline, started=started):
             deadline.check("an answer was begun")
             reply = service.answer(*about)
         status: str = getattr(reply, "status", "done")
@@ -307,18 +299,3 @@ def handle(
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
         coded = encode_error("internal", excuse, form, identifier(payload, form, kind))
         return Answer(*coded, False, "internal")
-
-
-@contextmanager
-def _taking(turn: threading.Lock | None) -> Iterator[None]:
-    """Hold a lock, if there is one, and if it can be had before the deadline."""
-    if turn is None:
-        yield
-        return
-    left, seconds = deadline.left(), deadline.seconds()
-    if not turn.acquire(timeout=-1.0 if left is None else left):
-        raise DeadlineError(seconds or 0.0, "other questions were answered")
-    try:
-        yield
-    finally:
-        turn.release()

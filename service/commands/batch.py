@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
-from types import TracebackType
 from typing import IO, TYPE_CHECKING, Final, Self
 
 import click
@@ -81,12 +80,7 @@ class _Replies:
                 raise unwritten(error, self._file, "-o") from None
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._file is not None and self._out is not None:
             self._out.close()
 

@@ -24,7 +24,7 @@ from service.commands.options import (
 )
 from service.commands.stances import read_request
 from service.commands.terminal import draw_plan, note, say, show
-from service.requests import LONGEST_DEADLINE
+from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving import (
     CruxClient,
     listening,
@@ -60,7 +60,7 @@ DEMO_STANCE: Final = "wall-300-joints"
     "--deadline",
     "seconds",
     type=click.FloatRange(0.0, min_open=True, max=LONGEST_DEADLINE),
-    default=10.0,
+    default=DEFAULT_DEADLINE,
     show_default=True,
     metavar="SECONDS",
     help="Of a question that names none, from its arrival.",

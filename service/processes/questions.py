@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
@@ -65,7 +64,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
 
     robots = robots_of(robot)
     build_ahead(len(builder_of(None, robots)(None).shoulders))
-    streams, turn = Streams(), threading.Lock()
+    streams = Streams()
 
     def answer(job: Job) -> Done:
         start = time.perf_counter()
@@ -80,7 +79,6 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
                     hand,
                     robots,
                     started=arrived,
-                    turn=turn,
                     streams=own,
                 )
         finally:

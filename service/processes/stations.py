@@ -5,7 +5,6 @@ A process can be killed at any time, which costs the questions in its lanes and 
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import sys
 import threading
@@ -14,8 +13,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Final, Generic, TypeVar
 
-from hand_models.base import begin_child, starting_children
-from planner.processes import one_thread
+from planner.processes import begin_child, spawned
 
 __all__ = ["Lane", "Make", "Station", "resident"]
 
@@ -97,19 +95,8 @@ class Station(Generic[T, R]):
     """
 
     def __init__(self, make: Make[T, R], lanes: int, memory: int | None) -> None:
-        context = multiprocessing.get_context("spawn")
-        pipes = [context.Pipe() for _ in range(lanes)]
-        others = [other for _, other in pipes]
-        self.process = context.Process(target=_answer_each, args=(others, memory), daemon=True)
-        with one_thread(), starting_children():
-            self.process.start()
-        for other in others:
-            # the process has the other ends alone, so that its death ends the pipes
-            other.close()
-        self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(pipes))
-        # what it is to make may be large: by a pipe, of which a death is told
-        with suppress(OSError):
-            self.lanes[0].pipe.send(make)
+        self.process, pipes = spawned(_answer_each, make, memory, pipes=lanes)
+        self.lanes = tuple(Lane(self, i, pipe) for i, pipe in enumerate(pipes))
 
     @property
     def ready(self) -> bool:

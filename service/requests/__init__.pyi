@@ -19,6 +19,7 @@ from .limits import (
 )
 from .plan import PlanRequest as PlanRequest, Want as Want
 from .request import (
+    DEFAULT_DEADLINE as DEFAULT_DEADLINE,
     LONGEST_DEADLINE as LONGEST_DEADLINE,
     Detail as Detail,
     Identifier as Identifier,

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, Literal
 from msgspec import Meta, Struct
 
 __all__ = [
+    "DEFAULT_DEADLINE",
     "LONGEST_DEADLINE",
     "Acceleration",
     "AccelerationEntry",
@@ -57,6 +58,9 @@ Tensions = Annotated[
 Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
+DEFAULT_DEADLINE: Final = 10.0
+"""Of a question to a service that names none, from its arrival [s]."""
+
 LONGEST_DEADLINE: Final = 600.0
 """[s]"""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import time
-from types import TracebackType
 from typing import Final, Self, TypeVar
 
 import msgspec
@@ -105,12 +104,7 @@ class CruxClient:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

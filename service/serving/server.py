@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from types import TracebackType
 from typing import Final, Self
 
 import zenoh
@@ -19,18 +18,16 @@ from planner.processes import cores
 from planner.robots import RobotFile
 from service.answering import SERVICES, robots_of
 from service.processes import Done, Job, Make, answering
+from service.requests import DEFAULT_DEADLINE
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.serving.watch import Told
 from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, service_key
 
-__all__ = ["MEMORY", "SECONDS", "PlanService"]
+__all__ = ["MEMORY", "PlanService"]
 
 SEARCH: Final = 1.0
 """How long another service of the same robot is looked for at most [s]."""
-
-SECONDS: Final = 10.0
-"""Deadline of a question that names none, from where it comes [s]."""
 
 MEMORY: Final = 2 * 2**30
 """Bytes that a process may have by default, where the system can keep it to them."""
@@ -84,7 +81,7 @@ class PlanService:
         hand: ParameterTable | None = None,
         *,
         workers: int | None = None,
-        seconds: float = SECONDS,
+        seconds: float = DEFAULT_DEADLINE,
         memory: int = MEMORY,
         make: Make[Job, Done] | None = None,
     ) -> None:
@@ -144,12 +141,7 @@ class PlanService:
         self._token = self._session.liveliness().declare_token(self._alive)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._token is not None:
             self._token.undeclare()
         self._dispatcher.stop()

@@ -487,18 +487,6 @@ def test_the_clock_of_a_query_starts_where_it_is_taken():
     assert reply["error"]["message"].startswith("500 s were over before ")
 
 
-def test_a_query_waits_for_others_no_longer_than_its_deadline():
-    turn = threading.Lock()
-    assert handled(wall_request(), turn=turn)["status"] == "optimal"
-    with turn:
-        reply = handled(wall_request() | {"deadline": 0.01}, turn=turn)
-    assert reply["error"]["kind"] == "deadline"
-    assert reply["error"]["message"] == (
-        "0.01 s were over before other questions were answered; allow longer"
-    )
-    assert handled(wall_request() | {"deadline": LONG}, turn=turn)["status"] == "optimal"
-
-
 @pytest.mark.parametrize("value", [0, -1.5, "soon", [1]])
 def test_a_deadline_that_cannot_be_is_refused_by_name(value):
     reply = handled(wall_request() | {"deadline": value})

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from planner.processes.workers import NO_GUARD, THREADS, Lost, Workers
+from planner.processes.child_processes import THREADS
+from planner.processes.workers import NO_GUARD, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
 

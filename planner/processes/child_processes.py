@@ -1,0 +1,128 @@
+"""Processes that are started here end with this one, and leave signals to it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from types import FrameType
+from typing import Any, Final
+
+__all__ = ["begin_child", "spawned"]
+
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+
+ORPHANED: Final = 1.0
+"""How long a process may go on without the one that started it [s]."""
+
+THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""What keeps a library of linear algebra to one thread, before it is loaded."""
+
+
+def spawned(
+    run: Callable[..., None], first: object, *more: object, pipes: int = 1
+) -> tuple[BaseProcess, list[Connection]]:
+    """Start a process; return it, and its pipes.
+
+    It does its linear algebra on one thread.
+
+    Parameters
+    ----------
+    run : callable
+        Called in the process with a list of the pipes' other ends, and ``more``; it is to call
+        `begin_child` first.
+    first : object
+        Is sent through the first pipe; it may be large.
+    more : object
+        Small.
+    pipes : int, optional
+        How many.
+    """
+    context = multiprocessing.get_context("spawn")
+    ends = [context.Pipe() for _ in range(pipes)]
+    others = [other for _, other in ends]
+    process = context.Process(target=run, args=(others, *more), daemon=True)
+    with _one_thread(), _starting_children():
+        process.start()
+    for other in others:
+        # the process has the other ends alone, so that its death ends the pipes
+        other.close()
+    own = [pipe for pipe, _ in ends]
+    # by a pipe, of which a death is told
+    with suppress(OSError):
+        own[0].send(first)
+    return process, own
+
+
+def begin_child(*, stays: bool = False) -> None:
+    """Leave Ctrl-C to the process that started this one, and end soon after that one does.
+
+    Parameters
+    ----------
+    stays : bool, optional
+        Whether SIGTERM is left to that one, too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN if stays else signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        time.sleep(ORPHANED)
+        os._exit(1)
+
+
+@contextmanager
+def _starting_children() -> Iterator[None]:
+    """Start processes that call `begin_child`: no signal interrupts that on either side.
+
+    One that arrives here meanwhile is answered at the end; there it waits for `begin_child`.
+    """
+    # or else it is started with the first process, and lets signals in again
+    resource_tracker.ensure_running()
+    arrived: list[int] = []
+
+    def later(number: int, _: FrameType | None) -> None:
+        arrived.append(number)
+
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for each in SIGNALS:
+            if signal.getsignal(each) not in (None, signal.SIG_IGN):
+                handlers[each] = signal.signal(each, later)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        # what has waited here arrives now
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started here do their linear algebra on one thread."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
