@@ -9,6 +9,7 @@ process if it must be.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -161,11 +162,18 @@ class Dispatcher:
             self._crew.hire()
             self._deal()
         pipes = self._crew.pipes
-        for ready in wait([self._woken, *pipes], self._pause()):
-            if ready is self._woken:
-                self._take_in()
-            elif (lane := pipes[cast(Connection, ready)]) in self._crew.work:
+        ready = wait([self._woken, *pipes], self._pause())
+        for pipe in ready:
+            if (
+                pipe is not self._woken
+                and (lane := pipes[cast(Connection, pipe)]) in self._crew.work
+            ):
                 self._take_back(lane)
+        if self._woken in ready:
+            if len(ready) > 1 and self._stops_at is None:
+                # no lane waits for what has come
+                self._deal()
+            self._take_in()
         self._end_overdue()
         if self._crew.up or self._crew.stillborn >= STILLBORN:
             self._started.set()
@@ -186,15 +194,15 @@ class Dispatcher:
     def _pause(self) -> float | None:
         """Return how long there is nothing to do unless something comes [s]."""
         now = time.perf_counter()
-        times = [question.deadline for question in self._waiting]
+        times = [self._waiting.first_deadline()]
         for lane in self._crew.work:
             times += self._crew.ends(lane) or ()
         if self._stops_at is None:
             times.append(self._crew.rests_until)
         else:
             times += [self._stops_at, self._quiet_from]
-        later = [each - now for each in times if each > now]
-        return min(later) if later else None
+        least = min(each - now for each in [*times, math.inf] if each > now)
+        return None if least == math.inf else least
 
     # questions -----------------------------------------------------------------------------------
 
@@ -288,7 +296,7 @@ class Dispatcher:
     def _end_overdue(self) -> None:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
-        for question in self._waiting.remove(lambda each: each.deadline <= now):
+        for question in self._waiting.overdue(now):
             missing = "it was its turn, since the service is busy"
             self._refuse(question, DeadlineError(question.seconds, missing))
         for lane, asked in list(self._crew.work.items()):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
+import itertools
+import math
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
@@ -19,6 +22,9 @@ ALL: Final = 256
 
 HELD: Final = 2**28
 """Bytes of all questions that wait."""
+
+STALE: Final = 16
+"""Deadlines that are kept for each question that waits, of those that waited before."""
 
 
 class Kind(Enum):
@@ -44,10 +50,6 @@ class FairQueue:
 
     def __len__(self) -> int:
         return self._size
-
-    def __iter__(self) -> Iterator[Question]:
-        for questions in self._of.values():
-            yield from questions
 
     def has_room(self, client: str) -> bool:
         """Whether one more question of a client may wait."""
@@ -93,13 +95,12 @@ class Waiting:
         self._queues = {kind: FairQueue() for kind in Kind}
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
         self._bytes = 0
+        self._ends: list[tuple[float, int, Question]] = []
+        """A heap; also of questions that wait no longer."""
+        self._order = itertools.count()
 
     def __len__(self) -> int:
         return sum(map(len, self._queues.values()))
-
-    def __iter__(self) -> Iterator[Question]:
-        for queue in self._queues.values():
-            yield from queue
 
     def counts(self) -> dict[str, int]:
         """Return how many there are, by kind."""
@@ -114,13 +115,18 @@ class Waiting:
         """Let a question wait."""
         self._bytes += len(question.payload)
         self._queues[kind].put(question)
+        question.waits = True
+        heapq.heappush(self._ends, (question.deadline, next(self._order), question))
+        if len(self._ends) > STALE * (len(self) + 1):
+            self._ends = [end for end in self._ends if end[-1].waits]
+            heapq.heapify(self._ends)
 
     def take(self, *kinds: Kind) -> Question | None:
         """Return the next question of the first of some kinds that has one."""
         for kind in kinds:
             if self._queues[kind]:
                 question = self._queues[kind].take()
-                self._bytes -= len(question.payload)
+                self._let_go(question)
                 return question
         return None
 
@@ -146,5 +152,22 @@ class Waiting:
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
         gone = [each for queue in self._queues.values() for each in queue.remove(unwanted)]
-        self._bytes -= sum(len(question.payload) for question in gone)
+        for question in gone:
+            self._let_go(question)
         return gone
+
+    def first_deadline(self) -> float:
+        """Return when the first question's time is over; infinity where none waits."""
+        while self._ends and not self._ends[0][-1].waits:
+            heapq.heappop(self._ends)
+        return self._ends[0][0] if self._ends else math.inf
+
+    def overdue(self, now: float) -> list[Question]:
+        """Take out the questions whose time is over; return them."""
+        if self.first_deadline() > now:
+            return []
+        return self.remove(lambda each: each.deadline <= now)
+
+    def _let_go(self, question: Question) -> None:
+        question.waits = False
+        self._bytes -= len(question.payload)

@@ -92,10 +92,21 @@ def dear(endpoint: str) -> None:
 @click.argument("endpoint")
 def echo(endpoint: str) -> None:
     """Reply to each query with as many bytes as a plan has, until killed."""
+    reply_to_all(endpoint, b"x" * 33_000)
+
+
+@main.command()
+@click.argument("endpoint")
+def refuse(endpoint: str) -> None:
+    """Reply to each query with as many bytes as ``busy`` has, until killed."""
+    reply_to_all(endpoint, b"x" * 150)
+
+
+def reply_to_all(endpoint: str, reply: bytes) -> None:
+    """Reply to each query alike, until killed."""
     config = zenoh.Config()
     config.insert_json5("listen/endpoints", f'["{endpoint}"]')
     config.insert_json5("scouting/multicast/enabled", "false")
-    reply = b"x" * 33_000
 
     def answer(query: zenoh.Query) -> None:
         with query:
@@ -220,34 +231,51 @@ def throughput(seconds: float) -> None:
 @click.option("--seconds", default=60.0, show_default=True)
 @click.option("--times", "factor", default=5.0, show_default=True, help="Of what it can do.")
 def overload(seconds: float, factor: float) -> None:
-    """Ask several times as much as the service can answer, by four clients, and count."""
-    with served() as server:
+    """Ask several times as much as the service can answer, by four clients, and count.
+
+    The questions cost those who ask and refuse them time on the same cores. So what the service
+    answers while as many go to a bare replier is told, too.
+    """
+    where = free_endpoint()
+    with served() as server, other("refuse", where):
         rate(server.endpoint, 3.0, 2, 2)
         capacity = rate(server.endpoint, 10.0, 2, 2)
-        clients = [Client(server.endpoint) for _ in range(4)]
-        payloads, tally = new_stances(99), Tally()
-        start, gap = time.perf_counter(), 1.0 / (factor * capacity)
-        asked = 0
-        while (now := time.perf_counter()) < start + seconds:
-            due = start + asked * gap
-            if now < due:
-                time.sleep(due - now)
-            tally.late.append(max(0.0, now - due))
-            clients[asked % 4].send(tally, PLAN, next(payloads), "application/json")
-            asked += 1
-        good = tally.statuses["good"] / seconds
-        while sum(tally.statuses.values()) < asked and time.perf_counter() < start + seconds + 40.0:
-            time.sleep(0.1)
-        for client in clients:
-            client.close()
+        gap = 1.0 / (factor * capacity)
+        aside = threading.Thread(target=flood, args=(where, ECHO, gap, 12.0, Tally()))
+        aside.start()
+        floor = rate(server.endpoint, 10.0, 2, 2)
+        aside.join()
+        tally = Tally()
+        asked = flood(server.endpoint, PLAN, gap, seconds, tally)
+    good = tally.in_time / seconds
     console.print(f"capacity {capacity:.1f}/s; asked {asked / seconds:.1f}/s for {seconds:g} s")
     console.print(f"answered {good:.1f}/s: {good / capacity:.2f} of the capacity")
+    console.print(f"while as many go to a bare replier {floor:.1f}/s: {good / floor:.2f} of that")
     console.print(f"{dict(tally.statuses)} of {asked}")
     console.print(
         f"good ones p50 {percentile(tally.times, 0.5):.0f} ms, "
         f"p99 {percentile(tally.times, 0.99):.0f} ms"
     )
     console.print(f"the generator was late by p99 {percentile(tally.late, 0.99):.1f} ms")
+
+
+def flood(endpoint: str, key: str, gap: float, seconds: float, tally: Tally) -> int:
+    """Ask at a steady pace by four clients; return how many questions, once all have replies."""
+    clients = [Client(endpoint) for _ in range(4)]
+    payloads, asked, start = new_stances(99), 0, time.perf_counter()
+    while (now := time.perf_counter()) < start + seconds:
+        due = start + asked * gap
+        if now < due:
+            time.sleep(due - now)
+        tally.late.append(max(0.0, now - due))
+        clients[asked % 4].send(tally, key, next(payloads), "application/json")
+        asked += 1
+    tally.in_time = tally.statuses["good"]
+    while sum(tally.statuses.values()) < asked and time.perf_counter() < start + seconds + 40.0:
+        time.sleep(0.1)
+    for client in clients:
+        client.close()
+    return asked
 
 
 def resident(server: Served) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import itertools
-import json
 import random
 import time
 from collections import Counter
@@ -35,7 +34,7 @@ def new_wrenches(seed: int = 0) -> Iterator[bytes]:
     request = wall_request(mass=None)
     while True:
         request["body_wrench"] = [rng.uniform(-50, 50), rng.uniform(-50, 50), 400.0, 0.0, 0.0, 0.0]
-        yield json.dumps(request).encode()
+        yield msgspec.json.encode(request)
 
 
 def new_stances(seed: int = 0) -> Iterator[bytes]:
@@ -45,7 +44,7 @@ def new_stances(seed: int = 0) -> Iterator[bytes]:
     while True:
         for hand in request["stance"]["hands"]:
             hand["hold"]["diameter"] = rng.uniform(0.25, 0.35)
-        yield json.dumps(request).encode()
+        yield msgspec.json.encode(request)
 
 
 def dear_questions(seed: int = 0) -> Iterator[Asked]:
@@ -61,19 +60,19 @@ def dear_questions(seed: int = 0) -> Iterator[Asked]:
             numbers = {"shear_limit": 60.0, "pull_off_limit": 15.0, "pull_off_angle": 0.7}
             stance["hands"][0]["surface"] = numbers | {"half_planes": rng.choice([3, 5, 8, 64])}
             asked = {"v": 1, "stance": stance, "limb": stance["hands"][0]["limb"]}
-            yield WRENCH_SPACE, json.dumps(asked).encode(), "application/json"
+            yield WRENCH_SPACE, msgspec.json.encode(asked), "application/json"
         elif kind == 1:
             for hand in stance["hands"]:
                 hand["wrist"] = "floating"
                 hand["tendon_preload"] = [20.0] * 4
-            yield PLAN, json.dumps(request).encode(), "application/json"
+            yield PLAN, msgspec.json.encode(request), "application/json"
         elif kind == 2:
             directions = [[rng.gauss(0, 1) for _ in range(3)] for _ in range(100)]
             asked = {"v": 1, "stance": stance, "others": "free", "directions": directions}
-            yield BODY_SPACE, json.dumps(asked).encode(), "application/json"
+            yield BODY_SPACE, msgspec.json.encode(asked), "application/json"
         else:
             request["want"] = ["robust", "load_factor", "prices", "model"]
-            yield PLAN, json.dumps(request).encode(), "application/json"
+            yield PLAN, msgspec.json.encode(request), "application/json"
 
 
 def spoilt(seed: int = 0) -> Iterator[Asked]:
@@ -96,7 +95,7 @@ def mixed(seed: int = 0) -> Iterator[Asked]:
         elif kind < 0.25:
             yield next(bad)
         elif kind < 0.5:
-            yield PLAN, json.dumps(random_request(seed * 10**6 + i)).encode(), "application/json"
+            yield PLAN, msgspec.json.encode(random_request(seed * 10**6 + i)), "application/json"
         else:
             yield PLAN, next(known if kind < 0.8 else stances), "application/json"
 
@@ -109,6 +108,7 @@ class Tally:
     times: list[float] = field(default_factory=list)
     late: list[float] = field(default_factory=list)
     slowest: float = 0.0
+    in_time: int = 0
 
     def note(self, reply: zenoh.Reply | None, seconds: float) -> None:
         """Count what a question got."""
