@@ -91,9 +91,9 @@ def serve(
     and gives the keys its name.
     """
     stop = _StopSignal()
-    from service.serving import JsonLines, PlanService, closed, exposed
+    from service.serving import JsonLines, LogThread, PlanService, closed, exposed
 
-    handler = logging.StreamHandler()
+    handler = LogThread()
     form = logging.Formatter("crux: %(levelname)s: %(message)s")
     handler.setFormatter(JsonLines() if log_format == "json" else form)
     logging.basicConfig(handlers=[handler], level=logging.INFO if verbose else logging.WARNING)

@@ -8,5 +8,5 @@ from .config import (
     zenoh_config as zenoh_config,
     zenoh_options as zenoh_options,
 )
+from .log_lines import JsonLines as JsonLines, LogThread as LogThread
 from .server import PlanService as PlanService
-from .watch import JsonLines as JsonLines

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections import Counter as Counts
@@ -25,7 +24,7 @@ from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.serving.question import Question
 from service.wire import Format
 
-__all__ = ["JsonLines", "State", "Told", "Watch"]
+__all__ = ["State", "Told", "Watch"]
 
 log = logging.getLogger(__name__)
 
@@ -199,18 +198,6 @@ class _Now(Collector):
             if each.resident is not None:
                 memory.add_metric([str(each.pid), each.purpose], each.resident)
         yield memory
-
-
-class JsonLines(logging.Formatter):
-    """Log lines as JSON objects: time, level, message, and all of a question's fields."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        line: dict[str, object] = {"time": record.created, "level": record.levelname.lower()}
-        question = getattr(record, "question", None)
-        line |= {"message": record.getMessage()} if question is None else question
-        if record.exc_info:
-            line["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(line)
 
 
 def _version() -> str | None:

@@ -8,6 +8,7 @@ import queue
 import random
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -526,3 +527,21 @@ def test_a_log_line_a_question() -> None:
     assert first["client"] == second["client"]
     assert first["worked"] > 0.0 <= first["waited"]
     assert (second["id"], second["status"]) == ("bad", "unsupported")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="makes a pipe small")
+def test_a_log_that_nobody_reads_keeps_nobody_waiting() -> None:
+    import fcntl
+
+    server = Served(free_endpoint(), "-v", "--log-format", "json")
+    # room for some twenty lines
+    fcntl.fcntl(server.process.stderr, fcntl.F_SETPIPE_SZ, 4096)
+    with zenoh.open(client_config(server.endpoint)) as session:
+        for _ in range(100):
+            (reply,) = session.get(PLAN, payload=b"{", timeout=PATIENCE)
+            assert json.loads(reply.err.payload.to_bytes())["error"]["kind"] == "malformed"
+    server.process.send_signal(signal.SIGTERM)
+    assert server.process.wait(PATIENCE) == 0
+    lines = server.process.stderr.read().splitlines()
+    assert all(json.loads(line)["status"] == "malformed" for line in lines[1:-1])
+    assert len(lines) < 100

@@ -1,0 +1,75 @@
+"""A service's log, written by a thread of its own: the service waits for nobody who reads it."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import threading
+from contextlib import suppress
+from queue import Full, Queue
+from typing import Final
+
+__all__ = ["JsonLines", "LogThread"]
+
+STDERR: Final = 2
+
+LINES: Final = 10_000
+"""Lines that wait to be written; further ones are left out, and counted."""
+
+LAST: Final = 0.5
+"""How long the end waits for those that are left [s]."""
+
+
+class LogThread(logging.Handler):
+    """Writes lines on standard error, in the background.
+
+    A terminal that is stopped, or a pipe that nobody reads, blocks its thread alone.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lines: Queue[str | None] = Queue(LINES)
+        self._left_out = 0
+        self._thread = threading.Thread(target=self._run, name="crux-log", daemon=True)
+        self._thread.start()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            self._lines.put_nowait(self.format(record))
+        except Full:
+            self._left_out += 1
+
+    def close(self) -> None:
+        """Wait a little for the lines that are left."""
+        with suppress(Full):
+            self._lines.put_nowait(None)
+        self._thread.join(LAST)
+        super().close()
+
+    def _run(self) -> None:
+        while (line := self._lines.get()) is not None:
+            self._write(line)
+            if self._left_out and self._lines.empty():
+                left_out, self._left_out = self._left_out, 0
+                log = logging.getLogger(__name__)
+                log.warning("%d lines of this log are left out: they were not read", left_out)
+
+    def _write(self, line: str) -> None:
+        data = line.encode(errors="replace") + b"\n"
+        # not sys.stderr: the interpreter cannot end while a thread is at work on that
+        with suppress(OSError):
+            while data:
+                data = data[os.write(STDERR, data) :]
+
+
+class JsonLines(logging.Formatter):
+    """Log lines as JSON objects: time, level, message, and all of a question's fields."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line: dict[str, object] = {"time": record.created, "level": record.levelname.lower()}
+        question = getattr(record, "question", None)
+        line |= {"message": record.getMessage()} if question is None else question
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        return json.dumps(line)
