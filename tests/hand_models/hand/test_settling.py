@@ -182,7 +182,7 @@ def turned(frame, angle):
     )
 
 
-@given_some(5, 15, seeds)
+@given_some(3, 15, seeds)
 def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
     rng = np.random.default_rng(seed)
     placements = [random_placement(rng) for _ in range(rng.integers(1, 5))]
@@ -191,7 +191,7 @@ def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
             check_hand(placement, settled)
 
 
-@given_some(4, 10, seeds)
+@given_some(2, 10, seeds)
 def test_tendons_that_rub_load_outer_fingers_less(seed):
     rng = np.random.default_rng(seed)
     hand = changed_hand("tendon", "friction", 0.1)
@@ -201,7 +201,7 @@ def test_tendons_that_rub_load_outer_fingers_less(seed):
             check_hand(placement, settled, hand)
 
 
-@given_some(3, 8, seeds)
+@given_some(2, 8, seeds)
 def test_neither_company_nor_order_changes_a_hand(seed):
     rng = np.random.default_rng(seed)
     placements = [random_placement(rng, rough=0.1) for _ in range(4)]

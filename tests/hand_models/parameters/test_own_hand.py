@@ -450,6 +450,7 @@ def alone() -> Iterator[zenoh.Session]:
         yield opened
 
 
+@pytest.mark.slow
 def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Session) -> None:
     asked = [request_for(), request_for(THICK), request_for(WEAK), request_for(THICK, WEAK)]
     want = [untimed(dispatch.plan(request)) for request in asked]
@@ -473,6 +474,7 @@ def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Se
     assert got == [want[i] for i in order]
 
 
+@pytest.mark.slow
 def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
     file, capfd: pytest.CaptureFixture[str]
 ) -> None:

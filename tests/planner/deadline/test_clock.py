@@ -531,6 +531,7 @@ def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, 
     assert "load factor without the palms" not in capfd.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_service_keeps_deadlines():
     server = Served(free_endpoint())
     try:

@@ -308,6 +308,7 @@ def alone() -> Iterator[zenoh.Session]:
         yield opened
 
 
+@pytest.mark.slow
 def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) -> None:
     own = read_robot(file)
     request = plan_request(hanging(file))

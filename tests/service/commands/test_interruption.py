@@ -81,6 +81,7 @@ def test_processes_end_soon_after_the_command_is_killed(lines: Path, tmp_path: P
     assert (status, error) == (-signal.SIGKILL, "")
 
 
+@pytest.mark.slow
 def test_a_batch_that_was_killed_goes_on_where_it_ended(
     lines: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -138,6 +139,7 @@ def test_a_full_disk_leaves_whole_lines_of_a_batch(lines: Path, tmp_path: Path) 
     assert (status, error) == (FAILED, f"crux: cannot write {output}: File too large; {kept}\n")
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_no_half_file(tmp_path: Path) -> None:
     picture = tmp_path / "plan.png"
     status, error = limited("plan", "wall", "--plot", str(picture), size=10_000)

@@ -135,6 +135,7 @@ def test_the_example_of_a_clients_name_is_a_query_that_a_service_can_tell_from_o
         assert names.get(timeout=PATIENCE) == (session.zid(), 1)
 
 
+@pytest.mark.slow
 def test_the_examples_of_a_client_read_whole_plans_and_set_points(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):

@@ -194,6 +194,7 @@ def test_processes_that_come_too_late_are_not_heard_of(tmp_path):
     assert (found.returncode, found.stdout, found.stderr) == (0, "optimal\n" * 2, "")
 
 
+@pytest.mark.slow
 def test_a_program_without_its_guard_is_told_so_and_answered(tmp_path):
     body = """
 told = []

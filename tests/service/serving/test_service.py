@@ -313,6 +313,7 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
 
 
+@pytest.mark.slow
 def test_a_second_server_of_one_robot_warns(served: Served) -> None:
     def said() -> list[str]:
         second = Served(free_endpoint(), "-e", served.endpoint)
@@ -353,6 +354,7 @@ def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
         assert soon(lambda: not service.has_rival())
 
 
+@pytest.mark.slow
 def test_a_killed_server_is_noticed_and_its_successor_found() -> None:
     endpoint = free_endpoint()
     server = Served(endpoint)
@@ -506,6 +508,7 @@ def test_a_port_that_is_the_systems_to_choose_is_told() -> None:
     assert third == "tcp/127.0.0.1:7447"
 
 
+@pytest.mark.slow
 def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
     port = free_endpoint().rpartition(":")[2]
     server = Served(f"tcp/0.0.0.0:{port}")
@@ -529,6 +532,7 @@ def test_a_log_line_a_question() -> None:
     assert (second["id"], second["status"]) == ("bad", "unsupported")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="makes a pipe small")
 def test_a_log_that_nobody_reads_keeps_nobody_waiting() -> None:
     import fcntl

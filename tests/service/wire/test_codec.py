@@ -136,7 +136,7 @@ def check_spoilt(count: int) -> None:
 
 
 def test_spoilt_requests_get_a_plan_or_an_error() -> None:
-    check_spoilt(300)
+    check_spoilt(120)
 
 
 @pytest.mark.slow
