@@ -11,7 +11,6 @@ from .row_scaling import (
 )
 from .solvers import (
     SLACK as SLACK,
-    build_ahead as build_ahead,
     curved as curved,
     effort as effort,
     least_tensions as least_tensions,

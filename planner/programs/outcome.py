@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from hand_models.base import Array
-from planner.programs.compiled import OUT_OF_TIME
+from planner.programs.conic import OUT_OF_TIME
 
 __all__ = ["LATE", "Outcome", "Reached"]
 
@@ -21,7 +21,7 @@ class Outcome:
     solved : bool
         Whether the solver says so; the plan is checked apart from it.
     status : str
-        CVXPY's word, or `planner.programs.compiled.OUT_OF_TIME`.
+        CVXPY's word, or `planner.programs.conic.OUT_OF_TIME`.
     iterations : int
     value : float
         Objective, NaN if not solved.
@@ -45,7 +45,7 @@ class Outcome:
 
 
 LATE: Final = Outcome(False, OUT_OF_TIME, 0, math.nan)
-"""Of a program that is not built in time."""
+"""Of a program that there was no time for."""
 
 
 class Reached(NamedTuple):

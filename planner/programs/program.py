@@ -33,12 +33,14 @@ from typing import Final
 
 import cvxpy as cp
 import numpy as np
+from scipy.linalg import block_diag
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
+from planner.programs.conic import ConicProgram
 from planner.programs.outcome import Outcome, Reached
-from planner.programs.stance_data import Shape, StanceData
-from planner.programs.stance_program import CAREFUL, REFINED, SHARP, StanceProgram
+from planner.programs.stance_data import StanceData
+from planner.programs.stance_program import REFINED, SHARP, Definition, StanceProgram
 
 __all__ = [
     "TIE",
@@ -62,100 +64,120 @@ TIE: Final = 8e-6
 
 
 class Margin(StanceProgram):
-    """min u: the least utilisation."""
+    """min u: the least utilisation; ``value`` is that utilisation."""
 
-    def define(self) -> cp.Problem:
-        self.u = cp.Variable()
-        self.limits = [row <= self.u for row in self.utilisations()]
-        self.balance = self.reaction == self.offset
-        return cp.Problem(cp.Minimize(self.u), [self.balance, *self.limits, *self.hard])
+    def define(self) -> Definition:
+        u, z = cp.Variable(), self.loads()
+        rows = self.rows(z, u)
+        return Definition(cp.Problem(cp.Minimize(u), [*rows]), (u, z), rows)
 
-    def solve(self, data: StanceData) -> Outcome:
-        """Return the plan of least utilisation; ``value`` is that utilisation."""
-        return self.run(data)[0]
+    def conic(self) -> ConicProgram:
+        A, b = self.blocks(1)
+        A[self.of_limits, 0] = -1.0
+        P, q = np.zeros((2, A.shape[1]))
+        q[0] = 1.0
+        return ConicProgram(P, q, A, b, len(self.G))
 
 
 class Unique(StanceProgram):
     """min u + `TIE` · mean (tension / maximum)²: the plan that is meant, in one solve.
 
     A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
+
+    Parameters
+    ----------
+    data : StanceData
+    share : float, optional
+        How much of its weight the second term is given.
     """
 
-    settings = (SHARP, REFINED, CAREFUL)
+    settings = (SHARP, REFINED)
+    wanted = 1
 
-    def define(self) -> cp.Problem:
-        self.u = cp.Variable()
-        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
-        self.own, self.further = [*self.weights], [self.u]
-        self.limits = [row <= self.u for row in self.utilisations()]
-        self.balance = self.reaction == self.offset
-        ties = sum(
-            cp.sum(cp.multiply(weights, cp.square(z)))
-            for weights, z in zip(self.weights, self.z, strict=True)
-        )
-        rows = [self.balance, *self.limits, *self.hard]
-        return cp.Problem(cp.Minimize(self.u + tie_weight(self.shape) * ties), rows)
+    def __init__(self, data: StanceData, share: float = 1.0) -> None:
+        super().__init__(data)
+        self.weights = tie_weight(len(data.hands)) * share * data.rows.tie
 
-    def solve(self, data: StanceData, share: float = 1.0) -> Outcome:
-        """Return the plan of least utilisation; ``value`` is that utilisation.
+    def define(self) -> Definition:
+        u, z = cp.Variable(), self.loads()
+        rows = self.rows(z, u)
+        ties = cp.sum(cp.multiply(self.weights, cp.square(z)))
+        return Definition(cp.Problem(cp.Minimize(u + ties), [*rows]), (u, z), rows)
 
-        ``share``: how much of its weight the second term is given.
-        """
-        ties = [hand.tie for hand in data.hands]
-        if share != 1.0:
-            ties = [share * tie for tie in ties]
-        outcome, further = self.run(data, *ties)
-        return replace(outcome, value=float(further[0])) if further else outcome
+    def conic(self) -> ConicProgram:
+        A, b = self.blocks(1)
+        A[self.of_limits, 0] = -1.0
+        P, q = np.zeros((2, A.shape[1]))
+        P[1:] = 2.0 * self.weights
+        q[0] = 1.0
+        return ConicProgram(P, q, A, b, len(self.G))
+
+    def solve(self) -> Outcome:
+        """Return the plan of least utilisation; ``value`` is that utilisation."""
+        outcome, u = self.run()
+        return outcome if u is None else replace(outcome, value=float(u[0]))
 
 
-def tie_weight(shape: Shape) -> float:
+def tie_weight(hands: int) -> float:
     """Return what `Unique` weighs the sum of squares with: `TIE` over the number of tendons."""
-    return TIE / (len(FINGERS) * len(shape.hands))
+    return TIE / (len(FINGERS) * hands)
 
 
 class Curved(StanceProgram):
-    """min u + ½ ‖R (z − z₀)‖²: least utilisation where sets are curved, or near to loads."""
+    """min u + ½ ‖R (z − z₀)‖²: least utilisation where sets are curved, or near to loads.
 
-    def define(self) -> cp.Problem:
-        self.u = cp.Variable()
-        size = sum(z.shape[0] for z in self.z)
-        self.root = [cp.Parameter((size, z.shape[0])) for z in self.z]
-        self.centre = cp.Parameter(size)
-        self.own = [*self.root, self.centre]
-        self.limits = [row <= self.u for row in self.utilisations()]
-        self.balance = self.reaction == self.offset
-        parts = [root @ z for root, z in zip(self.root, self.z, strict=True)]
-        bent = cp.sum_squares(sum(parts) - self.centre)
-        rows = [self.balance, *self.limits, *self.hard]
-        return cp.Problem(cp.Minimize(self.u + 0.5 * bent), rows)
+    Parameters
+    ----------
+    data : StanceData
+    root : ndarray, shape (M, M)
+        R, a root of the curvature in all hands' z.
+    near : sequence of ndarray
+        Each hand's y₀.
+    """
 
-    def solve(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-        """Return the plan for the root R (M, M) of the curvature in all hands' z, about their y."""
-        z = [y / hand.unit for hand, y in zip(data.hands, near, strict=True)]
-        parts = np.split(root, np.cumsum([len(part) for part in z])[:-1], axis=1)
-        return self.run(data, *parts, root @ np.concatenate(z))[0]
+    def __init__(self, data: StanceData, root: Array, near: Sequence[Array]) -> None:
+        super().__init__(data)
+        self.root, self.centre = root, root @ (np.concatenate(near) / data.rows.unit)
+
+    def define(self) -> Definition:
+        u, z = cp.Variable(), self.loads()
+        rows = self.rows(z, u)
+        bent = cp.sum_squares(self.root @ z - self.centre)
+        return Definition(cp.Problem(cp.Minimize(u + 0.5 * bent), [*rows]), (u, z), rows)
+
+    def conic(self) -> ConicProgram:
+        """Columns u, R z − R z₀ and z."""
+        size = len(self.centre)
+        A, b = self.blocks(1 + size, above=size)
+        A[:size, 1 : 1 + size] = -np.eye(size)
+        A[:size, 1 + size :] = self.root
+        A[size:][self.of_limits, 0] = -1.0
+        b[:size] = self.centre
+        P, q = np.zeros((2, A.shape[1]))
+        P[1 : 1 + size] = 1.0
+        q[0] = 1.0
+        return ConicProgram(P, q, A, b, size + len(self.G), size)
 
 
 class TieBreak(StanceProgram):
     """min Σ (tension / maximum)² under a cap on the utilisation: which plan is meant of those."""
 
-    def define(self) -> cp.Problem:
-        self.cap = cp.Parameter()
-        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
-        self.own = [self.cap, *self.weights]
-        self.limits = [row <= self.cap for row in self.utilisations()]
-        self.balance = self.reaction == self.offset
-        effort = sum(
-            cp.sum(cp.multiply(weights, cp.square(z)))
-            for weights, z in zip(self.weights, self.z, strict=True)
-        )
-        return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
-
-    def solve(self, data: StanceData, cap: float) -> Outcome:
-        """Return the plan that is meant among those with utilisation at most ``cap``."""
+    def __init__(self, data: StanceData, cap: float) -> None:
+        super().__init__(data)
         # weights relative to the largest: the minimiser does not change
-        largest = max(float(hand.tie.max(initial=0.0)) for hand in data.hands)
-        return self.run(data, cap, *(hand.tie / largest for hand in data.hands))[0]
+        self.cap, self.weights = cap, data.rows.tie / data.rows.tie.max()
+
+    def define(self) -> Definition:
+        z = self.loads()
+        rows = self.rows(z, self.cap)
+        effort = cp.sum(cp.multiply(self.weights, cp.square(z)))
+        return Definition(cp.Problem(cp.Minimize(effort), [*rows]), (z,), rows)
+
+    def conic(self) -> ConicProgram:
+        A, b = self.blocks(0)
+        b[self.of_limits] += self.cap
+        P = 2.0 * self.weights
+        return ConicProgram(P, np.zeros_like(P), A, b, len(self.G))
 
 
 class Effort(StanceProgram):
@@ -164,46 +186,65 @@ class Effort(StanceProgram):
     Small weights make loads unique that are neither: palms, lateral reactions, wrists.
     """
 
-    def define(self) -> cp.Problem:
-        self.cap = cp.Parameter()
-        self.E = [cp.Parameter((ne, m)) for m, _, _, ne in self.shape.hands]
-        self.e0 = [cp.Parameter(ne) for _, _, _, ne in self.shape.hands]
-        self.weights = [cp.Parameter(z.shape[0], nonneg=True) for z in self.z]
-        self.own = [self.cap, *self.E, *self.e0, *self.weights]
-        self.limits = [row <= self.cap for row in self.utilisations()]
-        self.balance = self.reaction == self.offset
-        effort = sum(
-            cp.sum_squares(E @ z + e0) + cp.sum(cp.multiply(weights, cp.square(z)))
-            for E, e0, weights, z in zip(self.E, self.e0, self.weights, self.z, strict=True)
-        )
-        return cp.Problem(cp.Minimize(effort), [self.balance, *self.limits, *self.hard])
+    def __init__(self, data: StanceData, cap: float) -> None:
+        super().__init__(data)
+        self.cap = cap
+        self.E = block_diag(*(hand.E for hand in data.hands))
+        self.e0 = np.concatenate([hand.e0 for hand in data.hands])
+        self.weights = np.concatenate([hand.rest for hand in data.hands])
 
-    def solve(self, data: StanceData, cap: float) -> Outcome:
-        """Return the plan of least effort among those with utilisation at most ``cap``."""
-        hands = data.hands
-        efforts = (*(hand.E for hand in hands), *(hand.e0 for hand in hands))
-        return self.run(data, cap, *efforts, *(hand.rest for hand in hands))[0]
+    def define(self) -> Definition:
+        z = self.loads()
+        rows = self.rows(z, self.cap)
+        rest = cp.sum(cp.multiply(self.weights, cp.square(z)))
+        effort = cp.sum_squares(self.E @ z + self.e0) + rest
+        return Definition(cp.Problem(cp.Minimize(effort), [*rows]), (z,), rows)
+
+    def conic(self) -> ConicProgram:
+        """Columns E z + e₀ and z."""
+        size = len(self.e0)
+        A, b = self.blocks(size, above=size)
+        A[:size, :size] = -np.eye(size)
+        A[:size, size:] = self.E
+        b[:size] = -self.e0
+        b[size:][self.of_limits] += self.cap
+        P = np.concatenate([np.full(size, 2.0), 2.0 * self.weights])
+        return ConicProgram(P, np.zeros_like(P), A, b, size + len(self.G), size)
 
 
 class LoadFactor(StanceProgram):
-    """max s: how many times the body wrench could be held at utilisation 1."""
+    """max s: how many times the body wrench, not zero, could be held at utilisation 1.
 
-    def define(self) -> cp.Problem:
-        self.factor = cp.Variable(nonneg=True)
-        self.wrench = cp.Parameter(self.shape.balance)
-        self.own = [self.wrench]
-        self.limits = [row <= 1.0 for row in self.utilisations()]
-        self.balance = self.reaction == self.offset + self.wrench * self.factor
-        return cp.Problem(cp.Maximize(self.factor), [self.balance, *self.limits, *self.hard])
+    ``value`` is that load factor.
+    """
 
-    def solve(self, data: StanceData) -> Outcome:
-        """Return the largest load factor as ``value``; the body wrench must not be zero."""
+    wanted = 1
+
+    def __init__(self, data: StanceData) -> None:
         body, held = data.wrench.copy(), data.wrench.copy()
         body[6:], held[:6] = 0.0, 0.0
-        size = float(np.abs(body).max())
+        super().__init__(data.turned(held))
         # of unit size, or a small wrench and its large factor would defeat the solver
-        outcome, _ = self.run(data.turned(held), body / size)
-        return replace(outcome, value=outcome.value / size)
+        self.size = float(np.abs(body).max())
+        self.wrench = body / self.size
+
+    def define(self) -> Definition:
+        s, z = cp.Variable(), self.loads()
+        _, limits, hard = self.rows(z, 1.0)
+        rows = self.G @ z == self.data.offset + self.wrench * s, limits, hard
+        return Definition(cp.Problem(cp.Maximize(s), [*rows, s >= 0.0]), (s, z), rows)
+
+    def conic(self) -> ConicProgram:
+        A, b = self.blocks(1, below=1)
+        A[: len(self.G), 0], A[-1, 0] = -self.wrench, -1.0
+        b[self.of_limits] += 1.0
+        P, q = np.zeros((2, A.shape[1]))
+        q[0] = -1.0
+        return ConicProgram(P, q, A, b, len(self.G))
+
+    def solve(self) -> Outcome:
+        outcome, s = self.run()
+        return outcome if s is None else replace(outcome, value=float(s[0]) / self.size)
 
 
 class Reach(StanceProgram):
@@ -211,61 +252,96 @@ class Reach(StanceProgram):
 
     The limit rows may change with t, too, as those of joints do with the body's acceleration:
     L z + l0 + K t ≤ cap.
+
+    Parameters
+    ----------
+    data : StanceData
+    goal : ndarray, shape (k,)
+        c.
+    B : ndarray, shape (nb, k)
+    cap : float, optional
+    K : sequence of ndarray, optional
+        Of each hand, (nl, k); zero by default.
     """
 
-    def __init__(self, shape: Shape, directions: int) -> None:
-        self.directions = directions
-        super().__init__(shape)
-
-    def define(self) -> cp.Problem:
-        self.t = cp.Variable(self.directions)
-        self.further = [self.t]
-        self.goal = cp.Parameter(self.directions)
-        self.cap = cp.Parameter()
-        self.B = cp.Parameter((self.shape.balance, self.directions))
-        self.K = [cp.Parameter((nl, self.directions)) for _, nl, _, _ in self.shape.hands]
-        self.own = [self.goal, self.B, self.cap, *self.K]
-        self.limits = [
-            row + K @ self.t <= self.cap for row, K in zip(self.utilisations(), self.K, strict=True)
-        ]
-        self.balance = self.reaction == self.offset + self.B @ self.t
-        return cp.Problem(cp.Maximize(self.goal @ self.t), [self.balance, *self.limits, *self.hard])
-
-    def solve(
+    def __init__(
         self,
         data: StanceData,
         goal: Array,
         B: Array,
         cap: float = 1.0,
         K: Sequence[Array] | None = None,
-    ) -> Reached:
-        """Return the farthest t for the goal c (k,), with B (nb, k) and K (nl, k) of each hand."""
-        if K is None:
-            K = [np.zeros((len(hand.l0), self.directions)) for hand in data.hands]
-        outcome, further = self.run(data, goal, B, cap, *K)
-        return Reached(outcome, further[0] if further else np.full(self.directions, np.nan))
+    ) -> None:
+        super().__init__(data)
+        self.goal, self.B, self.cap = goal, B, cap
+        self.K = np.zeros((len(self.L), len(goal))) if K is None else np.vstack(K)
+        self.wanted = len(goal)
+
+    def define(self) -> Definition:
+        t, z = cp.Variable(len(self.goal)), self.loads()
+        balance = self.G @ z == self.data.offset + self.B @ t
+        _, limits, hard = self.rows(z, self.cap - self.K @ t)
+        rows = balance, limits, hard
+        return Definition(cp.Problem(cp.Maximize(self.goal @ t), [*rows]), (t, z), rows)
+
+    def conic(self) -> ConicProgram:
+        size = len(self.goal)
+        A, b = self.blocks(size)
+        A[: len(self.G), :size], A[self.of_limits, :size] = -self.B, self.K
+        b[self.of_limits] += self.cap
+        P, q = np.zeros((2, A.shape[1]))
+        q[:size] = -self.goal
+        return ConicProgram(P, q, A, b, len(self.G))
+
+    def farthest(self) -> Reached:
+        """Return the farthest t."""
+        outcome, t = self.run()
+        if t is None:
+            return Reached(outcome, np.full(self.wanted, np.nan))
+        return Reached(replace(outcome, value=float(self.goal @ t)), t)
 
 
 class Nearest(StanceProgram):
     """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give.
 
-    The last ``kept`` rows of the balance, of wrenches that hands are given, are kept exactly; the
-    others count like the body's.
+    ``value`` is the distance, in `WRENCH_UNIT`.
+
+    Parameters
+    ----------
+    data : StanceData
+    kept : int, optional
+        The last so many rows of the balance, of wrenches that hands are given, are kept exactly;
+        the others count like the body's.
     """
 
-    def __init__(self, shape: Shape, kept: int = 0) -> None:
+    def __init__(self, data: StanceData, kept: int = 0) -> None:
+        super().__init__(data)
         self.kept = kept
-        super().__init__(shape)
+        self.L, self.l0 = self.L[:0], self.l0[:0]
 
-    def define(self) -> cp.Problem:
-        count = self.shape.balance
-        self.shortfall = cp.Variable(count)
-        self.balance = self.reaction + self.shortfall == self.offset
-        box = [sign * z <= UNLIMITED for z in self.z for sign in (1.0, -1.0)]
-        kept = [self.shortfall[count - self.kept :] == 0.0] if self.kept else []
-        objective = cp.Minimize(cp.norm(self.shortfall))
-        return cp.Problem(objective, [self.balance, *self.hard, *box, *kept])
+    def define(self) -> Definition:
+        missing, z = cp.Variable(len(self.G)), self.loads()
+        balance = self.G @ z + missing == self.data.offset
+        _, limits, hard = self.rows(z, 0.0)
+        box = [z <= UNLIMITED, -z <= UNLIMITED]
+        kept = [missing[len(self.G) - self.kept :] == 0.0] if self.kept else []
+        problem = cp.Problem(cp.Minimize(cp.norm(missing)), [balance, *kept, hard, *box])
+        return Definition(problem, (z,), (balance, limits, hard))
 
-    def solve(self, data: StanceData) -> Outcome:
-        """Return the distance to the nearest body wrench, in `WRENCH_UNIT`, as ``value``."""
-        return self.run(data)[0]
+    def conic(self) -> ConicProgram:
+        """Columns ‖W − w‖, W − w and z."""
+        count, kept, hard, loads = len(self.G), self.kept, len(self.H), self.G.shape[1]
+        zero = count + kept
+        box = zero + hard
+        cone = box + 2 * loads
+        A = np.zeros((1 + count + loads, cone + 1 + count)).T
+        A[:count, 1 : 1 + count], A[:count, 1 + count :] = np.eye(count), self.G
+        A[count:zero, 1 + count - kept : 1 + count] = np.eye(kept)
+        A[zero:box, 1 + count :] = self.H
+        A[box:cone, 1 + count :] = np.vstack([np.eye(loads), -np.eye(loads)])
+        A[cone:, : 1 + count] = -np.eye(1 + count)
+        b = np.zeros(len(A))
+        b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, UNLIMITED
+        P, q = np.zeros((2, A.shape[1]))
+        q[0] = 1.0
+        return ConicProgram(P, q, A, b, zero, second_order=1 + count)

@@ -6,7 +6,6 @@ Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,13 +27,11 @@ from planner.programs.row_scaling import (
 __all__ = [
     "JOINT_TORQUE",
     "LOAD_UNIT",
-    "ROOM",
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
     "HandData",
     "HandRows",
-    "Shape",
     "StanceData",
     "beyond",
     "body_wrench",
@@ -45,9 +42,6 @@ __all__ = [
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
-
-ROOM: Final = (16, 256, 32, 16)
-"""What programs have room for at least, (m, nl, nh, ne) of each hand: all tiles and joints."""
 
 
 class HandData(NamedTuple):
@@ -158,7 +152,7 @@ class HandRows(NamedTuple):
         unit = np.concatenate([hand.unit for hand in hands])
         rest = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
         limits = sum(len(hand.l0) for hand in hands)
-        whole = np.zeros((balance + len(rest), len(unit)))
+        whole = np.zeros((len(unit), balance + len(rest))).T  # column by column
         left, limit, below = 0, balance, balance + limits
         for hand in hands:
             m, nl, nh, _ = hand.shape
@@ -170,26 +164,6 @@ class HandRows(NamedTuple):
         return cls(whole, rest, limits, unit, np.concatenate([hand.tie for hand in hands]))
 
 
-class Shape(NamedTuple):
-    """What a program is built for: rows of balance, and (m, nl, nh, ne) of each hand."""
-
-    balance: int
-    hands: tuple[tuple[int, int, int, int], ...]
-
-    def with_room(self) -> Shape:
-        """Return the shape of a program that serves this and most others of so many hands.
-
-        All hands have room for `ROOM`, or its double, and so on, as the largest needs.
-        """
-        most = np.max(np.array(self.hands).reshape(-1, len(ROOM)), axis=0, initial=0)
-        room = [
-            least << max(0, math.ceil(math.log2(max(size, 1) / least)))
-            for size, least in zip(most.tolist(), ROOM, strict=True)
-        ]
-        m, nl, nh, ne = room
-        return Shape(self.balance, ((m, nl, nh, ne),) * len(self.hands))
-
-
 @dataclass(frozen=True, eq=False)
 class StanceData:
     """All hands of a stance, and what their balance is to give, scaled, shape (nb,).
@@ -199,11 +173,6 @@ class StanceData:
 
     hands: tuple[HandData, ...]
     wrench: Array
-
-    @cached_property
-    def shape(self) -> Shape:
-        """What a program is built for."""
-        return Shape(len(self.wrench), tuple(hand.shape for hand in self.hands))
 
     @cached_property
     def offset(self) -> Array:
@@ -222,9 +191,8 @@ class StanceData:
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
         turned = StanceData(self.hands, wrench)
-        for name in ("shape", "rows"):
-            if name in self.__dict__:
-                turned.__dict__[name] = self.__dict__[name]
+        if "rows" in self.__dict__:
+            turned.__dict__["rows"] = self.rows
         return turned
 
 

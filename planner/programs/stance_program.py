@@ -1,26 +1,38 @@
-"""What all programs of a stance share: variables, data, rows, and how they are run.
+"""What all programs of a stance share: its rows, in CVXPY and as they are solved, and how.
 
-Data enter as whole-block parameters (disciplined parametrised programming), so a program depends on
-the shape of a stance only, is compiled once and solved with new data after
-(`planner.programs.compiled`).
+`StanceProgram.define` is the program, as mathematics; `StanceProgram.conic` is the same for the
+solver, block by block, which takes a fraction of the time. Where the solver comes to no end with
+that, CVXPY solves the definition.
 """
 
 from __future__ import annotations
 
 import math
+import threading
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, NamedTuple
 
 import cvxpy as cp
+import numpy as np
 
 from hand_models.base import Array
-from planner.programs.compiled import Compiled
-from planner.programs.conic_extent import Extent
+from planner import deadline
+from planner.programs.conic import (
+    ENDS,
+    FAILED,
+    OUT_OF_TIME,
+    PRESENT,
+    PROVEN,
+    SOLVERS,
+    ConicProgram,
+    Solver,
+)
 from planner.programs.outcome import Outcome
-from planner.programs.stance_data import Shape, StanceData
+from planner.programs.stance_data import StanceData
 
-__all__ = ["CAREFUL", "REFINED", "SETTINGS", "SHARP", "SOLVER", "StanceProgram"]
+__all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "Definition", "StanceProgram"]
 
 SOLVER: Final = "CLARABEL"
 
@@ -45,105 +57,176 @@ REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": Tru
 CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
 """The solver's own defaults, for a third."""
 
-SOLVED: Final = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
+_cvxpy = threading.Lock()
+"""CVXPY counts its variables for all threads, and loses count where two define at a time."""
+
+
+class Definition(NamedTuple):
+    """A program in CVXPY.
+
+    Attributes
+    ----------
+    problem : Problem
+    variables : tuple of Variable
+        What is wanted beside the loads, and these.
+    rows : tuple of Constraint
+        The balance, limits, and hard rows.
+    """
+
+    problem: cp.Problem
+    variables: tuple[cp.Variable, ...]
+    rows: tuple[cp.Constraint, cp.Constraint, cp.Constraint]
 
 
 class StanceProgram(ABC):
-    """A program for one shape of stance, compiled. Safe to call from several threads."""
+    """A program for the rows of a stance.
 
-    settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED, CAREFUL)
+    The hands' loads z (M,) are one below the other, so that Σ_h G_h z_h is G z, and L and H are
+    block-diagonal.
 
-    def __init__(self, shape: Shape) -> None:
-        self.shape = shape
-        self.z = [cp.Variable(m) for m, _, _, _ in shape.hands]
-        self.G = [cp.Parameter((shape.balance, m)) for m, _, _, _ in shape.hands]
-        self.L: list[cp.Parameter] = []
-        self.l0: list[cp.Parameter] = []
-        self.H = [cp.Parameter((nh, m)) for m, _, nh, _ in shape.hands]
-        self.h = [cp.Parameter(nh) for _, _, nh, _ in shape.hands]
-        self.offset = cp.Parameter(shape.balance)
-        """W − Σ g, or −Σ g where W is scaled apart."""
-        self.reaction = sum(G @ z for G, z in zip(self.G, self.z, strict=True))
-        self.hard = [H @ z <= h for H, z, h in zip(self.H, self.z, self.h, strict=True)]
-        self.limits: list[cp.Constraint] = []
-        self.own: list[cp.Parameter] = []
-        """Parameters beside the stance's."""
-        self.further: list[cp.Variable] = []
-        """Variables beside the loads whose values are wanted."""
-        self.balance: cp.Constraint
-        self.problem = self.define()
-        self.compiled = Compiled(
-            self.problem,
-            [*self.G, *self.L, *self.l0, *self.H, *self.h, self.offset, *self.own],
-            [*self.z, *self.further],
-            [self.balance, *self.limits, *self.hard],
-            self.settings,
-        )
+    Parameters
+    ----------
+    data : StanceData
+
+    Attributes
+    ----------
+    data : StanceData
+    G, L, l0, H, h : ndarray
+        Of all hands.
+    """
+
+    settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED)
+    wanted: int = 0
+    """How many of the variables before the loads are wanted."""
+
+    def __init__(self, data: StanceData) -> None:
+        self.data = data
+        rows, balance = data.rows, len(data.wrench)
+        self.G = rows.whole[:balance]
+        self.L, self.H = np.split(rows.whole[balance:], [rows.limits])
+        self.l0, self.h = -rows.rest[: rows.limits], rows.rest[rows.limits :]
 
     @abstractmethod
-    def define(self) -> cp.Problem:
-        """Return the problem, with `limits`, `balance`, `own` and `further` set."""
+    def define(self) -> Definition:
+        """Return the program."""
 
-    def utilisations(self) -> list[cp.Expression]:
-        """Return each hand's limit rows as load over capacity."""
-        self.L = [cp.Parameter((nl, m)) for m, nl, _, _ in self.shape.hands]
-        self.l0 = [cp.Parameter(nl) for _, nl, _, _ in self.shape.hands]
-        return [L @ z + l0 for L, z, l0 in zip(self.L, self.z, self.l0, strict=True)]
+    @abstractmethod
+    def conic(self) -> ConicProgram:
+        """Return the program as its solver takes it.
 
-    def values(self, data: StanceData, *own: Any) -> list[Any]:
-        """Return what the parameters are given."""
-        hands = data.hands
-        limits = [*(hand.L for hand in hands), *(hand.l0 for hand in hands)] if self.L else []
-        return [
-            *(hand.G for hand in hands),
-            *limits,
-            *(hand.H for hand in hands),
-            *(hand.h for hand in hands),
-            data.offset,
-            *own,
-        ]
+        Columns: what is wanted beside the loads, what is not, and the loads. Rows: further
+        equations, the balance, equations, limits, hard rows, and others.
+        """
 
-    def run(self, data: StanceData, *own: Any) -> tuple[Outcome, list[Array]]:
-        """Solve with the stance's data and the values of `own`.
+    def loads(self) -> cp.Variable:
+        """Return z."""
+        return cp.Variable(self.G.shape[1])
+
+    def rows(
+        self, z: cp.Variable, cap: cp.Expression | float
+    ) -> tuple[cp.Constraint, cp.Constraint, cp.Constraint]:
+        """Return the balance, the limits at a utilisation, and the hard rows."""
+        return (
+            self.G @ z == self.data.offset,
+            self.L @ z + self.l0 <= cap,
+            self.H @ z <= self.h,
+        )
+
+    def blocks(self, front: int, above: int = 0, below: int = 0) -> tuple[Array, Array]:
+        """Return A and b with the balance, the limits at 0 and the hard rows.
+
+        Left at zero are so many columns before the loads, and rows above and below these.
+        """
+        rows, balance = self.data.rows, len(self.G)
+        count, loads = rows.whole.shape
+        A = np.zeros((front + loads, above + count + below)).T  # column by column
+        b = np.zeros(len(A))
+        A[above : above + count, front:] = rows.whole
+        b[above : above + balance] = self.data.offset
+        b[above + balance : above + count] = rows.rest
+        return A, b
+
+    @property
+    def of_limits(self) -> slice:
+        """Rows of the limits where no others are above the balance."""
+        return slice(len(self.G), len(self.G) + len(self.L))
+
+    def solve(self) -> Outcome:
+        """Return how it ends."""
+        return self.run()[0]
+
+    def run(self) -> tuple[Outcome, Array | None]:
+        """Solve it.
 
         Returns
         -------
         outcome : Outcome
-        further : list of ndarray
-            Values of the variables `further`; empty where there is no solution.
+        further : ndarray or None
+            What is wanted beside the loads; None where there is no solution.
         """
-        hands = data.hands
-        found = self.compiled.solve(self.values(data, *own), self.extent(data.shape))
-        solved = found.status in SOLVED and math.isfinite(found.value)
-        duals, first = found.multipliers, 1 + len(self.limits)
+        program = self.conic()
+        found = SOLVERS.solve(program, self.settings[0])
+        for settings in self.settings[1:]:
+            if found.status in ENDS or deadline.expired():
+                break
+            found = Solver(program, settings).solve()
+        ended = found.status in ENDS or deadline.expired()
+        if not ended and all(np.isfinite(part).all() for part in program[:4]):
+            return self._by_definition()
+        duals: tuple[Array, ...] = ()
+        if found.multipliers is not None:
+            balance = found.multipliers[program.above : program.above + len(self.G)]
+            limits, hard, _ = np.split(
+                found.multipliers[program.zero :], np.cumsum([len(self.L), len(self.H)])
+            )
+            duals = balance, limits, hard
+        return self._read(found.status, found.iterations, found.value, found.x, duals)
+
+    def _by_definition(self) -> tuple[Outcome, Array | None]:
+        """Let CVXPY solve it."""
+        left = deadline.left()
+        options = CAREFUL if left is None else {**CAREFUL, "time_limit": left}
+        with _cvxpy, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            problem, variables, rows = self.define()
+            try:
+                problem.solve(solver=cp.CLARABEL, **options)
+            except cp.SolverError:
+                return self._read(FAILED, 0, math.nan, None, ())
+        status, stats = problem.status, problem.solver_stats
+        x = None
+        if status in PRESENT:
+            x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
+        duals = tuple(row.dual_value for row in rows) if status in (*PRESENT, *PROVEN) else ()
+        if status == cp.USER_LIMIT and left is not None:
+            status = OUT_OF_TIME
+        value = math.nan if x is None else problem.value
+        return self._read(status, int(stats.num_iters or 0), value, x, duals)
+
+    def _read(
+        self, status: str, iterations: int, value: float, x: Array | None, duals: Sequence[Array]
+    ) -> tuple[Outcome, Array | None]:
+        """Return how it ended; what is wanted comes first in x, and the loads last."""
+        hands = self.data.hands
+        balance, limits, hard = duals or (None, None, None)
+        loads: tuple[Array, ...] = ()
+        if x is not None and math.isfinite(value):
+            unit = self.data.rows.unit
+            loads = _by_hand(x[-len(unit) :] * unit, [len(hand.unit) for hand in hands])
         outcome = Outcome(
-            solved=solved,
-            status=found.status,
-            iterations=found.iterations,
-            value=found.value if solved else math.nan,
-            loads=tuple(z * hand.unit for z, hand in zip(found.variables, hands, strict=False))
-            if solved
-            else (),
-            limit_duals=duals[1:first],
-            hard_duals=duals[first:],
-            balance_dual=duals[0] if duals else None,
+            solved=bool(loads),
+            status=status,
+            iterations=iterations,
+            value=value if loads else math.nan,
+            loads=loads,
+            limit_duals=_by_hand(limits, [len(hand.l0) for hand in hands] if len(self.L) else ()),
+            hard_duals=_by_hand(hard, [len(hand.h) for hand in hands]),
+            balance_dual=balance,
         )
-        return outcome, list(found.variables[len(hands) :]) if solved else []
+        return outcome, x[: self.wanted] if loads and x is not None else None
 
-    def extent(self, shape: Shape) -> Extent:
-        """Return how much there is of variables and constraints for a shape.
 
-        Parameters
-        ----------
-        shape : Shape
-            For which the program has room.
-        """
-        loads, limits, hard = [], [], []
-        for m, nl, nh, _ in shape.hands:
-            loads.append(m)
-            limits.append(nl)
-            hard.append(nh)
-        if not self.limits:
-            limits = []
-        further = [variable.size for variable in self.further]
-        return Extent((*loads, *further), (shape.balance, *limits, *hard), shape)
+def _by_hand(whole: Array | None, sizes: Sequence[int]) -> tuple[Array, ...]:
+    if whole is None or not sizes:
+        return ()
+    return tuple(np.split(whole, np.cumsum(sizes)[:-1]))

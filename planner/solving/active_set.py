@@ -133,7 +133,7 @@ def active_set_optimum(
     assert outcome.balance_dual is not None
     hands, rows = data.hands, _Rows.of(data)
     unit = data.rows.unit
-    Q = 2.0 * share * tie_weight(data.shape) * data.rows.tie
+    Q = 2.0 * share * tie_weight(len(data.hands)) * data.rows.tie
     multipliers = concatenated([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
     start = _Point(concatenated(outcome.loads) / unit, outcome.value, multipliers)
     room = rows.room(start.z, start.u)

@@ -42,7 +42,7 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
     """
     rows = data.rows
     z = concatenated(outcome.loads) / rows.unit
-    small = share * tie_weight(data.shape) * rows.tie * z
+    small = share * tie_weight(len(data.hands)) * rows.tie * z
     value = -float(small @ z) - share * TIE * outcome.value**2
     slopes = 2.0 * small
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value

@@ -59,11 +59,9 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
         Entries in which its hands are not the bundled one; a request's own go on top.
     """
     from planner import deadline
-    from planner.programs import build_ahead
-    from service.answering import Streams, builder_of, handle, robots_of
+    from service.answering import Streams, handle, robots_of
 
     robots = robots_of(robot)
-    build_ahead(len(builder_of(None, robots)(None).shoulders))
     streams = Streams()
 
     def answer(job: Job) -> Done:

@@ -43,7 +43,7 @@ class Curve(NamedTuple):
 
 PLAN = "whole plan, new stance"
 DATA = "hold → data"
-OURS = "program, compiled"
+OURS = "program"
 RAW = "program, raw Clarabel"
 
 

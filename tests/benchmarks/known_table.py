@@ -70,7 +70,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
                 timed,
                 ["floor", "whole"],
                 ("raw Clarabel, right-hand side updated, and solve (the floor)", "floor"),
-                ("raw Clarabel on CVXPY's own data, zeros kept (whole)", "whole"),
+                ("raw Clarabel on whole blocks, zeros kept (whole)", "whole"),
                 ("**verified plan, `KnownStance`**", "plan"),
                 ("**verified set-points, `WrenchStream`**", "stream"),
             ),

@@ -67,7 +67,7 @@ def scaled(sets: Sets) -> Data:
             b=np.sum([hand.g for hand in hands], axis=0),
         ),
         sets.data.wrench,
-        math.sqrt(tie_weight(sets.data.shape)) * v,
+        math.sqrt(tie_weight(len(sets.data.hands))) * v,
         v / v.max(),
     )
 
@@ -76,7 +76,7 @@ def si(question: Question, sets: Sets) -> Data:
     """Rows in N and N·m, each against its own capacity."""
     unit = np.concatenate([hand.unit for hand in sets.data.hands])
     v = np.sqrt(np.concatenate([hand.tie for hand in sets.data.hands])) / unit
-    w = math.sqrt(tie_weight(sets.data.shape)) * v
+    w = math.sqrt(tie_weight(len(sets.data.hands))) * v
     return Data(peer.rows(question, list(sets.spaces)), question.needed_wrench(), w, v)
 
 

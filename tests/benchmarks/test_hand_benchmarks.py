@@ -128,7 +128,7 @@ def test_data_of_four_hands(benchmark, known):
         return hands.sets(hands.at_rest(hands.idle)).data
 
     found = benchmark.pedantic(data, setup=forget, rounds=100)
-    assert found.shape.balance == 6
+    assert found.wrench.shape == (6,)
     assert len(found.hands) == 4
 
 

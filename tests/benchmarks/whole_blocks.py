@@ -1,4 +1,4 @@
-"""Raw Clarabel on what CVXPY itself would give it."""
+"""Raw Clarabel on whole blocks."""
 
 from __future__ import annotations
 
@@ -6,43 +6,45 @@ from collections.abc import Sequence
 from typing import Any
 
 import clarabel
+import numpy as np
 import scipy.sparse as sp
 
-from planner.programs import StanceData, program
+from planner.programs import HandData, StanceData, program
 
 __all__ = ["WholeBlocks"]
 
 
 class WholeBlocks:
-    """Raw Clarabel on the data as CVXPY writes them: whole blocks, with their zeros."""
+    """Raw Clarabel on the blocks of a program as they are, with their zeros; as CVXPY has them."""
 
     def __init__(self, stances: Sequence[StanceData]) -> None:
-        built = program.Unique(stances[0].shape)
-        of = built.compiled.map
-        assert of is not None
-        self._places, self._new = of.variables, []
-        for each in stances:
-            values = built.values(each, *(hand.tie for hand in each.hands))
-            for parameter, value in zip(built.compiled.parameters, values, strict=True):
-                parameter.value = value
-            p = of.vector()
-            new = {"P": of.P.values @ p, "A": of.A.values @ p, "b": of.b.values @ p}
-            self._new.append({name: part.tolist() for name, part in new.items()})
+        full = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
+        there = program.Unique(StanceData(full, stances[0].wrench)).conic().A != 0.0
+        columns, rows = np.nonzero(there.T)
+        starts = np.searchsorted(columns, np.arange(there.shape[1] + 1))
+        programs = [program.Unique(each).conic() for each in stances]
+        self._new = [
+            {"P": each.P.tolist(), "A": each.A[rows, columns].tolist(), "b": each.b.tolist()}
+            for each in programs
+        ]
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         for name, value in program.Unique.settings[0].items():
             setattr(settings, name, value)
-        P, A = (
-            sp.csc_matrix((part.values @ p, part.indices, part.indptr), part.shape)
-            for part in (of.P, of.A)
+        last = programs[-1]
+        A = sp.csc_matrix((last.A[rows, columns], rows, starts), there.shape)
+        cones = [
+            clarabel.ZeroConeT(last.zero),
+            clarabel.NonnegativeConeT(len(last.b) - last.zero),
+        ]
+        P = sp.csc_matrix(
+            (last.P, np.arange(len(last.P)), np.arange(len(last.P) + 1)), 2 * last.P.shape
         )
-        self._solver = clarabel.DefaultSolver(
-            P, of.q.values @ p, A, of.b.values @ p, of.cones, settings
-        )
+        self._solver = clarabel.DefaultSolver(P, last.q, A, last.b, cones, settings)
 
     def used(self, number: int) -> float:
         """Return the utilisation that it comes to."""
-        return float(self._places.of(self.updated(number).x)[-1])
+        return float(self.updated(number).x[0])
 
     def turned(self, number: int) -> Any:
         """Solve with the right-hand side of that stance new."""

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from hand_models.hand import FINGERS
 from hand_models.rock import Cylinder, Plane, Sphere
-from planner.programs import program, solvers, stance_data
+from planner.programs import solvers
 from planner.question import Load
 from planner.result import Plan
 from planner.solving import plan
@@ -29,17 +29,6 @@ many = pytest.mark.parametrize(
     "seeds", [SEEDS, pytest.param(range(200), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 AGREE = 1e-5
-
-KINDS = (
-    program.Margin,
-    program.TieBreak,
-    program.Unique,
-    program.Effort,
-    program.LoadFactor,
-    program.Nearest,
-    lambda shape: program.Reach(shape, 2),
-)
-SHAPE = stance_data.Shape(7, ((10, 126, 21, 11), (6, 40, 9, 4)))
 
 
 def tensions(answer: Plan) -> np.ndarray:
@@ -91,20 +80,6 @@ def test_load_factor_goes_as_one_over_the_wrench(size):
     reference = plan(ask(stance, "load_factor", body_wrench=wrench)).load_factor
     answer = plan(ask(stance, "load_factor", body_wrench=wrench * size))
     assert answer.load_factor == pytest.approx(reference / size, rel=AGREE)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_program_is_disciplined_in_its_parameters(kind):
-    assert kind(SHAPE).problem.is_dcp(dpp=True)
-
-
-def test_stances_of_one_shape_share_their_programs():
-    plan(ask(on_wall(), "load_factor"))
-    before = solvers.building.cache_info()
-    plan(ask(on_wall(overhang=0.1, off=0.25), "load_factor"))
-    after = solvers.building.cache_info()
-    assert after.misses == before.misses
-    assert after.hits == before.hits + 2
 
 
 def test_a_program_remembers_nothing_of_the_question_before():

@@ -1,0 +1,282 @@
+"""Conic programs as their solver takes them, at the speed of the solver.
+
+    min ½ xᵀ diag(P) x + qᵀ x   with   A x + s = b,  s ∈ K,
+
+K being zeros, then nonnegative numbers, then one second-order cone. Of A only the entries count
+that are not zero: the rows of a stance are mostly zeros, and a solver that does not know costs
+three times as much. A solver is set up for a pattern of entries, is kept, and takes over the
+numbers of later programs of that pattern: an answer depends on its program alone, not on those
+before.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import clarabel
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from hand_models.base import Array
+from planner import deadline
+
+__all__ = [
+    "ENDS",
+    "FAILED",
+    "OUT_OF_TIME",
+    "PRESENT",
+    "PROVEN",
+    "SOLVERS",
+    "ConicProgram",
+    "Solution",
+    "Solver",
+    "Solvers",
+]
+
+KEPT: Final = 64
+"""Solvers that wait for programs."""
+
+OUT_OF_TIME: Final = "out of time"
+"""Status of a solver that the deadline has ended."""
+
+STATUS: Final = {
+    "Solved": "optimal",
+    "AlmostSolved": "optimal_inaccurate",
+    "PrimalInfeasible": "infeasible",
+    "AlmostPrimalInfeasible": "infeasible_inaccurate",
+    "DualInfeasible": "unbounded",
+    "AlmostDualInfeasible": "unbounded_inaccurate",
+    "MaxIterations": "user_limit",
+    "MaxTime": "user_limit",
+    "CallbackTerminated": OUT_OF_TIME,
+}
+"""CVXPY's word for each of Clarabel's; for all others it is `FAILED`."""
+
+FAILED: Final = "solver_error"
+
+PRESENT: Final = ("optimal", "optimal_inaccurate")
+"""With a solution."""
+
+PROVEN: Final = ("infeasible", "infeasible_inaccurate")
+"""With multipliers that say why there is none."""
+
+ENDS: Final = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
+"""After which nothing else is tried."""
+
+
+class ConicProgram(NamedTuple):
+    """A program's data; m rows, n columns.
+
+    Attributes
+    ----------
+    P, q : ndarray, shape (n,)
+    A : ndarray, shape (m, n)
+    b : ndarray, shape (m,)
+    zero : int
+        Rows of equations, the first ones.
+    above : int
+        Of these, those above the balance.
+    second_order : int
+        Rows of the second-order cone, the last ones; all between are nonnegative.
+    """
+
+    P: Array
+    q: Array
+    A: Array
+    b: Array
+    zero: int
+    above: int = 0
+    second_order: int = 0
+
+
+class Solution(NamedTuple):
+    """How a program ended.
+
+    Attributes
+    ----------
+    status : str
+        CVXPY's word, or `OUT_OF_TIME`.
+    iterations : int
+    value : float
+        The objective; NaN without one.
+    x : ndarray or None
+        None where there is no solution.
+    multipliers : ndarray or None
+        Of the rows; where the program is infeasible, the proof of it. None without any.
+    """
+
+    status: str
+    iterations: int = 0
+    value: float = float("nan")
+    x: Array | None = None
+    multipliers: Array | None = None
+
+
+class Solver:
+    """A solver set up for a pattern of data, with the numbers it was given last.
+
+    Parameters
+    ----------
+    program : ConicProgram
+    settings : mapping of str to value
+        Of Clarabel. To be updated it may neither presolve nor decompose.
+    """
+
+    def __init__(self, program: ConicProgram, settings: Mapping[str, Any]) -> None:
+        self.settings = settings
+        self.pattern, entries = _pattern(program)
+        rows, columns = program.A.shape
+        self._numbers = {"P": program.P, "q": program.q, "A": entries, "b": program.b}
+        places = np.frombuffer(self.pattern.places, dtype=np.intp)
+        starts = np.searchsorted(places, rows * np.arange(columns + 1))
+        A = csc_matrix((entries, places % rows, starts), shape=(rows, columns))
+        # a program without a quadratic term begins elsewhere
+        diagonal = np.arange(columns + 1)
+        P = csc_matrix((columns, columns))
+        if self.pattern.quadratic:
+            P = csc_matrix((program.P, diagonal[:-1], diagonal), shape=P.shape)
+        between = rows - program.zero - program.second_order
+        cones = [clarabel.ZeroConeT(program.zero), clarabel.NonnegativeConeT(between)]
+        if program.second_order:
+            cones.append(clarabel.SecondOrderConeT(program.second_order))
+        chosen = clarabel.DefaultSettings()
+        chosen.verbose = False
+        for name, value in settings.items():
+            setattr(chosen, name, value)
+        self._solver = clarabel.DefaultSolver(P, program.q, A, program.b, cones, chosen)
+
+    def update(self, program: ConicProgram, entries: Array) -> None:
+        """Take over a program of the pattern, with the entries of A that are not zero."""
+        numbers = {"P": program.P, "q": program.q, "A": entries, "b": program.b}
+        changed = {
+            name: value
+            for name, value in numbers.items()
+            if not np.array_equal(value, self._numbers[name])
+        }
+        # it takes lists faster than arrays, and cannot take nothing
+        if changed:
+            self._solver.update(**{name: value.tolist() for name, value in changed.items()})
+            self._numbers = numbers
+
+    def solve(self) -> Solution:
+        """Solve the program taken last."""
+        deadline.begin_overlap()
+        if deadline.left() is None:
+            return _read(self._solver.solve())
+        caught: list[BaseException] = []
+
+        def over(_: object) -> bool:
+            # the solver would print what is raised here, and go on
+            try:
+                return deadline.expired()
+            except BaseException as error:
+                caught.append(error)
+                return True
+
+        self._solver.set_termination_callback(over)
+        try:
+            raw = self._solver.solve()
+        finally:
+            self._solver.unset_termination_callback()
+        if caught:
+            raise caught[0]
+        return _read(raw)
+
+
+class Solvers:
+    """Solvers that wait for programs. Safe to use from several threads.
+
+    Each serves one caller at a time, so that threads do not wait for each other.
+
+    Parameters
+    ----------
+    most : int
+        That are kept; those go first that were used longest ago.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = threading.Lock()
+        self._idle: list[Solver] = []
+
+    def __len__(self) -> int:
+        return len(self._idle)
+
+    def clear(self) -> None:
+        """Let all go that wait."""
+        with self._lock:
+            self._idle.clear()
+
+    def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> Solution:
+        """Solve a program; parameters as for `Solver`."""
+        pattern, entries = _pattern(program)
+        solver = self._take(pattern, settings)
+        if solver is None:
+            solver = Solver(program, settings)
+        else:
+            solver.update(program, entries)
+        solution = solver.solve()
+        # one that has met what is no number, or was interrupted, may not forget it
+        if solution.status != FAILED:
+            with self._lock:
+                self._idle.append(solver)
+                del self._idle[: -self._most]
+        return solution
+
+    def _take(self, pattern: Pattern, settings: Mapping[str, Any]) -> Solver | None:
+        """Take the solver of a pattern that was used last, if one waits."""
+        with self._lock:
+            for i in reversed(range(len(self._idle))):
+                if self._idle[i].pattern == pattern and self._idle[i].settings == settings:
+                    return self._idle.pop(i)
+        return None
+
+
+SOLVERS: Final = Solvers(KEPT)
+"""Those of this process."""
+
+
+class Pattern(NamedTuple):
+    """What a solver is set up for.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of A.
+    zero, second_order : int
+        As of the program.
+    quadratic : bool
+        Whether P is not zero.
+    places : bytes
+        Entries of A that are not zero, column by column.
+    """
+
+    shape: tuple[int, ...]
+    zero: int
+    second_order: int
+    quadratic: bool
+    places: bytes
+
+
+def _pattern(program: ConicProgram) -> tuple[Pattern, Array]:
+    """Return a program's pattern, and the entries of A that are not zero, column by column."""
+    columns = program.A.T.ravel()
+    places = np.flatnonzero(columns)
+    pattern = Pattern(
+        program.A.shape,
+        program.zero,
+        program.second_order,
+        bool(program.P.any()),
+        places.tobytes(),
+    )
+    return pattern, columns[places]
+
+
+def _read(raw: Any) -> Solution:
+    status = STATUS.get(str(raw.status), FAILED)
+    if status in PRESENT:
+        return Solution(status, raw.iterations, raw.obj_val, np.array(raw.x), np.array(raw.z))
+    proof = np.array(raw.z) if status in PROVEN else None
+    return Solution(status, raw.iterations, multipliers=proof)

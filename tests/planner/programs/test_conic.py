@@ -1,0 +1,357 @@
+"""Programs as they are solved: CVXPY's own data, whatever came before, from every thread."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+
+import clarabel
+import cvxpy as cp
+import numpy as np
+import pytest
+from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import CLARABEL
+
+from planner import deadline
+from planner.programs import conic, program, solvers, stance_program
+from planner.programs.conic import ConicProgram, Solver, Solvers
+from planner.programs.stance_data import HandData, StanceData
+from planner.programs.stance_program import SETTINGS, StanceProgram
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.stances import ask, on_wall, program_data
+
+FIXED = (10, 95, 20, 4)
+WITH_JOINTS = (10, 109, 20, 11)
+FLOATING = (6, 137, 62, 4)
+CLINGING = (8, 24, 28, 4)
+BARE = (4, 12, 4, 4)
+HANDS = (FIXED, WITH_JOINTS, FLOATING, CLINGING, BARE)
+
+SHAPES = [
+    (6, (FIXED,)),
+    (6, (FIXED,) * 4),
+    (6, (WITH_JOINTS,) * 4),
+    (9, (WITH_JOINTS, FLOATING, CLINGING, BARE)),
+    (6, (FLOATING, FLOATING)),
+    *((6 + count % 3, tuple(HANDS[i % 5] for i in range(count))) for count in (3, 8)),
+]
+"""Rows of balance, and loads, limits, hard rows and efforts of each hand."""
+
+SIXTEEN = (7, tuple(HANDS[i % 5] for i in range(16)))
+"""Of as many hands as there may be."""
+
+Draw = Callable[..., np.ndarray]
+
+KINDS: dict[str, Callable[[StanceData, Draw], StanceProgram]] = {
+    "Unique": lambda data, draw: program.Unique(data),
+    "Margin": lambda data, draw: program.Margin(data),
+    "Curved": lambda data, draw: program.Curved(
+        data, draw(*2 * data.rows.unit.shape), [draw(len(hand.unit)) for hand in data.hands]
+    ),
+    "TieBreak": lambda data, draw: program.TieBreak(data, 1.3),
+    "Effort": lambda data, draw: program.Effort(data, 1.3),
+    "LoadFactor": lambda data, draw: program.LoadFactor(data),
+    "Reach": lambda data, draw: program.Reach(
+        data,
+        draw(3),
+        draw(len(data.wrench), 3),
+        0.7,
+        [draw(len(hand.l0), 3) for hand in data.hands],
+    ),
+    "Nearest": lambda data, draw: program.Nearest(data),
+    "Nearest, some kept": lambda data, draw: program.Nearest(data, len(data.wrench) - 6),
+}
+
+
+def drawn(rng: np.random.Generator) -> Draw:
+    """Arrays of which about half is zero."""
+    return lambda *shape: rng.normal(size=shape) * rng.integers(0, 2, shape)
+
+
+def random_data(shape: tuple, draw: Draw) -> StanceData:
+    count, hands = shape
+    return StanceData(
+        tuple(
+            HandData(
+                G=draw(count, m),
+                g=draw(count),
+                L=draw(nl, m),
+                l0=draw(nl),
+                H=draw(nh, m),
+                h=draw(nh),
+                E=draw(ne, m),
+                e0=draw(ne),
+                tie=np.abs(draw(m)) + np.eye(m)[0],
+                rest=np.abs(draw(m)),
+                unit=np.full(m, 2.0),
+            )
+            for m, nl, nh, ne in hands
+        ),
+        draw(count) + np.eye(count)[0],
+    )
+
+
+def test_every_program_is_compared():
+    kinds = {kind for kind in vars(program).values() if isinstance(kind, type)}
+    programs = {kind for kind in kinds if issubclass(kind, StanceProgram)} - {StanceProgram}
+    assert {kind.__name__ for kind in programs} == {name.partition(",")[0] for name in KINDS}
+
+
+@pytest.mark.parametrize(
+    "shapes", [SHAPES, pytest.param([SIXTEEN], marks=pytest.mark.slow)], ids=["few", "sixteen"]
+)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_solver_gets_what_cvxpy_would_give_it(kind, shapes):
+    draw = drawn(np.random.default_rng(3))
+    for shape in shapes:
+        asked = KINDS[kind](random_data(shape, draw), draw)
+        ours = asked.conic()
+        theirs, _, _ = asked.define().problem.get_problem_data(cp.CLARABEL, solver_opts={})
+        np.testing.assert_array_equal(ours.A, theirs["A"].toarray())
+        np.testing.assert_array_equal(ours.b, theirs["b"])
+        np.testing.assert_array_equal(ours.q, theirs["c"])
+        # they leave a P out that is zero
+        P = theirs["P"].toarray() if "P" in theirs else np.zeros((len(ours.q),) * 2)
+        np.testing.assert_allclose(np.diag(ours.P), P, rtol=1e-15)
+        dims = theirs["dims"]
+        cones = ours.zero, len(ours.b) - ours.zero - ours.second_order
+        assert cones == (dims.zero, dims.nonneg)
+        assert dims.soc == [ours.second_order] * bool(ours.second_order)
+
+
+def real_programs(data: StanceData) -> dict[str, StanceProgram]:
+    """All of a stance that can be held."""
+    loads = solvers.unique(data).loads
+    root = 0.1 * np.eye(len(data.rows.unit))
+    up = np.eye(6)[:, 2:3]
+    return {
+        "Unique": program.Unique(data),
+        "Margin": program.Margin(data),
+        "Curved": program.Curved(data, root, loads),
+        "TieBreak": program.TieBreak(data, 1.1),
+        "Effort": program.Effort(data, 1.1),
+        "LoadFactor": program.LoadFactor(data),
+        "Reach": program.Reach(data, np.ones(1), up),
+        "Nearest": program.Nearest(data.turned(1e4 * data.wrench)),
+    }
+
+
+@pytest.fixture(scope="module")
+def data():
+    return program_data(ask(on_wall()))
+
+
+@pytest.mark.parametrize("kind", [name for name in KINDS if "," not in name])
+def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, kind):
+    asked = real_programs(data)[kind]
+    fast, further = asked.run()
+    assert fast.solved
+    gives_up = conic.Solution(conic.FAILED)
+    monkeypatch.setattr(stance_program.SOLVERS, "solve", lambda *_: gives_up)
+    monkeypatch.setattr(Solver, "solve", lambda _: gives_up)
+    slow, theirs = asked.run()
+    assert slow.solved
+    ours, value = (
+        (fast.value, slow.value) if further is None or not len(further) else (further[0], theirs[0])
+    )
+    assert value == pytest.approx(ours, rel=1e-6)
+    for one, two in zip(slow.loads, fast.loads, strict=True):
+        assert one.shape == two.shape
+    if kind in ("Unique", "TieBreak", "Effort", "Curved"):
+        for one, two in zip(slow.loads, fast.loads, strict=True):
+            np.testing.assert_allclose(one, two, atol=0.1)
+    for name in ("limit_duals", "hard_duals"):
+        shapes = [[dual.shape for dual in getattr(each, name)] for each in (slow, fast)]
+        assert shapes[0] == shapes[1]
+    np.testing.assert_allclose(slow.balance_dual, fast.balance_dual, atol=2e-3)
+    with deadline.within(0.0):
+        assert not asked.run()[0].solved
+
+
+def test_an_answer_does_not_depend_on_the_questions_before(data):
+    other = program_data(ask(on_wall(overhang=0.2, off=0.25)))
+    conic.SOLVERS.clear()
+    fresh = solvers.unique(data)
+    for before in (other, data, other.turned(1.2 * other.wrench), data.turned(other.wrench)):
+        solvers.unique(before)
+    again = solvers.unique(data)
+    assert again.value == fresh.value
+    for one, two in zip(again.loads, fresh.loads, strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
+    draw = drawn(np.random.default_rng(5))
+    data = random_data(SHAPES[3], draw)
+    first = KINDS[kind](data, draw).conic()
+    # the same pattern with other numbers, and another with none
+    second = first._replace(A=1.5 * first.A, b=0.5 * first.b, P=2.0 * first.P)
+    third = first._replace(b=np.zeros_like(first.b), q=3.0 * first.q)
+    fourth = first._replace(A=np.where(np.abs(first.A) < 0.3, 0.0, first.A))
+    kept = Solvers(2)
+    for asked in (first, second, third, fourth, first):
+        found, fresh = kept.solve(asked, SETTINGS), Solver(asked, SETTINGS).solve()
+        assert found.status == fresh.status
+        for name in ("x", "multipliers"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
+    assert len(kept) <= 2
+
+
+def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
+    given = []
+
+    class Spy:
+        def __init__(self, *problem, original=clarabel.DefaultSolver):
+            given.append("new")
+            self.solver = original(*problem)
+
+        def update(self, **blocks):
+            given.append(set(blocks))
+            self.solver.update(**blocks)
+
+        def solve(self):
+            return self.solver.solve()
+
+    conic.SOLVERS.clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(clarabel, "DefaultSolver", Spy)
+        solvers.unique(data)
+    assert given == ["new"]
+    wrench = 1.1 * data.wrench
+    turned = solvers.unique(data.turned(wrench))
+    assert given[1:] == [{"b"}]
+    weaker = tuple(hand._replace(L=1.1 * hand.L) for hand in data.hands)
+    solvers.unique(StanceData(weaker, wrench))
+    assert given[2:] == [{"A"}]
+    conic.SOLVERS.clear()
+    assert solvers.unique(data.turned(wrench)).value == turned.value
+
+
+def test_threads_do_not_disturb_each_other(data):
+    conic.SOLVERS.clear()
+    wrenches = [data.wrench * (1.0 + 0.02 * i) for i in range(24)]
+    alone = [solvers.unique(data.turned(w)).value for w in wrenches]
+    with ThreadPoolExecutor(6) as pool:
+        together = list(pool.map(lambda w: solvers.unique(data.turned(w)).value, wrenches * 4))
+    assert together == alone * 4
+    assert len(conic.SOLVERS) <= 6
+
+
+def test_the_solvers_that_wait_are_bounded(data):
+    for i, j in product(range(10), range(7)):
+        hand = data.hands[0]
+        # another entry that is zero: another pattern
+        L = hand.L.copy()
+        L[j, i] = 0.0 if L[j, i] else 1.0
+        solvers.margin(StanceData((hand._replace(L=L), *data.hands[1:]), data.wrench))
+    assert len(conic.SOLVERS) == conic.KEPT
+    conic.SOLVERS.clear()
+    assert len(conic.SOLVERS) == 0
+
+
+def test_numbers_that_are_none_cost_only_their_own_question(data):
+    honest = solvers.unique(data)
+    lost = solvers.unique(data.turned(data.wrench * np.nan))
+    assert not lost.solved
+    assert np.isnan(lost.value)
+    assert solvers.unique(data).value == honest.value
+    # in the weights, too: what a solver keeps of them it takes along
+    for number in (np.nan, np.inf):
+        hands = tuple(hand._replace(tie=hand.tie * number) for hand in data.hands)
+        assert not solvers.unique(StanceData(hands, data.wrench)).solved
+        again = solvers.unique(data)
+        for one, two in zip(again.loads, honest.loads, strict=True):
+            np.testing.assert_array_equal(one, two)
+
+
+def test_a_solver_is_stopped_at_the_deadline_and_goes_on_after(data):
+    honest = solvers.unique(data)
+    with deadline.within(0.0):
+        late = solvers.unique(data)
+    assert late.status == conic.OUT_OF_TIME
+    assert not late.solved
+    with deadline.within(1e4):
+        assert solvers.unique(data).value == honest.value
+    assert solvers.unique(data).value == honest.value
+
+
+def test_an_inner_deadline_cannot_put_off_an_outer_one():
+    with deadline.within(0.0), deadline.within(1e4):
+        assert deadline.expired()
+    with deadline.within(1e4), deadline.within(None):
+        assert deadline.seconds() == 1e4
+        assert 0.0 < deadline.left() <= 1e4
+    assert deadline.left() is None
+
+
+def test_infeasible_comes_with_its_proof():
+    """Farkas: ν·(W − g) + λ·h < 0 with λ ≥ 0 and Gᵀν + Hᵀλ = 0, no weight on limits."""
+    data = program_data(ask(on_wall(palm=False)))
+    outcome = solvers.unique(data)
+    assert outcome.status == cp.INFEASIBLE
+    nu = outcome.balance_dual
+    value = float(nu @ data.offset)
+    for hand, limit, hard in zip(data.hands, outcome.limit_duals, outcome.hard_duals, strict=True):
+        assert hard.min() >= 0.0
+        value += float(hard @ hand.h - limit @ hand.l0)
+        np.testing.assert_allclose(
+            hand.G.T @ nu + hand.H.T @ hard + hand.L.T @ limit, 0.0, atol=1e-6
+        )
+        assert np.abs(limit).max() < 1e-6
+    assert value < -1e-3
+
+
+def test_the_solvers_words_are_cvxpys():
+    theirs = CLARABEL.STATUS_MAP
+    assert {word: theirs.get(word) for word in conic.STATUS if word in theirs} == {
+        word: status for word, status in conic.STATUS.items() if status != conic.OUT_OF_TIME
+    }
+    assert {status for word, status in theirs.items() if word not in conic.STATUS} <= {conic.FAILED}
+
+
+def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
+    honest = solvers.unique(data)
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with deadline.within(1e4), monkeypatch.context() as patch:
+        patch.setattr(deadline, "expired", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            solvers.unique(data)
+    assert solvers.unique(data).value == honest.value
+
+
+FORKED = """
+import os
+from tests.suite.helpers.stances import PLACES, ask, on_wall
+from planner.solving.solve import plan
+plan(ask(on_wall()))
+child = os.fork()
+if not child:
+    os._exit(0 if plan(ask(on_wall(limbs=tuple(PLACES)[:3]))).verified else 1)
+_, status = os.waitpid(child, 0)
+raise SystemExit(os.waitstatus_to_exitcode(status))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_plans():
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORKED],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert ended.returncode == 0
+
+
+def test_a_program_of_one_row_is_solved_by_hand():
+    """min x + ½ (2 x²) with x ≥ −1 as −x ≤ 1: at −½, of value −¼."""
+    asked = ConicProgram(np.array([2.0]), np.array([1.0]), np.array([[-1.0]]), np.array([1.0]), 0)
+    found = Solvers(1).solve(asked, SETTINGS)
+    assert found.value == pytest.approx(-0.25, abs=1e-8)
+    assert found.x == pytest.approx([-0.5], abs=1e-6)
