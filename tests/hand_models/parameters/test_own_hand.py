@@ -403,6 +403,7 @@ def test_a_route_is_climbed_with_the_hand(
     assert "hand_load" in tables["1"]
 
 
+@pytest.mark.slow
 def test_the_demo_asks_for_the_hand(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

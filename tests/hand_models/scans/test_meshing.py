@@ -89,6 +89,7 @@ def test_a_spacing_keeps_one_point_a_square(tmp_path):
     np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_large_cloud_is_thinned_to_what_a_hand_can_be_placed_on(tmp_path):
     x, z = np.random.default_rng(0).uniform(-0.6, 0.6, (2, 200_000))
     points = np.column_stack([x, 1.0 - relief(x, z), z])
@@ -159,6 +160,7 @@ def test_progress_is_told(tmp_path):
     assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 
+@pytest.mark.slow
 def test_a_hand_settles_on_real_terrain_that_is_made_a_wall(tmp_path):
     scan = read_scan(TERRAIN, cell=90.0, up="y", width=1.0)
     rock = mesh_scan(scan, spacing=0.004)

@@ -237,6 +237,7 @@ GIVEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limb", "name"),
     [

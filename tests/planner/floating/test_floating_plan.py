@@ -125,6 +125,7 @@ def pressed(model, section, contact, depth):
     return replace(contact, along=float(np.trapezoid(pressures * places) / np.trapezoid(pressures)))
 
 
+@pytest.mark.slow
 def test_nothing_near_a_plan_is_better():
     """Other poses that balance, found with the hands' stiffness alone, use at least as much."""
     question, answer = pair()
@@ -168,6 +169,7 @@ def test_hand_asked_for_its_wrench_at_rest_stays_there():
     np.testing.assert_allclose(told, at_rest, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_symmetric_stance_has_a_symmetric_plan():
     answer = plan(ask(floating(on_wall(), *REAR, preload=np.full(4, 60.0)), load=CALIBRATION_LOAD))
     right, left = (hand.wrist.twist for hand in answer.hands if hand.wrist is not None)
@@ -264,6 +266,7 @@ def test_no_plan_is_dressed_up():
 # As it travels ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_reply_over_zenoh_tells_the_wrists():
     request = msgspec.structs.replace(read_request("wall-300-floating"), want=["model"])
     with (
@@ -303,6 +306,7 @@ def test_wrench_space_of_a_floating_hand():
     assert reply["dimension"] == 6
 
 
+@pytest.mark.slow
 def test_spoilt_requests_get_an_answer():
     request = wall_request(LIGHT, limbs=("rear_left",))
     request["stance"]["hands"][0] |= {"wrist": "floating", "tendon_preload": [40, 50, 50, 40]}

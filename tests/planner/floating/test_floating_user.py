@@ -132,6 +132,7 @@ def test_tension_that_a_slack_hand_needs_holds_its_tiles():
         assert bool((loads.shears[0][hand.touching] >= -1e-6).all()) == holds
 
 
+@pytest.mark.slow
 def test_preload_that_alone_overloads_is_named():
     asked = question(request(("rear_right", "rear_left"), preload=95.0, want=["load_factor"]))
     answer = plan(asked)

@@ -129,7 +129,15 @@ def words(axes):
     return [note.get_text() for note in axes.texts]
 
 
-KINDS = ("overloaded", "plain", "ceiling", "floating", "infeasible", "one limb", "two limbs")
+KINDS = (
+    "overloaded",
+    pytest.param("plain", marks=pytest.mark.slow),
+    pytest.param("ceiling", marks=pytest.mark.slow),
+    "floating",
+    "infeasible",
+    pytest.param("one limb", marks=pytest.mark.slow),
+    pytest.param("two limbs", marks=pytest.mark.slow),
+)
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -106,10 +106,12 @@ def test_threads_that_share_a_program_get_the_answers_of_one_thread():
     "question",
     [
         ask(on_wall(), load=Load()),
-        ask(on_wall(Cylinder(0.7), overhang=-0.3)),
+        pytest.param(ask(on_wall(Cylinder(0.7), overhang=-0.3)), marks=pytest.mark.slow),
         ask(on_wall(Sphere(0.5), lateral=False)),
-        ask(on_wall(Plane(), overhang=-0.7, outer_rotation=0.0)),
-        random_question(10),
+        pytest.param(
+            ask(on_wall(Plane(), overhang=-0.7, outer_rotation=0.0)), marks=pytest.mark.slow
+        ),
+        pytest.param(random_question(10), marks=pytest.mark.slow),
         random_question(18),
     ],
 )

@@ -350,6 +350,7 @@ def flags_to(served: Served) -> list[str]:
     return [*flags, "--timeout", str(PATIENCE)]
 
 
+@pytest.mark.slow
 def test_serve_and_query_a_robot_and_a_hand(
     served: Served, file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -382,6 +383,7 @@ def test_a_service_says_what_its_robot_does_not_reach(served: Served, file: Path
     assert caught.value.kind == "unreachable"
 
 
+@pytest.mark.slow
 def test_the_demo_is_of_the_robot(
     lemur: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

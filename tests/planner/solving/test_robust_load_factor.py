@@ -67,7 +67,7 @@ def asked_of(name: str, **kwargs) -> Question:
         (ask(on_wall(), "robust", limits=Limits(tendon_tension=150.0)), 8),
         (asked_of("wall-300-joints"), 6),
         (asked_of("ledge"), 6),
-        (asked_of("boulders"), 2),
+        pytest.param(asked_of("boulders"), 2, marks=pytest.mark.slow),
         pytest.param(asked_of("wall-300"), 50, marks=pytest.mark.slow),
         pytest.param(asked_of("boulders"), 50, marks=pytest.mark.slow),
     ],

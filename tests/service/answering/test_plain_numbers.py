@@ -41,7 +41,9 @@ def answered(key: str, request: dict, form: Format, streams: Streams | None = No
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("status", STANCES)
-@pytest.mark.parametrize("objective", ["max_margin", "min_effort"])
+@pytest.mark.parametrize(
+    "objective", ["min_effort", pytest.param("max_margin", marks=pytest.mark.slow)]
+)
 def test_plans_travel(status, form, objective):
     asked = STANCES[status] | {"want": WANT, "objective": objective}
     asked["present"] = {hand["limb"]: [5.0] * 4 for hand in asked["stance"]["hands"]}

@@ -16,7 +16,7 @@ from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complain
 from tests.suite.helpers.processes import begun, ended, loaded, until, watched, workers
 from tests.suite.helpers.requests import HEAVY, wall_request
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow))
 COUNT = 24
 
 
@@ -150,7 +150,7 @@ def test_a_full_disk_leaves_no_half_file(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["stages.csv"]
 
 
-@pytest.mark.parametrize("more", [[], ["--json"]])
+@pytest.mark.parametrize("more", [pytest.param([], marks=pytest.mark.slow), ["--json"]])
 def test_standard_output_that_is_full(more: list[str]) -> None:
     full = Path("/dev/full")
     if not full.exists():

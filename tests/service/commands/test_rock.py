@@ -136,7 +136,7 @@ def test_a_file_in_the_wrong_unit_is_warned_of(
     assert "m across, and a hold may be 10 m" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize("up", ["z", "y"])
+@pytest.mark.parametrize("up", ["z", pytest.param("y", marks=pytest.mark.slow)])
 def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
     up: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -184,6 +184,7 @@ def script(tmp_path: Path, body: str, guard: str = "") -> subprocess.CompletedPr
     )
 
 
+@pytest.mark.slow
 def test_processes_that_come_too_late_are_not_heard_of(tmp_path):
     body = """
     with Planners(3) as planners:

@@ -65,7 +65,7 @@ def numbers(reply: object) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("form", [JSON, MSGPACK])
+@pytest.mark.parametrize("form", [JSON, pytest.param(MSGPACK, marks=pytest.mark.slow)])
 def test_a_shared_rock_gives_the_plan_of_four_alike(form: str) -> None:
     apart, shared = four_on(WALL | {"pose": IN_WORLD}), on_wall()
     assert len(msgspec.json.encode(apart)) > 3.9 * len(msgspec.json.encode(shared))

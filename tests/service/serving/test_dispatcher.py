@@ -208,6 +208,7 @@ def test_processes_that_are_killed_are_replaced_whatever_they_do(
         assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
 
 
+@pytest.mark.slow
 def test_a_service_whose_processes_do_not_start_says_so() -> None:
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (

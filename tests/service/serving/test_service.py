@@ -341,6 +341,7 @@ def soon(said: Callable[[], bool], *, within: float = PATIENCE) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
     endpoint = free_endpoint()
     first = zenoh_config(listen=[endpoint], multicast=False)
@@ -517,6 +518,7 @@ def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
     assert exposes.startswith(f"crux: tcp/0.0.0.0:{port}: whoever reaches it can ask")
 
 
+@pytest.mark.slow
 def test_a_log_line_a_question() -> None:
     server = Served(free_endpoint(), "-v", "--log-format", "json")
     with CruxClient(client_config(server.endpoint), timeout=PATIENCE) as client:
