@@ -320,6 +320,11 @@ def _print(
         f"{len(trials):,} trials at {points:,} points: {len(found):,} hold something, {pulled:,} "
         "of them also where they are pulled off (pull; shear is the least to any side)"
     )
+    if not found:
+        out.print(
+            "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
+            markup=False,
+        )
     for words in oddities:
         out.print(f"warning: {words}", markup=False)
     for reason, count in refused.most_common(REASONS):

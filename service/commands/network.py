@@ -155,7 +155,7 @@ class _StopSignal:
 def query(
     stance: str,
     config: zenoh.Config,
-    timeout: float,
+    timeout: float | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,

@@ -149,9 +149,7 @@ robot_option = click.option(
 timeout_option = click.option(
     "--timeout",
     type=FiniteRange(0.01, LONGEST),
-    default=TIMEOUT,
-    show_default=True,
-    help="[s]",
+    help=f"[s]; by default {TIMEOUT:g}, or what the deadline of the request takes.",
 )
 
 

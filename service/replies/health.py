@@ -21,10 +21,14 @@ class ProcessHealth(Struct, kw_only=True):
 
 
 class LastFailure(Struct, kw_only=True):
-    """What failed last: the kind of error, of which question or process, and when (Unix time)."""
+    """What failed last: the kind of error, of which key or process, and when (Unix time).
+
+    ``id``: the question's.
+    """
 
     kind: str
     about: str
+    id: str | None = None
     at: float
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import time
+from queue import SimpleQueue
 from typing import Final, Self, TypeVar
 
 import msgspec
 import zenoh
 from msgspec import UNSET
+from zenoh.handlers import Callback
 
 from service.replies import (
     BodySpaceReply,
@@ -54,7 +56,7 @@ IN_TIME: Final = 0.9
 """Part of a client's time in which a question without a deadline is to be answered."""
 
 TIMEOUT: Final = 10.0
-"""How long a client waits for an answer by default [s]."""
+"""How long a client waits at least by default [s]."""
 
 SECOND_TRY_AFTER: Final = 0.3
 """Pause before an empty answer is believed: a service that has just come back needs it [s]."""
@@ -69,7 +71,8 @@ class CruxClient:
         A session, which stays open, or the configuration of one that the client opens and closes.
     robot : str, optional
     timeout : float, optional
-        Of each question [s]; one that names no deadline has nine tenths of it.
+        How long each question is waited for [s]; one that names no deadline has nine tenths of it.
+        By default 10 s, and longer for a question whose own deadline is.
     form : Format, optional
         How messages travel.
 
@@ -84,7 +87,7 @@ class CruxClient:
         where: zenoh.Session | zenoh.Config,
         robot: str = DEFAULT_ROBOT,
         *,
-        timeout: float = TIMEOUT,
+        timeout: float | None = None,
         form: Format = Format.MSGPACK,
     ) -> None:
         self.robot = robot
@@ -148,15 +151,17 @@ class CruxClient:
         return self._ask(SET_POINTS, request, SetPointsReply)
 
     def _ask(self, name: str, request: Query, kind: type[R]) -> R:
-        key = service_key(self.robot, name)
+        key, waits = service_key(self.robot, name), self.timeout
+        if waits is None:
+            waits = max(TIMEOUT, (request.deadline or 0.0) / IN_TIME)
         if request.deadline is None:
             # nobody waits for an answer that comes later
-            own = min(IN_TIME * self.timeout, LONGEST_DEADLINE)
+            own = min(IN_TIME * waits, LONGEST_DEADLINE)
             request = msgspec.structs.replace(request, deadline=own)
-        reply = self._get(key, request)
+        reply = self._get(key, request, waits)
         if reply is None:
             time.sleep(SECOND_TRY_AFTER)
-            reply = self._get(key, request)
+            reply = self._get(key, request, waits)
         if reply is None:
             raise NoServiceError(f"nobody answers at {key}")
         if reply.ok is not None:
@@ -164,7 +169,7 @@ class CruxClient:
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
-                f"no answer at {key} within {self.timeout:g} s; allow it longer (--timeout)"
+                f"no answer at {key} within {waits:g} s; allow it longer (--timeout)"
             )
         detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
         raise ServiceError(
@@ -174,17 +179,25 @@ class CruxClient:
             retry_after=None if detail.retry_after is UNSET else detail.retry_after,
         )
 
-    def _get(self, key: str, request: Query) -> zenoh.Reply | None:
-        """Return the first reply, or None where there is none."""
-        replies = self._session.get(
+    def _get(self, key: str, request: Query, timeout: float) -> zenoh.Reply | None:
+        """Return the first reply that is no error, else the first error, or None without any."""
+        replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+        self._session.get(
             key,
+            Callback(replies.put, lambda: replies.put(None), indirect=False),
             payload=self.form.encode(request),
             encoding=self.form.label(request),
             consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=self.timeout,
+            timeout=timeout,
             source_info=zenoh.SourceInfo(self._source.id, next(self._asked)),
         )
-        return next(iter(replies), None)
+        error = None
+        while (reply := replies.get()) is not None:
+            if reply.ok is not None:
+                return reply
+            # of servers that are linked, one may not know the stream that another has
+            error = error or reply
+        return error
 
     def _read(self, payload: zenoh.ZBytes, encoding: zenoh.Encoding, kind: type[R]) -> R:
         try:

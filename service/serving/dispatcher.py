@@ -297,7 +297,7 @@ class Dispatcher:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.overdue(now):
-            missing = "it was its turn, since the service is busy"
+            missing = "it was its turn"
             self._refuse(question, DeadlineError(question.seconds, missing))
         for lane, asked in list(self._crew.work.items()):
             ends = self._crew.ends(lane) if lane in self._crew.work else None

@@ -120,7 +120,9 @@ class Watch:
         if worked > 0.0:
             self._worked.labels(question.name).observe(worked)
         if status in FAILURES:
-            self._failure = LastFailure(kind=status, about=question.name, at=time.time())
+            self._failure = LastFailure(
+                kind=status, about=question.name, id=question.id, at=time.time()
+            )
         if log.isEnabledFor(logging.INFO):
             line = {
                 "key": question.key,
@@ -128,6 +130,7 @@ class Watch:
                 "client": question.client or None,
                 "waited": round(waited, 6),
                 "worked": round(worked, 6),
+                "total": round(now - question.arrived, 6),
                 "status": status,
             }
             log.info(

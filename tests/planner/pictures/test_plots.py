@@ -129,18 +129,13 @@ def words(axes):
     return [note.get_text() for note in axes.texts]
 
 
-KINDS = (
-    "overloaded",
-    pytest.param("plain", marks=pytest.mark.slow),
-    pytest.param("ceiling", marks=pytest.mark.slow),
-    "floating",
-    "infeasible",
-    pytest.param("one limb", marks=pytest.mark.slow),
-    pytest.param("two limbs", marks=pytest.mark.slow),
+KINDS = ("overloaded", "plain", "ceiling", "floating", "infeasible", "one limb", "two limbs")
+LONG = ("plain", "ceiling", "one limb", "two limbs")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in KINDS]
 )
-
-
-@pytest.mark.parametrize("name", KINDS)
 def test_every_kind_of_stance_has_a_picture_with_units_on_its_axes(name, tmp_path):
     question, plan = answered(name)
     figure = drawn(name)
