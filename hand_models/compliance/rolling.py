@@ -306,7 +306,9 @@ def _link(finger: SettledFinger, section: Section, first: int, bearing: int, dep
         near, far, depth = far, model.joint_spacing, 0.0
     start, end = (arm.real + (each - contact.along) for each in (near, far))
     flat = curvature * FLATTEST <= 1.0
-    rolls = not flat and contact.kind != "edge" and start <= arm.real + away <= end
+    # beyond its radius there is no more of the circle that the rock is taken for
+    near_by = not flat and abs(away) < 1.0 / curvature
+    rolls = near_by and contact.kind != "edge" and start <= arm.real + away <= end
     if rolls:
         arm += away
         point = (point[0] + away * u.real, point[1] + away * u.imag)

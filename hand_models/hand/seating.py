@@ -285,6 +285,8 @@ def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seatin
         """By how much proximal contacts miss c₁; least in rock, most where there is none."""
         missed = np.full(len(places), math.nan)
         there = np.isfinite(places[:, 1])
+        if not there.any():
+            return missed
         joints = x - places[there, 0] + 1j * (z - places[there, 1])
         rests = [section.rests(joints, *face, *limits) for section in under]
         along = np.array([each.distance for each in rests])

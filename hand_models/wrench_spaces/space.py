@@ -161,7 +161,12 @@ class WrenchSpace:
         idle = ~used.any(axis=1)
         if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
             raise self._empty()
-        groups = coupled_columns(used)
+        # what moves nothing, and nothing holds, adds nothing: a wrist without lateral reactions
+        groups = [
+            each
+            for each in coupled_columns(used)
+            if used[:, each].any() or self.generators[:, each].any()
+        ]
         if len(groups) == 1:
             # rows of the whole wrench couple nothing that is not coupled already
             A, b, used = self.A, self.b, np.abs(self.A) > 0.0

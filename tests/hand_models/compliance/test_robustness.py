@@ -8,7 +8,18 @@ import warnings
 import numpy as np
 import pytest
 
-from hand_models import Cylinder, Edge, Grasp, Hold, InvalidInputError, Plane, Pose, Sphere
+from hand_models import (
+    Cylinder,
+    Edge,
+    Grasp,
+    Hold,
+    InvalidInputError,
+    Plane,
+    Pose,
+    Profile,
+    Sphere,
+    Surface,
+)
 from hand_models.base import EmptySetError
 from hand_models.compliance import (
     CompliantHand,
@@ -126,3 +137,11 @@ def test_a_hand_that_touches_nothing_gives_no_wrench_and_no_warning() -> None:
         pose = wrist_pose(hand, PULL)
     assert not pose.converged
     assert math.isclose(pose.residual[2], -1.0)
+
+
+def test_a_face_that_lies_far_along_the_rock_does_not_roll() -> None:
+    """The rock's radius there is less than the way to where the face's line is nearest to it."""
+    rock = Profile(np.array([[-0.0975723, 0.00926578], [0.1602632, 0.0890436]]))
+    settled = HAND.settle(rock, Surface.named("concrete-fine"), Grasp(3.0049519663715873), None)
+    loads = CompliantHand(settled).loads(np.zeros((1, 6)))
+    assert np.isfinite(loads.normals[0]).all()

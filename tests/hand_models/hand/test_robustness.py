@@ -19,6 +19,7 @@ from hand_models import (
     LimitError,
     Plane,
     Pose,
+    Profile,
     Sphere,
     Surface,
     tension_limits,
@@ -221,3 +222,8 @@ def test_a_tension_that_closes_no_joint_is_refused_and_the_least_that_does_is_na
         with pytest.raises(InvalidInputError, match=f"at least {told:g} N") as caught:
             HAND.settle(hold, ROCK, Grasp(closing_tension=tension))
         assert caught.value.field == "grasp.closing_tension"
+
+
+def test_a_profile_whose_top_is_nowhere_on_the_way_of_a_pinch():
+    outline = [[0.1713, 0.0513], [0.02604, -0.02449], [0.07038, 0.06011], [0.02808, 0.00927]]
+    assert stress(Profile(np.array(outline)), ROCK, Grasp(math.pi), None) in ("held", "empty")

@@ -139,3 +139,25 @@ def test_the_same_in_this_process() -> None:
     reply = answering.wrench_space(msgspec.structs.replace(request, want=["half_spaces"]))
     assert reply.vertices is None
     assert reply.half_spaces == answering.wrench_space(request).half_spaces
+
+
+@pytest.mark.parametrize(
+    ("hold", "grasp"),
+    [
+        # no finger reaches it
+        ({"shape": "sphere", "diameter": 0.004}, {"palm": False, "lateral": False}),
+        # nothing holds the wrist sideways
+        (
+            {"shape": "edge", "fillet_radius": 0.0012, "angle": 3.05},
+            {"palm": False, "lateral": False, "outer_rotation": 0.0},
+        ),
+    ],
+)
+def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing(
+    hold: dict[str, Any], grasp: dict[str, Any]
+) -> None:
+    request = asked(1, wrist="floating")
+    request["stance"]["hands"][0] |= {"hold": hold, "grasp": grasp, "surface": "rock"}
+    reply = answered(request)
+    assert reply["dimension"] is not None
+    assert reply["dimension"] < 6
