@@ -80,11 +80,13 @@ def try_everywhere(
     # as many for each process
     rounds = max(math.ceil(len(trials) / (most * count)), 1)
     size = max(math.ceil(len(trials) / (rounds * count)), 1)
-    chunks = [list(trials[i : i + size]) for i in range(0, len(trials), size)]
+    # each all over the rock, so that what is broken off has been everywhere
+    step = math.ceil(len(trials) / size)
+    chunks = [list(trials[i::step]) for i in range(step)]
     here, processes = how.trying(), min(count, len(chunks)) - 1
     with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
         pairs = enumerate(map(here, chunks)) if others is None else others.each(chunks, here)
         for i, results in pairs:
             if isinstance(results, Lost):
                 results = [InvalidInputError(results.reason) for _ in chunks[i]]
-            yield from enumerate(results, start=size * i)
+            yield from zip(range(i, len(trials), step), results, strict=True)
