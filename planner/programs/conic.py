@@ -21,6 +21,7 @@ from scipy.sparse import csc_matrix
 
 from hand_models.base import Array
 from planner import deadline
+from planner.programs.stance_data import Columns
 
 __all__ = [
     "ENDS",
@@ -72,7 +73,8 @@ class ConicProgram(NamedTuple):
     Attributes
     ----------
     P, q : ndarray, shape (n,)
-    A : ndarray, shape (m, n)
+    A : tuple of Columns
+        Beside each other, all with m rows.
     b : ndarray, shape (m,)
     zero : int
         Rows of equations, the first ones.
@@ -84,7 +86,7 @@ class ConicProgram(NamedTuple):
 
     P: Array
     q: Array
-    A: Array
+    A: tuple[Columns, ...]
     b: Array
     zero: int
     above: int = 0
@@ -126,12 +128,10 @@ class Solver:
 
     def __init__(self, program: ConicProgram, settings: Mapping[str, Any]) -> None:
         self.settings = settings
-        self.pattern, entries = _pattern(program)
-        rows, columns = program.A.shape
-        self._numbers = {"P": program.P, "q": program.q, "A": entries, "b": program.b}
-        places = np.frombuffer(self.pattern.places, dtype=np.intp)
-        starts = np.searchsorted(places, rows * np.arange(columns + 1))
-        A = csc_matrix((entries, places % rows, starts), shape=(rows, columns))
+        self.pattern = Pattern.of(program)
+        self._numbers = _numbers(program)
+        rows, columns = len(program.b), len(program.q)
+        A = csc_matrix(Columns.beside(program.A), shape=(rows, columns))
         # a program without a quadratic term begins elsewhere
         diagonal = np.arange(columns + 1)
         P = csc_matrix((columns, columns))
@@ -147,9 +147,9 @@ class Solver:
             setattr(chosen, name, value)
         self._solver = clarabel.DefaultSolver(P, program.q, A, program.b, cones, chosen)
 
-    def update(self, program: ConicProgram, entries: Array) -> None:
-        """Take over a program of the pattern, with the entries of A that are not zero."""
-        numbers = {"P": program.P, "q": program.q, "A": entries, "b": program.b}
+    def update(self, program: ConicProgram) -> None:
+        """Take over a program of the pattern."""
+        numbers = _numbers(program)
         changed = {
             name: value
             for name, value in numbers.items()
@@ -211,12 +211,11 @@ class Solvers:
 
     def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> Solution:
         """Solve a program; parameters as for `Solver`."""
-        pattern, entries = _pattern(program)
-        solver = self._take(pattern, settings)
+        solver = self._take(Pattern.of(program), settings)
         if solver is None:
             solver = Solver(program, settings)
         else:
-            solver.update(program, entries)
+            solver.update(program)
         solution = solver.solve()
         # one that has met what is no number, or was interrupted, may not forget it
         if solution.status != FAILED:
@@ -243,35 +242,36 @@ class Pattern(NamedTuple):
 
     Attributes
     ----------
-    shape : tuple of int
-        Of A.
-    zero, second_order : int
-        As of the program.
+    rows, columns, zero, second_order : int
     quadratic : bool
         Whether P is not zero.
-    places : bytes
-        Entries of A that are not zero, column by column.
+    places : tuple of bytes
+        Where A is not zero.
     """
 
-    shape: tuple[int, ...]
+    rows: int
+    columns: int
     zero: int
     second_order: int
     quadratic: bool
-    places: bytes
+    places: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, program: ConicProgram) -> Pattern:
+        """Return that of a program."""
+        return cls(
+            len(program.b),
+            len(program.q),
+            program.zero,
+            program.second_order,
+            bool(program.P.any()),
+            tuple(part.tobytes() for each in program.A for part in (each.rows, each.starts)),
+        )
 
 
-def _pattern(program: ConicProgram) -> tuple[Pattern, Array]:
-    """Return a program's pattern, and the entries of A that are not zero, column by column."""
-    columns = program.A.T.ravel()
-    places = np.flatnonzero(columns)
-    pattern = Pattern(
-        program.A.shape,
-        program.zero,
-        program.second_order,
-        bool(program.P.any()),
-        places.tobytes(),
-    )
-    return pattern, columns[places]
+def _numbers(program: ConicProgram) -> dict[str, Array]:
+    A = np.concatenate([part.values for part in program.A])
+    return {"P": program.P, "q": program.q, "A": A, "b": program.b}
 
 
 def _read(raw: Any) -> Solution:

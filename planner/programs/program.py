@@ -39,7 +39,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import ConicProgram
 from planner.programs.outcome import Outcome, Reached
-from planner.programs.stance_data import StanceData
+from planner.programs.stance_data import Columns, StanceData
 from planner.programs.stance_program import REFINED, SHARP, Definition, StanceProgram
 
 __all__ = [
@@ -72,11 +72,11 @@ class Margin(StanceProgram):
         return Definition(cp.Problem(cp.Minimize(u), [*rows]), (u, z), rows)
 
     def conic(self) -> ConicProgram:
-        A, b = self.blocks(1)
-        A[self.of_limits, 0] = -1.0
-        P, q = np.zeros((2, A.shape[1]))
+        u, loads, b = self.blocks(1)
+        u[self.of_limits] = -1.0
+        P, q = np.zeros((2, 1 + self.size))
         q[0] = 1.0
-        return ConicProgram(P, q, A, b, len(self.G))
+        return ConicProgram(P, q, (Columns.of(u), loads), b, len(self.G))
 
 
 class Unique(StanceProgram):
@@ -105,12 +105,12 @@ class Unique(StanceProgram):
         return Definition(cp.Problem(cp.Minimize(u + ties), [*rows]), (u, z), rows)
 
     def conic(self) -> ConicProgram:
-        A, b = self.blocks(1)
-        A[self.of_limits, 0] = -1.0
-        P, q = np.zeros((2, A.shape[1]))
+        u, loads, b = self.blocks(1)
+        u[self.of_limits] = -1.0
+        P, q = np.zeros((2, 1 + self.size))
         P[1:] = 2.0 * self.weights
         q[0] = 1.0
-        return ConicProgram(P, q, A, b, len(self.G))
+        return ConicProgram(P, q, (Columns.of(u), loads), b, len(self.G))
 
     def solve(self) -> Outcome:
         """Return the plan of least utilisation; ``value`` is that utilisation."""
@@ -147,16 +147,15 @@ class Curved(StanceProgram):
 
     def conic(self) -> ConicProgram:
         """Columns u, R z − R z₀ and z."""
-        size = len(self.centre)
-        A, b = self.blocks(1 + size, above=size)
-        A[:size, 1 : 1 + size] = -np.eye(size)
-        A[:size, 1 + size :] = self.root
-        A[size:][self.of_limits, 0] = -1.0
+        size = self.size
+        front, loads, b = self.blocks(1 + size, above=self.root)
+        front[:size, 1:] = -np.eye(size)
+        front[size:][self.of_limits, 0] = -1.0
         b[:size] = self.centre
-        P, q = np.zeros((2, A.shape[1]))
+        P, q = np.zeros((2, 1 + 2 * size))
         P[1 : 1 + size] = 1.0
         q[0] = 1.0
-        return ConicProgram(P, q, A, b, size + len(self.G), size)
+        return ConicProgram(P, q, (Columns.of(front), loads), b, size + len(self.G), size)
 
 
 class TieBreak(StanceProgram):
@@ -174,10 +173,10 @@ class TieBreak(StanceProgram):
         return Definition(cp.Problem(cp.Minimize(effort), [*rows]), (z,), rows)
 
     def conic(self) -> ConicProgram:
-        A, b = self.blocks(0)
+        _, loads, b = self.blocks(0)
         b[self.of_limits] += self.cap
         P = 2.0 * self.weights
-        return ConicProgram(P, np.zeros_like(P), A, b, len(self.G))
+        return ConicProgram(P, np.zeros_like(P), (loads,), b, len(self.G))
 
 
 class Effort(StanceProgram):
@@ -203,12 +202,12 @@ class Effort(StanceProgram):
     def conic(self) -> ConicProgram:
         """Columns E z + e₀ and z."""
         size = len(self.e0)
-        A, b = self.blocks(size, above=size)
-        A[:size, :size] = -np.eye(size)
-        A[:size, size:] = self.E
+        front, loads, b = self.blocks(size, above=self.E)
+        front[:size] = -np.eye(size)
         b[:size] = -self.e0
         b[size:][self.of_limits] += self.cap
         P = np.concatenate([np.full(size, 2.0), 2.0 * self.weights])
+        A = Columns.of(front), loads
         return ConicProgram(P, np.zeros_like(P), A, b, size + len(self.G), size)
 
 
@@ -225,8 +224,8 @@ class LoadFactor(StanceProgram):
         body[6:], held[:6] = 0.0, 0.0
         super().__init__(data.turned(held))
         # of unit size, or a small wrench and its large factor would defeat the solver
-        self.size = float(np.abs(body).max())
-        self.wrench = body / self.size
+        self.unit = float(np.abs(body).max())
+        self.wrench = body / self.unit
 
     def define(self) -> Definition:
         s, z = cp.Variable(), self.loads()
@@ -235,16 +234,16 @@ class LoadFactor(StanceProgram):
         return Definition(cp.Problem(cp.Maximize(s), [*rows, s >= 0.0]), (s, z), rows)
 
     def conic(self) -> ConicProgram:
-        A, b = self.blocks(1, below=1)
-        A[: len(self.G), 0], A[-1, 0] = -self.wrench, -1.0
+        s, loads, b = self.blocks(1, below=1)
+        s[: len(self.G), 0], s[-1] = -self.wrench, -1.0
         b[self.of_limits] += 1.0
-        P, q = np.zeros((2, A.shape[1]))
+        P, q = np.zeros((2, 1 + self.size))
         q[0] = -1.0
-        return ConicProgram(P, q, A, b, len(self.G))
+        return ConicProgram(P, q, (Columns.of(s), loads), b, len(self.G))
 
     def solve(self) -> Outcome:
         outcome, s = self.run()
-        return outcome if s is None else replace(outcome, value=float(s[0]) / self.size)
+        return outcome if s is None else replace(outcome, value=float(s[0]) / self.unit)
 
 
 class Reach(StanceProgram):
@@ -285,13 +284,13 @@ class Reach(StanceProgram):
         return Definition(cp.Problem(cp.Maximize(self.goal @ t), [*rows]), (t, z), rows)
 
     def conic(self) -> ConicProgram:
-        size = len(self.goal)
-        A, b = self.blocks(size)
-        A[: len(self.G), :size], A[self.of_limits, :size] = -self.B, self.K
+        ways = len(self.goal)
+        t, loads, b = self.blocks(ways)
+        t[: len(self.G)], t[self.of_limits] = -self.B, self.K
         b[self.of_limits] += self.cap
-        P, q = np.zeros((2, A.shape[1]))
-        q[:size] = -self.goal
-        return ConicProgram(P, q, A, b, len(self.G))
+        P, q = np.zeros((2, ways + self.size))
+        q[:ways] = -self.goal
+        return ConicProgram(P, q, (Columns.of(t), loads), b, len(self.G))
 
     def farthest(self) -> Reached:
         """Return the farthest t."""
@@ -330,18 +329,17 @@ class Nearest(StanceProgram):
 
     def conic(self) -> ConicProgram:
         """Columns ‖W − w‖, W − w and z."""
-        count, kept, hard, loads = len(self.G), self.kept, len(self.H), self.G.shape[1]
-        zero = count + kept
-        box = zero + hard
-        cone = box + 2 * loads
-        A = np.zeros((1 + count + loads, cone + 1 + count)).T
+        count, kept, size = len(self.G), self.kept, self.size
+        zero, box = count + kept, count + kept + len(self.H)
+        cone = box + 2 * size
+        A = np.zeros((cone + 1 + count, 1 + count + size))
         A[:count, 1 : 1 + count], A[:count, 1 + count :] = np.eye(count), self.G
         A[count:zero, 1 + count - kept : 1 + count] = np.eye(kept)
         A[zero:box, 1 + count :] = self.H
-        A[box:cone, 1 + count :] = np.vstack([np.eye(loads), -np.eye(loads)])
+        A[box:cone, 1 + count :] = np.vstack([np.eye(size), -np.eye(size)])
         A[cone:, : 1 + count] = -np.eye(1 + count)
         b = np.zeros(len(A))
         b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, UNLIMITED
         P, q = np.zeros((2, A.shape[1]))
         q[0] = 1.0
-        return ConicProgram(P, q, A, b, zero, second_order=1 + count)
+        return ConicProgram(P, q, (Columns.of(A),), b, zero, second_order=1 + count)

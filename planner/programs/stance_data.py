@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import WrenchSpace
 from planner.programs.row_scaling import (
     JOINT_TORQUE,
@@ -30,6 +30,7 @@ __all__ = [
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
+    "Columns",
     "HandData",
     "HandRows",
     "StanceData",
@@ -125,6 +126,43 @@ def with_held(carried: Array, held: Array) -> Array:
     return np.vstack([carried, held / WRENCH_UNIT]) if len(held) else carried
 
 
+class Columns(NamedTuple):
+    """A matrix without its zeros, in compressed columns.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+    rows : ndarray of int, shape (n,)
+        Of the values, column by column.
+    starts : ndarray of int, shape (columns + 1,)
+        Where each column begins in them, and where the last one ends.
+    """
+
+    values: Array
+    rows: Indices
+    starts: Indices
+
+    @classmethod
+    def of(cls, matrix: Array) -> Columns:
+        """Leave the zeros of a matrix out."""
+        height, width = matrix.shape
+        flat = matrix.T.ravel()
+        (places,) = flat.nonzero()
+        starts = places.searchsorted(height * np.arange(width + 1))
+        return cls(flat.take(places), places % max(height, 1), starts)
+
+    @classmethod
+    def beside(cls, parts: Sequence[Columns]) -> Columns:
+        """Put some with the same rows beside each other."""
+        ends = np.cumsum([0, *(part.starts[-1] for part in parts)])
+        starts = [part.starts[:-1] + end for part, end in zip(parts, ends, strict=False)]
+        return cls(
+            np.concatenate([part.values for part in parts]),
+            np.concatenate([part.rows for part in parts]),
+            np.concatenate([*starts, ends[-1:]]),
+        )
+
+
 class HandRows(NamedTuple):
     """All hands' rows in all their loads z (M,): G z of the balance, limits L z, hard rows H z.
 
@@ -132,6 +170,8 @@ class HandRows(NamedTuple):
     ----------
     whole : ndarray, shape (nb + Σ nl + Σ nh, M)
         G above L above H.
+    columns : Columns
+        The same without its zeros.
     rest : ndarray, shape (Σ nl + Σ nh,)
         −l0 above h.
     limits : int
@@ -141,6 +181,7 @@ class HandRows(NamedTuple):
     """
 
     whole: Array
+    columns: Columns
     rest: Array
     limits: int
     unit: Array
@@ -152,16 +193,22 @@ class HandRows(NamedTuple):
         unit = np.concatenate([hand.unit for hand in hands])
         rest = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
         limits = sum(len(hand.l0) for hand in hands)
-        whole = np.zeros((len(unit), balance + len(rest))).T  # column by column
+        whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
+        parts = []
         for hand in hands:
             m, nl, nh, _ = hand.shape
             right = left + m
             whole[:balance, left:right] = hand.G
             whole[limit : limit + nl, left:right] = hand.L
             whole[below : below + nh, left:right] = hand.H
+            own = Columns.of(np.concatenate([hand.G, hand.L, hand.H]))
+            skipped = np.array([0, limit - balance, below - balance - nl])
+            rows = own.rows + skipped.repeat([balance, nl, nh])[own.rows]
+            parts.append(own._replace(rows=rows))
             left, limit, below = right, limit + nl, below + nh
-        return cls(whole, rest, limits, unit, np.concatenate([hand.tie for hand in hands]))
+        tie = np.concatenate([hand.tie for hand in hands])
+        return cls(whole, Columns.beside(parts), rest, limits, unit, tie)
 
 
 @dataclass(frozen=True, eq=False)

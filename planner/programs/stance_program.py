@@ -30,7 +30,7 @@ from planner.programs.conic import (
     Solver,
 )
 from planner.programs.outcome import Outcome
-from planner.programs.stance_data import StanceData
+from planner.programs.stance_data import Columns, StanceData
 
 __all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "Definition", "StanceProgram"]
 
@@ -93,6 +93,8 @@ class StanceProgram(ABC):
     data : StanceData
     G, L, l0, H, h : ndarray
         Of all hands.
+    size : int
+        M.
     """
 
     settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED)
@@ -104,6 +106,7 @@ class StanceProgram(ABC):
         rows, balance = data.rows, len(data.wrench)
         self.G = rows.whole[:balance]
         self.L, self.H = np.split(rows.whole[balance:], [rows.limits])
+        self.size = len(rows.unit)
         self.l0, self.h = -rows.rest[: rows.limits], rows.rest[rows.limits :]
 
     @abstractmethod
@@ -120,7 +123,7 @@ class StanceProgram(ABC):
 
     def loads(self) -> cp.Variable:
         """Return z."""
-        return cp.Variable(self.G.shape[1])
+        return cp.Variable(self.size)
 
     def rows(
         self, z: cp.Variable, cap: cp.Expression | float
@@ -132,19 +135,32 @@ class StanceProgram(ABC):
             self.H @ z <= self.h,
         )
 
-    def blocks(self, front: int, above: int = 0, below: int = 0) -> tuple[Array, Array]:
-        """Return A and b with the balance, the limits at 0 and the hard rows.
+    def blocks(
+        self, front: int, above: Array | None = None, below: int = 0
+    ) -> tuple[Array, Columns, Array]:
+        """Return columns before the loads', the loads', and b.
 
-        Left at zero are so many columns before the loads, and rows above and below these.
+        With the balance, the limits at 0 and the hard rows. The first columns are zero, and so is
+        what else b has.
+
+        Parameters
+        ----------
+        front : int
+            How many columns come before the loads.
+        above : ndarray, shape (rows, M), optional
+            What stands above the balance in the columns of the loads.
+        below : int, optional
+            Rows below, in which the loads are not.
         """
-        rows, balance = self.data.rows, len(self.G)
-        count, loads = rows.whole.shape
-        A = np.zeros((front + loads, above + count + below)).T  # column by column
-        b = np.zeros(len(A))
-        A[above : above + count, front:] = rows.whole
-        b[above : above + balance] = self.data.offset
-        b[above + balance : above + count] = rows.rest
-        return A, b
+        rows = self.data.rows
+        loads, first = rows.columns, 0
+        if above is not None:
+            loads, first = Columns.of(np.vstack([above, rows.whole])), len(above)
+        b = np.zeros(first + len(rows.whole) + below)
+        own = b[first:]
+        own[: len(self.G)] = self.data.offset
+        own[len(self.G) : len(rows.whole)] = rows.rest
+        return np.zeros((len(b), front)), loads, b
 
     @property
     def of_limits(self) -> slice:
@@ -171,7 +187,10 @@ class StanceProgram(ABC):
                 break
             found = Solver(program, settings).solve()
         ended = found.status in ENDS or deadline.expired()
-        if not ended and all(np.isfinite(part).all() for part in program[:4]):
+        if not ended and all(
+            np.isfinite(part).all()
+            for part in (program.P, program.q, program.b, self.data.rows.whole)
+        ):
             return self._by_definition()
         duals: tuple[Array, ...] = ()
         if found.multipliers is not None:

@@ -89,7 +89,7 @@ class _Rows(NamedTuple):
     @classmethod
     def of(cls, data: StanceData) -> _Rows:
         """Return those of a stance: balance, limits, hard rows."""
-        C, rest, limits, *_ = data.rows
+        C, rest, limits = data.rows.whole, data.rows.rest, data.rows.limits
         nb = len(data.wrench)
         d = np.zeros(len(C))
         d[nb : nb + limits] = 1.0

@@ -10,6 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from planner.programs import HandData, StanceData, program
+from planner.programs.conic import ConicProgram
+from planner.programs.stance_data import Columns
 
 __all__ = ["WholeBlocks"]
 
@@ -19,12 +21,12 @@ class WholeBlocks:
 
     def __init__(self, stances: Sequence[StanceData]) -> None:
         full = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
-        there = program.Unique(StanceData(full, stances[0].wrench)).conic().A != 0.0
+        there = _dense(program.Unique(StanceData(full, stances[0].wrench)).conic()) != 0.0
         columns, rows = np.nonzero(there.T)
         starts = np.searchsorted(columns, np.arange(there.shape[1] + 1))
         programs = [program.Unique(each).conic() for each in stances]
         self._new = [
-            {"P": each.P.tolist(), "A": each.A[rows, columns].tolist(), "b": each.b.tolist()}
+            {"P": each.P.tolist(), "A": _dense(each)[rows, columns].tolist(), "b": each.b.tolist()}
             for each in programs
         ]
         settings = clarabel.DefaultSettings()
@@ -32,7 +34,7 @@ class WholeBlocks:
         for name, value in program.Unique.settings[0].items():
             setattr(settings, name, value)
         last = programs[-1]
-        A = sp.csc_matrix((last.A[rows, columns], rows, starts), there.shape)
+        A = sp.csc_matrix((_dense(last)[rows, columns], rows, starts), there.shape)
         cones = [
             clarabel.ZeroConeT(last.zero),
             clarabel.NonnegativeConeT(len(last.b) - last.zero),
@@ -55,3 +57,8 @@ class WholeBlocks:
         """Solve with all data of that stance new."""
         self._solver.update(**self._new[number % len(self._new)])
         return self._solver.solve()
+
+
+def _dense(asked: ConicProgram) -> np.ndarray:
+    shape = len(asked.b), len(asked.q)
+    return sp.csc_matrix(Columns.beside(asked.A), shape).toarray()

@@ -12,11 +12,12 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import CLARABEL
+from scipy.sparse import csc_matrix
 
 from planner import deadline
 from planner.programs import conic, program, solvers, stance_program
 from planner.programs.conic import ConicProgram, Solver, Solvers
-from planner.programs.stance_data import HandData, StanceData
+from planner.programs.stance_data import Columns, HandData, StanceData
 from planner.programs.stance_program import SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
@@ -93,6 +94,12 @@ def random_data(shape: tuple, draw: Draw) -> StanceData:
     )
 
 
+def dense(asked: ConicProgram) -> np.ndarray:
+    """The matrix A."""
+    shape = len(asked.b), len(asked.q)
+    return csc_matrix(Columns.beside(asked.A), shape).toarray()
+
+
 def test_every_program_is_compared():
     kinds = {kind for kind in vars(program).values() if isinstance(kind, type)}
     programs = {kind for kind in kinds if issubclass(kind, StanceProgram)} - {StanceProgram}
@@ -109,7 +116,7 @@ def test_the_solver_gets_what_cvxpy_would_give_it(kind, shapes):
         asked = KINDS[kind](random_data(shape, draw), draw)
         ours = asked.conic()
         theirs, _, _ = asked.define().problem.get_problem_data(cp.CLARABEL, solver_opts={})
-        np.testing.assert_array_equal(ours.A, theirs["A"].toarray())
+        np.testing.assert_array_equal(dense(ours), theirs["A"].toarray())
         np.testing.assert_array_equal(ours.b, theirs["b"])
         np.testing.assert_array_equal(ours.q, theirs["c"])
         # they leave a P out that is zero
@@ -188,9 +195,10 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
     data = random_data(SHAPES[3], draw)
     first = KINDS[kind](data, draw).conic()
     # the same pattern with other numbers, and another with none
-    second = first._replace(A=1.5 * first.A, b=0.5 * first.b, P=2.0 * first.P)
+    A = dense(first)
+    second = first._replace(A=(Columns.of(1.5 * A),), b=0.5 * first.b, P=2.0 * first.P)
     third = first._replace(b=np.zeros_like(first.b), q=3.0 * first.q)
-    fourth = first._replace(A=np.where(np.abs(first.A) < 0.3, 0.0, first.A))
+    fourth = first._replace(A=(Columns.of(np.where(np.abs(A) < 0.3, 0.0, A)),))
     kept = Solvers(2)
     for asked in (first, second, third, fourth, first):
         found, fresh = kept.solve(asked, SETTINGS), Solver(asked, SETTINGS).solve()
@@ -351,7 +359,8 @@ def test_a_forked_process_plans():
 
 def test_a_program_of_one_row_is_solved_by_hand():
     """min x + ½ (2 x²) with x ≥ −1 as −x ≤ 1: at −½, of value −¼."""
-    asked = ConicProgram(np.array([2.0]), np.array([1.0]), np.array([[-1.0]]), np.array([1.0]), 0)
+    A = (Columns.of(np.array([[-1.0]])),)
+    asked = ConicProgram(np.array([2.0]), np.array([1.0]), A, np.array([1.0]), 0)
     found = Solvers(1).solve(asked, SETTINGS)
     assert found.value == pytest.approx(-0.25, abs=1e-8)
     assert found.x == pytest.approx([-0.5], abs=1e-6)
