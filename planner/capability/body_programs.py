@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, SolverError
+from hand_models.base import Array, CruxError, InvalidInputError, SolverError, UnsupportedError
 from hand_models.wrench_spaces import SCALE
 from planner import deadline, programs
 from planner.capability.body_motion import Motion, motion_of
@@ -35,6 +35,8 @@ __all__ = ["BodyPrograms", "size_of"]
 
 MISSING: Final = "it was known what the stance can hold"
 """What a deadline may come before."""
+
+UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
 
 EMPTY: Final = ("infeasible", "infeasible_inaccurate")
 """The solver's words for a set in which there is nothing."""
@@ -194,7 +196,7 @@ def _solved(
     Raises
     ------
     SolverError
-        If there is no answer that passes the checks.
+        If there is no answer that passes the checks; an `UnsupportedError` if it has no bound.
     """
     deadline.check(MISSING)
     B = np.vstack([columns, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
@@ -284,6 +286,11 @@ def _error(
     return max(missing, programs.beyond(data, loads, cap))
 
 
-def _unsolved(outcome: Outcome) -> SolverError:
+def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING)
+    if outcome.status in UNBOUNDED:
+        return UnsupportedError(
+            "what the hands hold has no bound some way: sets of floating wrists, taken about this "
+            "body wrench, do not hold them everywhere; ask about one that can nearly be held"
+        )
     return SolverError(f"body space: the solver gave no usable answer ({outcome.status})")

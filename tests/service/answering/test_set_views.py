@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from planner import programs
+from planner.programs import Outcome, Reached
 from service import answering
 from service.answering import dispatch
 from service.commands.stances import read_request
@@ -161,3 +163,13 @@ def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing(
     reply = answered(request)
     assert reply["dimension"] is not None
     assert reply["dimension"] < 6
+
+
+def test_a_body_space_without_a_bound_is_refused_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = Outcome(False, "unbounded", 0, float("nan"))
+    monkeypatch.setattr(programs, "reach", lambda *_: Reached(nothing, np.full(1, np.nan)))
+    stance = json.loads(msgspec.json.encode(read_request("wall-300").stance))
+    payload = json.dumps({"v": 1, "stance": stance, "directions": [[0, 0, 1]]}).encode()
+    answer = dispatch.handle("crux/robosimian/body_space", payload)
+    assert answer.status == "unsupported"
+    assert "has no bound" in json.loads(answer.payload)["error"]["message"]
