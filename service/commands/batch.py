@@ -44,6 +44,10 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
 
 
+REPLY: Final = b'{"v":1,'
+"""How each line of a batch begins."""
+
+
 class _Told(msgspec.Struct):
     """What the summary needs to know of an answer."""
 
@@ -149,6 +153,8 @@ def batch(
     """
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
+    if file is not None:
+        _check_output(file, requests, resume)
     numbers, lines = _lines(requests)
     folder = Path() if requests == "-" else Path(requests).parent
     told = _answered(file, lines) if resume and file is not None else []
@@ -191,6 +197,18 @@ def _lines(source: str) -> tuple[list[int], list[bytes]]:
     return [i for i, _ in kept], [line for _, line in kept]
 
 
+def _check_output(file: Path, requests: str, resume: bool) -> None:
+    """Refuse a file for replies that is the requests' own, or that nothing can be resumed in."""
+    try:
+        if requests != "-" and file.exists() and file.samefile(requests):
+            raise InvalidInputError(f"{file}: the requests are there", field="-o")
+        if resume and file.exists() and not file.is_file():
+            raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
+    except OSError:
+        # reading or writing tells
+        return
+
+
 def _answered(file: Path, lines: Sequence[bytes]) -> list[_Told]:
     """Return what the whole lines of a file tell, and drop a last one that is cut off."""
     try:
@@ -218,8 +236,12 @@ def _answered(file: Path, lines: Sequence[bytes]) -> list[_Told]:
                 "is it of another batch?",
                 field="--resume",
             )
+        if one.status is None and one.error is None:
+            raise InvalidInputError(f"{file}, line {number}: no reply", field="--resume")
         told.append(one)
     if whole < len(data):
+        if not data[whole:].startswith(REPLY[: len(data) - whole]):
+            raise InvalidInputError(f"{file}: its end is of no reply", field="--resume")
         with writing(file, "-o"), file.open("r+b") as stream:
             stream.truncate(whole)
     return told

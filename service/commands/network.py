@@ -44,6 +44,11 @@ __all__ = ["demo", "query", "serve"]
 PATIENCE: Final = 120.0
 """How long the demo waits for its own service, however busy the machine [s]."""
 
+ZENOH_THREADS: Final = (
+    "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
+)
+"""By default, where ``ZENOH_RUNTIME`` does not say otherwise."""
+
 DEMO_STANCE: Final = "wall-300-joints"
 
 
@@ -91,6 +96,8 @@ def serve(
     and gives the keys its name.
     """
     stop = _StopSignal()
+    # a client that does not read stops one of these for as long as zenoh waits for it
+    os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)
     from service.serving import JsonLines, LogThread, PlanService, closed, exposed
 
     handler = LogThread()

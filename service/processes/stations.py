@@ -24,6 +24,9 @@ SWITCH: Final = 5e-4
 """How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
 times as long, in which a short question would wait for a long one at each of its steps."""
 
+ROOM: Final = 2**14
+"""Bytes that a pipe has room for, wherever."""
+
 LAST_MOMENT: Final = 0.2
 """Longest time between the end of a process's pipes and its own [s]."""
 
@@ -53,11 +56,29 @@ class Lane(Generic[T, R]):
         self.number = number
         self.pipe = pipe
         self.ready = False
+        self._sender: threading.Thread | None = None
 
-    def give(self, question: T) -> None:
-        """Send a question; of a process that has died, `take` tells."""
+    def give(self, question: T, size: int = 0) -> None:
+        """Send a question of about so many bytes; of a process that has died, `take` tells.
+
+        One that the pipe may have no room for is sent in the background: its process may stand
+        still, and take nothing.
+        """
+        if size < ROOM:
+            self._send(question)
+            return
+        self._sender = threading.Thread(target=self._send, args=(question,), daemon=True)
+        self._sender.start()
+
+    def _send(self, question: T) -> None:
         with suppress(OSError):
             self.pipe.send(question)
+
+    def close(self) -> None:
+        """Close the pipe; after its process has ended."""
+        if self._sender is not None:
+            self._sender.join()
+        self.pipe.close()
 
     def take(self) -> R | None:
         """Return what has come; None for the word that the lane is ready.
@@ -116,7 +137,7 @@ class Station(Generic[T, R]):
         self.process.kill()
         self.process.join()
         for lane in self.lanes:
-            lane.pipe.close()
+            lane.close()
         if died is None:
             return "was stopped"
         if died == OUT_OF_MEMORY:

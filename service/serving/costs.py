@@ -78,6 +78,11 @@ class Costs:
             return False
         return seen.again <= SHORT and seen.first <= SOON
 
+    def is_cheap(self, stance: int | None) -> bool:
+        """Whether questions about a stance have taken little so far."""
+        seen = None if stance is None else self._stances.get(stance)
+        return seen is not None and (seen.first if seen.again is None else seen.again) <= DEAR
+
     def knows(self, process: int, stance: int | None) -> bool:
         """Whether a process knows a stance."""
         seen = None if stance is None else self._stances.get(stance)

@@ -27,11 +27,11 @@ from service.answering import Answer
 from service.processes import Done, Job, Lane, Station
 from service.serving.costs import Costs
 from service.serving.crew import Crew
-from service.serving.mail import Mail
-from service.serving.question import Question, take
+from service.serving.mail import Mail, reply_to
+from service.serving.question import Question, client_of, take
 from service.serving.waiting import Kind, Waiting
 from service.serving.watch import State, Told, Watch
-from service.wire import PLAN, SET_POINTS, STREAM, BusyError, LostError, encode_error
+from service.wire import PLAN, SET_POINTS, STREAM, BusyError, Format, LostError, encode_error
 
 __all__ = ["Dispatcher"]
 
@@ -60,6 +60,12 @@ TOLD_IN: Final = 1.0
 
 UNNAMED: Final = 8
 """Clients without a name as which those without a name are replied to."""
+
+OPERATORS: Final = "operators"
+"""One more, as which those are who ask how the service is."""
+
+AT_ONCE: Final = 32
+"""Of what has come, how much is taken in before processes are looked at again."""
 
 COME_AGAIN: Final = (0.05, 10.0)
 """Least and longest time after which a client is told to come again [s]."""
@@ -121,7 +127,10 @@ class Dispatcher:
 
     def look(self, query: zenoh.Query, key: str, told: Callable[[], Told]) -> None:
         """Take an operator's query; returns at once."""
-        self._post(lambda: self._send(query, key, "", Answer(*told(), True)))
+        self._mail.send(
+            client_of(query) or OPERATORS,
+            partial(reply_to, query, key, lambda: Answer(*told(), True)),
+        )
 
     def gone(self, client: str) -> None:
         """Say that a client has gone: what it asked is not answered unless it is in work."""
@@ -134,12 +143,16 @@ class Dispatcher:
 
     def close(self) -> None:
         """Refuse what has come since the stop, and wait a little for replies on their way."""
-        self._take_in()
+        while not self._inbox.empty():
+            self._take_in()
         self._mail.close(MAILS)
 
     def _post(self, event: Callable[[], None]) -> None:
         """Let the dispatcher's own thread do something; all that follows is in it."""
         self._inbox.put(event)
+        self._ring()
+
+    def _ring(self) -> None:
         with self._bell:
             if not self._rung:
                 self._rung = True
@@ -184,12 +197,13 @@ class Dispatcher:
             self._woken.recv_bytes()
         with self._bell:
             self._rung = False
-        while True:
+        for _ in range(AT_ONCE):
             try:
                 event = self._inbox.get_nowait()
             except Empty:
                 return
             self._guarded(event)
+        self._ring()
 
     def _pause(self) -> float | None:
         """Return how long there is nothing to do unless something comes [s]."""
@@ -207,7 +221,14 @@ class Dispatcher:
     # questions -----------------------------------------------------------------------------------
 
     def _admit(self, query: zenoh.Query, key: str, arrived: float) -> None:
-        question = take(query, key, arrived, self._seconds)
+        try:
+            question = take(query, key, arrived, self._seconds)
+        except Exception:
+            log.exception("a query at %s cannot be read", key)
+            unread = CruxError("the service could not read the query; its log says why")
+            coded = encode_error("internal", unread, Format.JSON)
+            self._send(query, key, "", Answer(*coded, False, "internal"))
+            return
         if self._stops_at is not None:
             self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
             self._quiet_from = time.perf_counter() + QUIET
@@ -232,6 +253,8 @@ class Dispatcher:
             return Kind.DEAR
         if question.name == PLAN and self._costs.is_short(question.stance):
             return Kind.SHORT
+        if self._costs.is_cheap(question.stance):
+            return Kind.OTHER
         return Kind.DEAR if self._costs.is_dear(question.client) else Kind.OTHER
 
     def _deal(self) -> None:
@@ -259,7 +282,7 @@ class Dispatcher:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
-        lane.give(question.job(question.begun, rehearsal))
+        lane.give(question.job(question.begun, rehearsal), len(question.payload))
 
     def _drop(self, client: str) -> None:
         for question in self._waiting.remove(lambda each: each.client == client):
@@ -272,10 +295,12 @@ class Dispatcher:
         try:
             done = lane.take()
         except EOFError:
+            rest = "nothing else was lost with it"
+            if self._crew.has_streams(lane):
+                rest = "the streams are lost with it; declare them again"
             how, left = self._dismiss(lane.station)
             for question in left:
-                lost = f"the process that worked on it {how}; nothing else was lost with it"
-                self._refuse(question, LostError(lost))
+                self._refuse(question, LostError(f"the process that worked on it {how}; {rest}"))
             return
         if done is None:
             return
@@ -307,6 +332,7 @@ class Dispatcher:
                 missing = "there was an answer, and its work was broken off"
                 self._refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
+                self._costs.took(asked.client, None, None, now - asked.begun)
                 self._dismiss(lane.station, "did not stop at a deadline")
 
     def _dismiss(
@@ -328,15 +354,9 @@ class Dispatcher:
         self._send(question.query, question.key, question.client, answer)
 
     def _send(self, query: zenoh.Query, key: str, client: str, answer: Answer) -> None:
-        def send() -> None:
-            with query:
-                if answer.good:
-                    query.reply(key, answer.payload, encoding=answer.encoding)
-                else:
-                    query.reply_err(answer.payload, encoding=answer.encoding)
-
         if not client:
             self._unnamed = (self._unnamed + 1) % UNNAMED
+        send = partial(reply_to, query, key, lambda: answer)
         self._mail.send(client or str(self._unnamed), send)
 
     def _state(self) -> State:

@@ -13,7 +13,11 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Final
 
-__all__ = ["Mail"]
+import zenoh
+
+from service.answering import Answer
+
+__all__ = ["Mail", "reply_to"]
 
 log = logging.getLogger(__name__)
 
@@ -64,3 +68,13 @@ class Mail:
             del self._to[client]
             self._sent.notify_all()
             return None
+
+
+def reply_to(query: zenoh.Query, key: str, told: Callable[[], Answer]) -> None:
+    """Reply to a query, and let it go."""
+    with query:
+        answer = told()
+        if answer.good:
+            query.reply(key, answer.payload, encoding=answer.encoding)
+        else:
+            query.reply_err(answer.payload, encoding=answer.encoding)

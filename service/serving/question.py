@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -12,20 +11,27 @@ import zenoh
 from hand_models.base import LimitError
 from service.answering import SERVICES
 from service.processes import Job
+from service.requests import LONGEST_DEADLINE
 from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError, check_size
 
-__all__ = ["Question", "take"]
+__all__ = ["Question", "client_of", "take"]
 
-READ: Final = 2**18
+READ: Final = 2**20
 """Bytes of a payload that is looked into before its turn; what is larger is a process's to read."""
+
+LARGE: Final = 2**18
+"""Bytes of one that may take long."""
+
+SMALL: Final = 2**12
+"""Bytes of a field that is read of it; what is longer is left to a process, too."""
 
 
 class _Head(msgspec.Struct):
     """Of a request's fields those that decide when it is answered."""
 
-    id: Any = None
-    deadline: Any = None
-    want: Any = None
+    id: msgspec.Raw = msgspec.Raw()
+    deadline: msgspec.Raw = msgspec.Raw()
+    want: msgspec.Raw = msgspec.Raw()
     stance: msgspec.Raw = msgspec.Raw()
 
 
@@ -100,6 +106,12 @@ class Question:
         return Job(self.name, self.payload, self.encoding, waited, self.seconds, rehearsal)
 
 
+def client_of(query: zenoh.Query) -> str:
+    """Return the identifier of who asks; empty where that is not told."""
+    source = query.source_info
+    return "" if source is None else str(source.source_id.zid)
+
+
 def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Question:
     """Return a query as a question.
 
@@ -120,17 +132,16 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
             payload = given.to_bytes()
         except LimitError as error:
             fault = error
-    source = query.source_info
     question = Question(
         query=query,
         key=key,
         name=name,
-        client="" if source is None else str(source.source_id.zid),
+        client=client_of(query),
         arrived=arrived,
         payload=payload,
         encoding="" if query.encoding is None else str(query.encoding),
         seconds=longest,
-        dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > READ,
+        dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > LARGE,
         fault=fault,
     )
     if len(payload) <= READ:
@@ -144,11 +155,25 @@ def _read(question: Question) -> None:
     except (MalformedError, msgspec.ValidationError):
         # its process says what is wrong with it
         return
-    if isinstance(head.id, str):
-        question.id = head.id
-    seconds = head.deadline
-    if isinstance(seconds, int | float) and math.isfinite(seconds) and seconds > 0.0:
+    name, seconds, want = (
+        _value(field, question.form) for field in (head.id, head.deadline, head.want)
+    )
+    if isinstance(name, str):
+        question.id = name
+    # what no request may have is refused by its process, in the service's own time
+    if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
         question.deadline = question.arrived + question.seconds
-    question.dear = question.dear or (isinstance(head.want, list) and "robust" in head.want)
+    question.dear = question.dear or (isinstance(want, list) and "robust" in want)
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
+
+
+def _value(field: msgspec.Raw, form: Format) -> Any:
+    """Return what a field says; None where that is long, or nothing."""
+    data = bytes(field)
+    if not 0 < len(data) <= SMALL:
+        return None
+    try:
+        return form.decode(data, Any)
+    except MalformedError:
+        return None

@@ -18,7 +18,7 @@ from planner.processes import cores
 from planner.robots import RobotFile
 from service.answering import SERVICES, robots_of
 from service.processes import Done, Job, Make, answering
-from service.requests import DEFAULT_DEADLINE
+from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.serving.watch import Told
@@ -88,8 +88,11 @@ class PlanService:
         count = max(FEWEST, cores()) if workers is None else workers
         if count < 1:
             raise InvalidInputError(f"must be 1 at least, got {count}", field="workers")
-        if not seconds > 0.0:
-            raise InvalidInputError(f"must be above 0 s, got {seconds:g}", field="seconds")
+        if not 0.0 < seconds <= LONGEST_DEADLINE:
+            raise InvalidInputError(
+                f"must be above 0 s and {LONGEST_DEADLINE:g} s at most, got {seconds:g}",
+                field="seconds",
+            )
         (self.robot,) = robots_of(robot)
         self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
         self.operators = tuple(service_key(self.robot, name) for name in (HEALTH, METRICS))

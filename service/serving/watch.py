@@ -65,7 +65,7 @@ class Watch:
     """
 
     def __init__(self, robot: str, state: Callable[[], State]) -> None:
-        self._robot, self._state = robot, state
+        self._robot, self._version, self._state = robot, _version(), state
         self._started = time.time()
         self._failure: LastFailure | None = None
         self._replied = 0
@@ -155,7 +155,7 @@ class Watch:
         state = self._state()
         reply = HealthReply(
             robot=self._robot,
-            version=_version(),
+            version=self._version,
             uptime=time.time() - self._started,
             replied=self._replied,
             waiting=state.waiting,

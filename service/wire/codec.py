@@ -10,7 +10,7 @@ import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import Identifier, SetPointsRequest
+from service.requests import Identifier, SetPointsRequest, StreamRequest
 from service.wire.checks import check
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
@@ -32,8 +32,9 @@ T = TypeVar("T")
 LARGEST_REQUEST: Final = 2**26
 """Bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
 
-LARGEST: Final[dict[type, int]] = {SetPointsRequest: 2**12}
-"""The same of requests that have no rock in them."""
+LARGEST: Final[dict[type, int]] = {SetPointsRequest: 2**12, StreamRequest: 2**24}
+"""The same of requests that have no rock in them, and of those that are kept: sixteen of these have
+to find room in one process."""
 
 ADVICE: Final[dict[type, str]] = {
     SetPointsRequest: "ask for one body wrench at a time, with a shorter id",

@@ -139,6 +139,27 @@ def test_a_full_disk_leaves_whole_lines_of_a_batch(lines: Path, tmp_path: Path) 
     assert (status, error) == (FAILED, f"crux: cannot write {output}: File too large; {kept}\n")
 
 
+@pytest.mark.parametrize("text", ["notes", "notes\n", '{"v":1'[:3] + "x"])
+def test_a_batch_does_not_go_on_in_a_file_that_is_none_of_its(
+    text: str, lines: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text(text)
+    assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
+    assert notes.read_text() == text
+    assert "no reply" in capfd.readouterr().err
+
+
+def test_a_batch_does_not_write_over_its_requests(
+    lines: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = lines.read_text()
+    for more in ([], ["--resume"]):
+        assert run(["batch", str(lines), "-o", str(lines), *more]) == BAD_INPUT
+        assert "the requests are there" in capfd.readouterr().err
+    assert lines.read_text() == before
+
+
 @pytest.mark.slow
 def test_a_full_disk_leaves_no_half_file(tmp_path: Path) -> None:
     picture = tmp_path / "plan.png"

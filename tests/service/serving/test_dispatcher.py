@@ -13,7 +13,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +22,7 @@ import pytest
 import zenoh
 
 from hand_models.base import InvalidInputError
-from service.serving import PlanService, open_session, zenoh_config
+from service.serving import PlanService, dispatcher, open_session, zenoh_config
 from service.serving.waiting import EACH
 from service.wire import LostError, service_key
 from tests.suite.helpers.checkout import ROOT
@@ -174,6 +174,46 @@ def test_a_deadline_that_comes_while_the_question_waits(site: Site, client: Clie
         waits = client.ask({"echo": 1, "deadline": 0.2})
         assert kind(waits) == "deadline"
         assert "its turn" in waits["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    "deadline", ["1e12", "1e308", "9" * 400, "-" + "9" * 400, "0", "true", '"soon"', "[[]]"]
+)
+def test_a_deadline_that_no_question_may_have_stops_nothing(client: Client, deadline: str) -> None:
+    """The process says what is wrong with it; meanwhile it is the service's own."""
+    (reply,) = client.session.get(PLAN, payload=f'{{"deadline": {deadline}}}', timeout=PATIENCE)
+    assert reply.ok is not None
+    assert "pid" in client.ask({"echo": 1})
+
+
+def test_a_query_that_cannot_be_read_is_replied_to(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ZeroDivisionError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(dispatcher, "take", fails)
+        assert kind(client.ask({"echo": 1})) == "internal"
+    assert "pid" in client.ask({"echo": 1})
+
+
+def test_a_process_that_stands_still_takes_nothing_and_stops_nobody(
+    site: Site, client: Client
+) -> None:
+    """Not even by a question that its pipe has no room for."""
+    before = [p["pid"] for p in site.health(client)["processes"] if p["purpose"] == "questions"]
+    for pid in before:
+        os.kill(pid, signal.SIGSTOP)
+    large = client.send({"echo": "x" * 3_000_000, "deadline": 1.0})
+    assert len(site.health(client)["processes"]) == 3
+    assert kind(result(large)) == "deadline"
+    assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
+    for pid in before:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGCONT)
+    site.wait_until(client, all_up)
+    assert "pid" in client.ask({"echo": 1})
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
