@@ -128,3 +128,15 @@ def test_a_hand_with_a_pose_is_not_seated():
     with pytest.raises(InvalidInputError, match="leave out the pose") as caught:
         best_seats(HAND, [given])
     assert caught.value.field == "seat"
+
+
+def test_the_best_seat_holds_no_less_than_one_that_a_hand_backs_off_to():
+    """Which is between those of the first stage."""
+    x = np.linspace(-0.3, 0.3, 61).round(4)
+    z = 0.0352028 * (np.sin(15.03 * x + 1.98507) - np.sin(1.98507))
+    each = placement(Profile(np.column_stack([x, z.round(5)])), math.pi)
+    (rest,), up = HAND.settle_each([each]), (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert rest.seating.backed_off > 0.0
+    (best,) = best_seats(HAND, [each], up)
+    assert reach(best, up) >= reach(rest, up)
+    assert best.seating.rule == BEST
