@@ -10,6 +10,16 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 
+LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py", "test_closing.py")
+"""Files whose tests take longest together, which one process each goes through."""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes long, so that no process is left alone with it at the end."""
+    items.sort(key=lambda item: item.path.name not in LONG)
+
+
 @pytest.fixture
 def stance_file(tmp_path: Path):
     """Writes a request to a file, and returns its path."""
