@@ -328,7 +328,7 @@ def test_what_a_client_asked_that_has_gone_is_not_worked_on(site: Site, client: 
         with zenoh.open(client_config(site.endpoint)) as session:
             left = Client(session)
             for _ in range(5):
-                left.send({"sleep": LONG})
+                left.send({"sleep": LONG, "deadline": LONG})
             site.wait_until(client, lambda health: sum(health["waiting"].values()) == 5)
         site.wait_until(client, lambda health: sum(health["waiting"].values()) == 0)
     assert 'status="gone"} 5.0' in metrics(client)
