@@ -120,7 +120,7 @@ def best_seats(
     known: dict[Hashable, SettledHand | InvalidInputError | None] = dict(stored)
     new = {key: each for key, each in zip(keys, placements, strict=True) if known[key] is None}
     search = _Search(hand, list(new.values()), d)
-    search.look([(*FIRST, *search.resting(i)) for i in range(len(new))])
+    search.look([(*FIRST, *own) for own in search.resting()])
     search.look([[] if found is None else _about(found.move) for found in search.best])
     found = dict(zip(new, search.outcomes(), strict=True))
     hand.seated_best.keep(
@@ -156,13 +156,15 @@ class _Search:
         self._refused: list[InvalidInputError | None] = [None] * len(placements)
         self.best: list[_Found | None] = [None] * len(placements)
 
-    def resting(self, index: int) -> list[_Move]:
-        """Return the move to where a hand comes to rest, if it backs off for that."""
-        (rest,) = self._hand.settle_each([self._placements[index]])
-        if isinstance(rest, InvalidInputError):
-            return []
-        off = rest.seating.backed_off / self._hand.back_off
-        return [] if off in OFFS else [_Move(off, 0.0)]
+    def resting(self) -> list[list[_Move]]:
+        """Return each hand's move to where it comes to rest, if it backs off for that."""
+        moves: list[list[_Move]] = []
+        for rest in self._hand.settle_each(self._placements):
+            off = 0.0
+            if isinstance(rest, SettledHand):
+                off = rest.seating.backed_off / self._hand.back_off
+            moves.append([] if off in OFFS else [_Move(off, 0.0)])
+        return moves
 
     def look(self, moves: Sequence[Iterable[_Move]]) -> None:
         """Close each hand at each of its places, and keep the best of them."""

@@ -73,20 +73,23 @@ class Costs:
 
     def is_short(self, stance: int | None) -> bool:
         """Whether a question about a stance is sure to be answered soon."""
-        seen = None if stance is None else self._stances.get(stance)
+        seen = self._seen(stance)
         if seen is None or seen.again is None:
             return False
         return seen.again <= SHORT and seen.first <= SOON
 
     def is_cheap(self, stance: int | None) -> bool:
         """Whether questions about a stance have taken little so far."""
-        seen = None if stance is None else self._stances.get(stance)
+        seen = self._seen(stance)
         return seen is not None and (seen.first if seen.again is None else seen.again) <= DEAR
 
     def knows(self, process: int, stance: int | None) -> bool:
         """Whether a process knows a stance."""
-        seen = None if stance is None else self._stances.get(stance)
+        seen = self._seen(stance)
         return seen is not None and process in seen.known_to
+
+    def _seen(self, stance: int | None) -> _Stance | None:
+        return None if stance is None else self._stances.get(stance)
 
     def is_dear(self, client: str) -> bool:
         """Whether a client's questions take long."""
