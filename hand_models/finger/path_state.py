@@ -160,9 +160,10 @@ class Around(NamedTuple):
     @classmethod
     def of(cls, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> Around:
         """Look at fingers turned by q."""
-        points, lengths = nearest_points(rock, shape, q)
-        joints, u = fan_out(q[:, None] + POSES, shape.end)
-        beside = shape.beside(points[:, None], lengths[:, None], joints, u, drive.depth[:, None])
+        near = nearest_points(rock, shape, q, drive.depth, TINY)
+        joints, u = fan_out(q + POSES[:, None], shape.end)
+        depth = np.broadcast_to(drive.depth, u.shape)
+        beside = shape.beside(near.of_poses(len(POSES)), joints, u, depth)
         # a phalanx that presses aside, with its end, has its spines beside the rock
         share = engaged_share(beside.tile_gap, shape.travel)
         share = engaged_share(1.0 - share * beside.push.imag, 1.0)
@@ -170,11 +171,11 @@ class Around(NamedTuple):
         arms = (joints + beside.place * u)[..., None, :] - joints[..., None]
         arms = LATER * arms * (beside.push * u).conj()[..., None, :]
         values = (beside.gap, share, -arms.real, -arms.imag)
-        gap, share, a, b = (value[:, 0] for value in values)
+        gap, share, a, b = (value[0] for value in values)
         d_gap, d_share, d_a, d_b = (
-            np.moveaxis((value[:, 1:] - value[:, :1]) / TINY, 1, -1) for value in values
+            np.moveaxis((value[1:] - value[:1]) / TINY, 0, -1) for value in values
         )
-        place, push = beside.place[:, 0], beside.push[:, 0]
+        place, push = beside.place[0], beside.push[0]
         return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
 
 

@@ -30,11 +30,19 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import Complexes, Outlines
+from hand_models.sections import Complexes, Flags, Outlines, stretch_minima
 
-__all__ = ["NEAREST", "Beside", "PhalanxShape", "fan_out", "middle_of_bed", "nearest_points"]
+__all__ = [
+    "NEAREST",
+    "Beside",
+    "NearPoints",
+    "PhalanxShape",
+    "fan_out",
+    "middle_of_bed",
+    "nearest_points",
+]
 
 NEAREST: Final = 96
 """How many points of rock are looked at for a phalanx: on flat rock, all along it and beyond."""
@@ -56,6 +64,8 @@ TINY: Final = 1e-30
 
 Pressed = TypeVar("Pressed", float, NDArray[Any])
 
+Values = TypeVar("Values", Array, Complexes)
+
 
 class Beside(NamedTuple):
     """Phalanges beside rock, shape (...); in a phalanx's axes, along + i above.
@@ -76,6 +86,53 @@ class Beside(NamedTuple):
     tile_gap: Array
     place: Complexes
     push: Complexes
+
+
+class NearPoints(NamedTuple):
+    """Points of rock that phalanges may press on, one phalanx after the other.
+
+    Attributes
+    ----------
+    points : ndarray of complex, shape (p,)
+        [m]
+    lengths : ndarray, shape (p,)
+        [m]
+    phalanx : ndarray of int, shape (p,)
+        Each one's.
+    first : ndarray of int
+        Where those of each phalanx begin; every one has some.
+    """
+
+    points: Complexes
+    lengths: Array
+    phalanx: Indices
+    first: Indices
+
+    @classmethod
+    def among(cls, points: Complexes, lengths: Array, chosen: Flags) -> NearPoints:
+        """Choose among points of phalanges, each of shape (..., p)."""
+        count = np.count_nonzero(chosen, axis=-1).ravel()
+        phalanx = np.repeat(np.arange(len(count)), count)
+        return cls(points[chosen], lengths[chosen], phalanx, np.cumsum(count) - count)
+
+    def of_poses(self, count: int) -> NearPoints:
+        """Return those of so many poses of all phalanges, one after the other."""
+        poses = np.arange(count)[:, None]
+        return NearPoints(
+            np.tile(self.points, count),
+            np.tile(self.lengths, count),
+            (self.phalanx + len(self.first) * poses).ravel(),
+            (self.first + len(self.points) * poses).ravel(),
+        )
+
+    def sums(self, values: Values) -> Values:
+        """Return the sum over the points of each phalanx."""
+        total: Values = np.add.reduceat(values, self.first)
+        return total
+
+    def least(self, values: Array) -> Array:
+        """Return the least of the points of each phalanx."""
+        return np.asarray(np.minimum.reduceat(values, self.first))
 
 
 class PhalanxShape(NamedTuple):
@@ -124,38 +181,58 @@ class PhalanxShape(NamedTuple):
         """By how much a gap may be negative without being closed [m]."""
         return (self.far - self.near) / ROUNDINGS
 
-    def beside(
-        self, points: Complexes, lengths: Array, joint: Complexes, u: Complexes, depth: Array
-    ) -> Beside:
+    def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
         """Return how phalanges are beside rock.
 
         Parameters
         ----------
-        points : ndarray of complex, shape (..., p)
-            Of the rock; see `nearest_points` [m].
-        lengths : ndarray, shape (..., p)
-            [m]
+        near : NearPoints
+            Of all phalanges; see `nearest_points`.
         joint, u : ndarray of complex, shape (...)
             Of the phalanges: their joints [m] and their directions.
         depth : ndarray, shape (...)
             How far their tiles are pressed in [m].
         """
-        seen = (points - joint[..., None]) * u.conj()[..., None]
+        of = near.phalanx
+        seen = (near.points - joint.ravel()[of]) * u.ravel().conj()[of]
         away, from_tile = self._from_axis(seen)
         size = np.abs(away)
         depths = size - self.radius
-        gap = self._level(depths, lengths) - self.fine
-        pressed = np.maximum((gap + depth)[..., None] - depths, 0.0) * lengths
-        total = np.maximum(pressed.sum(axis=-1), TINY)
+        gap = self._level(depths, near) - self.fine
+        pressed = np.maximum((gap + depth.ravel())[of] - depths, 0.0) * near.lengths
+        total = np.maximum(near.sums(pressed), TINY)
         out = away / np.maximum(size, TINY)
-        place = (pressed * (seen - away + self.radius * out)).sum(axis=-1) / total
-        push = (pressed * out).sum(axis=-1) / total
+        place = near.sums(pressed * (seen - away + self.radius * out)) / total
+        push = near.sums(pressed * out) / total
         return Beside(
-            gap,
-            from_tile.min(axis=-1) - self.radius,
-            place,
-            push / np.maximum(np.abs(push), TINY),
+            gap.reshape(u.shape),
+            (near.least(from_tile) - self.radius).reshape(u.shape),
+            place.reshape(u.shape),
+            (push / np.maximum(np.abs(push), TINY)).reshape(u.shape),
         )
+
+    def may_press(
+        self, points: Complexes, lengths: Array, joint: Complexes, u: Complexes, within: Array
+    ) -> NearPoints:
+        """Choose the points of which `beside` depends, as of phalanges (...).
+
+        Parameters
+        ----------
+        points, lengths : ndarray, shape (..., p)
+        joint, u : ndarray of complex, shape (...)
+        within : ndarray, shape (...)
+            How far tiles are pressed in, and phalanges may still be moved, at most [m].
+        """
+        seen = (points - joint[..., None]) * u.conj()[..., None]
+        away, from_tile = self._from_axis(seen)
+        size = np.abs(away)
+        first = size.argmin(axis=-1)[..., None]
+        # the bed sinks no lower than with the nearest point alone
+        alone = self._alone(np.take_along_axis(lengths, first, axis=-1))
+        least = np.take_along_axis(size, first, axis=-1) + alone
+        chosen = size <= least + within[..., None]
+        chosen |= from_tile <= from_tile.min(axis=-1, keepdims=True) + within[..., None]
+        return NearPoints.among(points, lengths, chosen)
 
     def _from_axis(self, seen: Complexes) -> tuple[Complexes, Array]:
         """Return the way to points from the axis; and how far from under the tile they are [m]."""
@@ -166,19 +243,21 @@ class PhalanxShape(NamedTuple):
         distance = np.abs(from_tile)
         return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
 
-    def _level(self, depths: Array, lengths: Array) -> Array:
+    def _alone(self, lengths: Array) -> Array:
+        """Return how far beds sink that are nothing but one point each [m]."""
+        root = self.fine * np.sqrt(self.far - self.near)
+        return np.asarray(np.minimum(root / np.sqrt(lengths), self.far))
+
+    def _level(self, depths: Array, near: NearPoints) -> Array:
         """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
         root = self.fine * np.sqrt(self.far - self.near)
-        least = depths.argmin(axis=-1)[..., None]
-        # no lower than with the nearest point alone
-        alone = np.take_along_axis(lengths, least, axis=-1)[..., 0]
-        level = np.take_along_axis(depths, least, axis=-1)[..., 0]
-        level = level + np.minimum(root / np.sqrt(alone), self.far)
+        first = stretch_minima(depths, near.first)
+        level = depths[first] + self._alone(near.lengths[first])
         for _ in range(MOST_STEPS):
-            sunk = np.maximum(level[..., None] - depths, 0.0)
-            load = lengths * sunk
-            norm = np.sqrt((load * sunk).sum(axis=-1))
-            step = (root - norm) * norm / np.maximum(load.sum(axis=-1), TINY)
+            sunk = np.maximum(level[near.phalanx] - depths, 0.0)
+            load = near.lengths * sunk
+            norm = np.sqrt(near.sums(load * sunk))
+            step = (root - norm) * norm / np.maximum(near.sums(load), TINY)
             # each as far as it needs, whatever others do
             going = np.abs(step) > LEVEL * self.far
             level = np.where(going, level + step, level)
@@ -217,8 +296,22 @@ def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
     return joints, u
 
 
-def nearest_points(rock: Outlines, shape: PhalanxShape, q: Array) -> tuple[Complexes, Array]:
-    """Return the points nearest each phalanx of fingers turned by q, (n, 3, `NEAREST`)."""
+def nearest_points(
+    rock: Outlines, shape: PhalanxShape, q: Array, depth: Array, turn: float = 0.0
+) -> NearPoints:
+    """Return the points that phalanges of fingers may press on, of the `NEAREST` to each.
+
+    Parameters
+    ----------
+    rock : Outlines
+    shape : PhalanxShape
+    q : ndarray, shape (n, 3)
+        Turns of the joints [rad].
+    depth : ndarray, shape (n, 3)
+        How far their tiles are pressed in [m].
+    turn : float, optional
+        How far joints may turn from there [rad].
+    """
     joints, u = fan_out(q, shape.end)
     x, y = rock.points.real[:, None] - joints.real[..., None], rock.points.imag[:, None]
     y = y - joints.imag[..., None]
@@ -233,4 +326,7 @@ def nearest_points(rock: Outlines, shape: PhalanxShape, q: Array) -> tuple[Compl
     # in their own order, so that sums do not depend on what other fingers are there
     nearest.sort(axis=-1)
     nearest += rock.points.shape[-1] * np.arange(len(q))[:, None, None]
-    return rock.points.take(nearest), rock.lengths.take(nearest)
+    points, lengths = rock.points.take(nearest), rock.lengths.take(nearest)
+    # two points may come nearer to each other by the way of each
+    arms = 2.0 * q.shape[-1] * (shape.end + shape.radius + depth)
+    return shape.may_press(points, lengths, joints, u, depth + turn * arms)

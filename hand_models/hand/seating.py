@@ -19,7 +19,7 @@ the grasp, and the other follows.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
@@ -33,7 +33,7 @@ from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
 from hand_models.sections import PolylineSection, Section
 
-__all__ = ["CENTRED", "Seating", "propose", "seat", "seating_given", "touches_seat"]
+__all__ = ["CENTRED", "RockUnder", "Seating", "propose", "seat", "seating_given", "touches_seat"]
 
 Angle = TypeVar("Angle", float, Array)
 
@@ -129,17 +129,31 @@ def seat(hand: HandModel, hold: Hold, grasp: Grasp, at: Pose | None = None) -> S
 
 
 def propose(
-    hand: HandModel, hold: Hold, grasp: Grasp, at: Pose | None = None
+    hand: HandModel,
+    hold: Hold,
+    grasp: Grasp,
+    at: Pose | None = None,
+    known: dict[Hashable, RockUnder] | None = None,
 ) -> tuple[Seating, bool]:
     """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
 
     If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
+
+    Parameters
+    ----------
+    hand, hold, grasp, at
+        As of `seat`.
+    known : dict, optional
+        Rock under hands like this one that was cut already; what is cut is added. It is the same
+        for whatever grasp a hand has at a place.
     """
     _, y, z = hand.inner_place
     if at is not None:
-        there = _on_outline(
-            hand, _Outlines(hand, hold, at), hand.pinch_crest if grasp.pinch else None
-        )
+        key = hold, at.position.tobytes(), at.rotation.tobytes()
+        known = {} if known is None else known
+        if key not in known:
+            known[key] = RockUnder(hand, hold, at)
+        there = _on_outline(hand, known[key], hand.pinch_crest if grasp.pinch else None)
         return replace(there, pose=there.pose @ at.inverse()), False
     if hold.shape == Plane.shape:
         return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
@@ -147,7 +161,7 @@ def propose(
     crest = hand.pinch_crest if pinch else None
     circle = hold.crest_circle(y)
     if circle is None and hold.swept is None:
-        return _on_outline(hand, _Outlines(hand, hold, Pose.identity()), crest), False
+        return _on_outline(hand, RockUnder(hand, hold, Pose.identity()), crest), False
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
         return CENTRED, False
@@ -224,7 +238,7 @@ def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
 # Rock that is known by its outline only -----------------------------------------------------------
 
 
-class _Outlines:
+class RockUnder:
     """Rock under a palm and the inner fingers as seen from a frame: outlines along x.
 
     Attributes
@@ -271,7 +285,7 @@ class _Outlines:
         return np.where(np.isfinite(least), least, math.nan)
 
 
-def _on_outline(hand: HandModel, rock: _Outlines, crest: float | None) -> Seating:
+def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seating:
     """Seat a hand on rock that is known by its outlines; centred if there is none under it."""
     under = rock.under
     if not under:

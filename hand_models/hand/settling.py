@@ -8,7 +8,7 @@ their holds, the places and axes of their tiles. How each finger rests is found 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -21,7 +21,7 @@ from hand_models.hand.hooked_nails import hook_nails, no_nails
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
-from hand_models.hand.seating import CENTRED, propose, seat, seating_given, touches_seat
+from hand_models.hand.seating import CENTRED, RockUnder, propose, seat, seating_given, touches_seat
 from hand_models.hand.settled_hand import HandPostures, SettledHand
 from hand_models.hand.tightening import resting_tensions
 from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_rock
@@ -213,11 +213,12 @@ def _placed(
     """Return hands at their holds, seated where these have no place, and their fingers laid."""
     shapes = [each.hold.swept for each in placements]
     seatings, meant = [], []
+    under: dict[Hashable, RockUnder] = {}
     for i, (each, shape) in enumerate(zip(placements, shapes, strict=True)):
         if each.hold_in_hand is not None:
             seatings.append(seating_given(each.hold_in_hand))
             continue
-        seating, on_contact = propose(hand, each.hold, each.grasp, each.at)
+        seating, on_contact = propose(hand, each.hold, each.grasp, each.at, under)
         if on_contact and shape is None:
             seating, on_contact = seat(hand, each.hold, each.grasp), False
         seatings.append(seating)

@@ -1,3 +1,4 @@
+from .boundary import stretch_minima as stretch_minima
 from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .profile_section import ProfileSection as ProfileSection

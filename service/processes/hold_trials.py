@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from contextlib import nullcontext
 from functools import partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from hand_models.base import InvalidInputError
@@ -77,16 +78,19 @@ def try_everywhere(
     count = cores() if workers is None else workers
     # one that is searched for, or scattered, is many already
     most = TOGETHER if how.seat == "rest" and not how.robust else 1
+    # what hands at one place have alike is found once
+    places = [list(of) for _, of in groupby(range(len(trials)), lambda i: trials[i][:3])]
     # as many for each process
     rounds = max(math.ceil(len(trials) / (most * count)), 1)
-    size = max(math.ceil(len(trials) / (rounds * count)), 1)
+    size = max(math.ceil(len(places) / (rounds * count)), 1)
     # each all over the rock, so that what is broken off has been everywhere
-    step = math.ceil(len(trials) / size)
-    chunks = [list(trials[i::step]) for i in range(step)]
+    step = math.ceil(len(places) / size)
+    chunks = [[i for place in places[k::step] for i in place] for k in range(step)]
     here, processes = how.trying(), min(count, len(chunks)) - 1
     with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
-        pairs = enumerate(map(here, chunks)) if others is None else others.each(chunks, here)
-        for i, results in pairs:
+        parts = [[trials[i] for i in chunk] for chunk in chunks]
+        pairs = enumerate(map(here, parts)) if others is None else others.each(parts, here)
+        for k, results in pairs:
             if isinstance(results, Lost):
-                results = [InvalidInputError(results.reason) for _ in chunks[i]]
-            yield from zip(range(i, len(trials), step), results, strict=True)
+                results = [InvalidInputError(results.reason) for _ in chunks[k]]
+            yield from zip(chunks[k], results, strict=True)

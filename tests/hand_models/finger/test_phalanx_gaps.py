@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out, nearest_points
+from hand_models.finger.phalanx_gaps import (
+    NEAREST,
+    NearPoints,
+    PhalanxShape,
+    fan_out,
+    nearest_points,
+)
 from hand_models.sections import FlatSection, Outlines, RoundSection
 from tests.suite.helpers.hands import HAND
 
@@ -26,7 +32,8 @@ def beside(section, angle, joint=0.0, depth=DEPTH):
     points = np.broadcast_to(rock.points[0], (*shape, rock.points.shape[1]))
     lengths = np.broadcast_to(rock.lengths[0], points.shape)
     joints = np.broadcast_to(np.asarray(joint, dtype=complex), shape)
-    return SHAPE.beside(points, lengths, joints, u, np.broadcast_to(depth, shape))
+    every = NearPoints.among(points, lengths, np.ones(points.shape, dtype=bool))
+    return SHAPE.beside(every, joints, u, np.broadcast_to(depth, shape))
 
 
 def flat(offset):
@@ -107,9 +114,10 @@ def bed(section, q, depth):
     With the place and the direction of its force.
     """
     rock = Outlines.of([section], 0.2, SHAPE.spacing, NEAREST)
-    points, lengths = nearest_points(rock, SHAPE, q[None])
+    depths = np.full(3, depth)
+    near = nearest_points(rock, SHAPE, q[None], depths[None])
     joints, u = fan_out(q, SHAPE.end)
-    return SHAPE.beside(points[0], lengths[0], joints, u, np.full(3, depth)), joints, u
+    return SHAPE.beside(near, joints, u, depths), joints, u
 
 
 @settings(max_examples=150, deadline=None)
@@ -165,15 +173,21 @@ def test_phalanges_fan_out_from_the_first_joint():
     np.testing.assert_allclose(joints, [0.0, 0.04 * u[0], 0.04 * (u[0] + u[1])])
 
 
-def test_the_points_looked_at_are_those_nearest_a_phalanx():
-    rock = Outlines.of([flat(H), flat(0.02)], 0.2, SHAPE.spacing, NEAREST)
-    q = np.array([[0.1, 0.0, 0.3], [0.0, 0.2, -0.1]])
-    points, lengths = nearest_points(rock, SHAPE, q)
-    assert points.shape == lengths.shape == (2, 3, NEAREST)
-    joints, u = fan_out(q, SHAPE.end)
-    for i in range(2):
-        for j in range(3):
-            along = joints[i, j] + np.linspace(SHAPE.near, SHAPE.end, 200) * u[i, j]
-            every = np.abs(rock.points[i][:, None] - along).min(axis=1)
-            mine = np.abs(points[i, j][:, None] - along).min(axis=1)
-            assert mine.max() <= np.sort(every)[NEAREST - 1] + 1e-5
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
+    """Where they are, and wherever they may yet turn to."""
+    rng = np.random.default_rng(seed)
+    r, turn = float(rng.uniform(0.003, 0.3)), float(rng.choice([0.0, 1e-7, 1e-3]))
+    round_rock = RoundSection((float(rng.uniform(0.0, 0.1)), r + float(rng.uniform(0.0, 0.03))), r)
+    rock = Outlines.of([flat(H), round_rock], 0.2, SHAPE.spacing, NEAREST)
+    q, depth = rng.uniform(-0.1, 0.4, (2, 3)), rng.uniform(0.0, 5e-4, (2, 3))
+    near = nearest_points(rock, SHAPE, q, depth, turn)
+    joints, u = fan_out(q + turn * rng.uniform(-1.0, 1.0, (2, 3)), SHAPE.end)
+    found = SHAPE.beside(near, joints, u, depth)
+    shape = 2, 3, rock.points.shape[1]
+    points, lengths = (np.broadcast_to(each[:, None], shape) for each in rock)
+    every = NearPoints.among(points, lengths, np.ones(shape, dtype=bool))
+    for value, want in zip(found, SHAPE.beside(every, joints, u, depth), strict=True):
+        np.testing.assert_allclose(value, want, rtol=1e-9, atol=1e-12)
+    assert len(near.points) < len(every.points)

@@ -455,3 +455,23 @@ def test_a_finger_is_laid_as_on_its_section(seed):
         # the bed presses aside of where the face first touches near an end of the tile
         alongs = [[c.along for c in each.contacts] for each in (finger, first)]
         np.testing.assert_allclose(*alongs, atol=8e-3)
+
+
+def test_hands_at_one_place_are_seated_on_rock_that_is_cut_once(monkeypatch):
+    rock, at = Mesh(*cylinder_mesh(0.3, 64), anywhere=True), Pose.identity()
+    placements = [Placement(rock, ROCK, grasp, None, at) for grasp in (Grasp(), PINCH)]
+    alone = [SpinyHand(HAND.table).settle_each([each])[0].seating for each in placements]
+    cuts: list[tuple[float, ...]] = []
+    real = Mesh.section
+
+    def counted(self: Mesh, origin: np.ndarray, s_axis: np.ndarray, t_axis: np.ndarray):
+        cuts.append(tuple(np.round(np.concatenate([origin, s_axis, t_axis]), 12)))
+        return real(self, origin, s_axis, t_axis)
+
+    monkeypatch.setattr(Mesh, "section", counted)
+    together = SpinyHand(HAND.table).settle_each(placements)
+    assert [each.seating.rule for each in together] == [each.rule for each in alone]
+    for one, each in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(one.seating.pose.position, each.pose.position)
+    # two under the inner fingers, five under the palm; then those of the fingers themselves
+    assert len(cuts) == 7 + 4 * len(placements)

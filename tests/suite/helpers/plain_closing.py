@@ -129,9 +129,9 @@ class PlainFinger:
     # Geometry and forces --------------------------------------------------------------------------
 
     def beside(self, q: np.ndarray) -> Beside:
-        points, lengths = nearest_points(self.rock, self.shape, q[None])
+        near = nearest_points(self.rock, self.shape, q[None], self.depth[None])
         joints, u = fan_out(q, self.shape.end)
-        found = self.shape.beside(points[0], lengths[0], joints, u, self.depth)
+        found = self.shape.beside(near, joints, u, self.depth)
         share = engaged_share(found.tile_gap, self.shape.travel)
         share = engaged_share(1.0 - share * found.push.imag, 1.0)
         arms = (joints + found.place * u)[None, :] - joints[:, None]
