@@ -57,6 +57,15 @@ def test_what_an_index_exports_is_what_the_module_defines_and_no_module_hides_it
         assert not (index / name / "__init__.py").exists()
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_nothing_is_found_by_an_objects_identity(package):
+    for path in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            asked = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+            assert not (asked and node.func.id == "id"), f"{path}:{node.lineno}"
+            assert not isinstance(node, ast.Name) or not node.id.startswith("Weak"), path
+
+
 def test_every_room_has_an_index():
     found = {path for package in PACKAGES for path in (ROOT / package).iterdir() if path.is_dir()}
     others = {"__pycache__", "examples", "parameters"}

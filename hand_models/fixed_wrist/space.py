@@ -251,7 +251,8 @@ def _of_layout(
 
 
 def _stacked(hands: Sequence[SettledHand], name: str) -> Array:
-    return np.array([getattr(hand, name) for hand in hands])
+    arrays: list[Array] = [getattr(hand, name) for hand in hands]
+    return np.concatenate(arrays).reshape(len(hands), *arrays[0].shape)
 
 
 class _Sums(NamedTuple):

@@ -153,7 +153,7 @@ def close_fingers(
         for k, (phalanges, base_tile) in enumerate(
             zip(laid[i], hand.rubbing, strict=True), len(FINGERS) * i
         ):
-            key = id(phalanges), base_tile
+            key = tuple(phalanges), base_tile
             if key not in known:
                 row = _row_laid(hand, placement, phalanges, tension, base_tile)
                 if row is None:

@@ -13,7 +13,7 @@ reaction, but no normal load (``assumed``).
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -40,6 +40,8 @@ ROTATIONS: Final = 64
 class HandModel:
     """The hand's geometry and mechanics: what is known of it before it takes a hold.
 
+    Hands of the same numbers are equal.
+
     Parameters
     ----------
     table : ParameterTable, optional
@@ -53,6 +55,7 @@ class HandModel:
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         self.table = table = table or hand_table()
+        self._hash = hash(table)
         self._frames: dict[tuple[float, ...], FrameStack] = {}
         self.palm_share = lru_cache(maxsize=SHARES)(self._palm_share)
         self.finger = FingerModel.from_table(table)
@@ -134,6 +137,17 @@ class HandModel:
         except InvalidInputError as error:
             entry = str(error.field).replace("friction", "pulley_friction")
             raise InvalidInputError(error.message, field=f"palm.{entry}") from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # hashes of words differ from process to process
+        return type(self), (self.table,)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same hand: of equal numbers."""
+        return self is other or (isinstance(other, HandModel) and self.table == other.table)
 
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""

@@ -179,7 +179,7 @@ class SpinyHand(HandModel):
 
 def _rock_bytes(hands: Iterable[SettledHand]) -> int:
     """Return how many bytes the rock has that hands are on, of each hold once."""
-    return sum({id(hand.hold): hand.hold.nbytes for hand in hands}.values())
+    return sum({hand.hold: hand.hold.nbytes for hand in hands}.values())
 
 
 def nearby_closures(settled: SettledHand, distance: float = NEARBY) -> tuple[NearbyClosure, ...]:

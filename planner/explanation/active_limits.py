@@ -13,7 +13,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.prepare import KEPT_NAMES, IdentityKey, concatenated
+from planner.prepare import KEPT_NAMES, concatenated
 from planner.programs import JOINT_TORQUE, SLACK
 from planner.result import LimitName, Price
 
@@ -116,7 +116,7 @@ class ActiveLimits:
         multipliers: Sequence[Array],
     ) -> None:
         self._spaces = spaces
-        self._named = named = _named(IdentityKey(*[space.rows for space in spaces]), tuple(limbs))
+        self._named = named = _named(tuple([space.rows for space in spaces]), tuple(limbs))
         duals = concatenated(multipliers)
         self._weights = duals * (duals > BINDING)
         self._worth = np.bincount(named.of_row, self._weights, len(named.names))
@@ -201,11 +201,9 @@ class _Named(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named(key: IdentityKey, limbs: tuple[str, ...]) -> _Named:
-    """Return the limits of hands of limbs; ``key``: the rows of the set of each."""
-    hands = [
-        _named_alone(IdentityKey(rows), limb) for rows, limb in zip(key.each, limbs, strict=True)
-    ]
+def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> _Named:
+    """Return the limits of hands of limbs by the rows of their sets."""
+    hands = [_named_alone(rows, limb) for rows, limb in zip(sets, limbs, strict=True)]
     offsets = accumulate((len(hand.names) for hand in hands), initial=0)
     return _Named(
         tuple(chain.from_iterable(hand.names for hand in hands)),
@@ -215,8 +213,7 @@ def _named(key: IdentityKey, limbs: tuple[str, ...]) -> _Named:
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named_alone(key: IdentityKey, limb: str) -> _Named:
-    rows: tuple[Row, ...] = key.each[0]  # type: ignore[assignment]
+def _named_alone(rows: tuple[Row, ...], limb: str) -> _Named:
     names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
     index = {name: i for i, name in enumerate(dict.fromkeys(names))}
     of_row = np.array([index[name] for name in names], dtype=np.intp)

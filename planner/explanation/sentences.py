@@ -13,7 +13,7 @@ from hand_models.fixed_wrist import HAND_LOAD
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from planner.explanation.active_limits import LimitUse
 from planner.explanation.infeasibility import HELD_WRENCH
-from planner.prepare import FORCE_CAP, TENSION_CHANGE, batch_of
+from planner.prepare import FORCE_CAP, TENSION_CHANGE, HandBatch
 from planner.programs import JOINT_TORQUE, WRENCH_UNIT
 from planner.question import Stance
 from planner.result import Certificate, HandPlan, LimitName
@@ -298,12 +298,12 @@ def _farther(stretch: float) -> str:
     return f"{max(100.0 * (stretch - 1.0), 0.1):.2g} % farther than"
 
 
-def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
+def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     """Return what is odd about a stance that can be planned all the same."""
     found: list[str] = []
     limbs = [place.limb for place in stance.hands]
     stretches = stance.robot.stretches(stance.body, limbs, [place.pose for place in stance.hands])
-    holding, count = batch_of(tuple(settled)).touch.holding, len(FINGERS)
+    settled, holding, count = batch.hands, batch.touch.holding, len(FINGERS)
     for h, (place, hand, stretch) in enumerate(zip(stance.hands, settled, stretches, strict=True)):
         if stretch > 1.0:
             found.append(
@@ -325,7 +325,7 @@ def warnings(stance: Stance, settled: Sequence[SettledHand]) -> tuple[str, ...]:
                 f"{place.limb}: its rock ends {end:.2g} m from the base of a finger, which reaches "
                 f"{reach:.2g} m; the plan may depend on rock that is not given"
             )
-    first = {id(place.hold): i for i, place in reversed([*enumerate(stance.hands)])}
+    first = {place.hold: i for i, place in reversed([*enumerate(stance.hands)])}
     for i in sorted(first.values()):
         found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
     return tuple(found)

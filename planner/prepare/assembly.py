@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, wrench_transports
+from hand_models.base import Array, BoundedStore, wrench_transports
 from hand_models.fixed_wrist import wrench_spaces
-from hand_models.hand import SettledHand
+from planner.prepare.hand_batch import HandBatch
 from planner.prepare.hand_sets import HandSets
 from planner.prepare.joint_posture import Posture
 from planner.prepare.settled_stance import settle_stance, wrist_at
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
-from planner.programs import WRENCH_UNIT
+from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
 from planner.question import Question
 
 __all__ = ["assemble"]
@@ -26,9 +27,14 @@ NO_AIMS: Final = np.zeros(0)
 """The values of that."""
 
 
+KNOWN: Final[BoundedStore[Hashable, tuple[HandBatch, tuple[ScaledRows, ...]]]] = BoundedStore(64)
+"""Hands of stances in arrays, and their sets' rows, by the hands and the cap on tensions: those
+that were asked for last."""
+
+
 def assemble(
     question: Question, where: Posture | None, wrench: Array
-) -> tuple[list[SettledHand], HandSets]:
+) -> tuple[HandBatch, HandSets]:
     """Return the hands of a question on their holds, and what the programs need of them.
 
     Parameters
@@ -49,15 +55,25 @@ def assemble(
         for wrist, rows in zip(wrists, added, strict=True)
     ]
     held, aims = _held(question)
+    # what a stance adds to sets, and where wrists float, is known of no other
+    own = any(wrist is not None for wrist in wrists) or any(rows is not NOTHING for rows in added)
+    key = tuple(settled), cap
+    known = None if own else KNOWN.find([key])[0]
+    if known is None:
+        known = HandBatch.of(settled), tuple([scaled_rows(space) for space in spaces])
+        if not own:
+            KNOWN.keep([(key, known)])
+    batch, scaled = known
     hands = HandSets(
         spaces=tuple(spaces),
+        scaled=scaled,
         wrists=tuple(wrists),
         transports=wrench_transports(stance.body, [hand.pose for hand in stance.hands]),
         wrench=np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT,
         held=held,
         added=tuple(added),
     )
-    return settled, hands
+    return batch, hands
 
 
 def _added_rows(question: Question, where: Posture | None, index: int) -> StanceConstraints:

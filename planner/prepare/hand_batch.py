@@ -27,18 +27,16 @@ __all__ = [
     "TOUCHING",
     "ContactPattern",
     "HandBatch",
-    "IdentityKey",
     "TileIndex",
-    "batch_of",
     "concatenated",
     "contact_pattern_of",
     "tile_index_of",
 ]
 
 KEPT: Final = 64
-"""Stances whose arrays are kept, those used last; each takes some 40 kB besides its hands."""
+"""Shapes of stances of which arrays are kept, those used last."""
 
-KEPT_NAMES: Final = 1024
+KEPT_NAMES: Final = 256
 """Lists of names (of tiles, columns, rows) of which something is kept: some 5 kB each."""
 
 PLAIN: Final = 14
@@ -58,29 +56,14 @@ UNLIMITED: Final = (math.inf, math.inf)
 """Limits of a palm that touches nothing: no part of them is used."""
 
 
-class IdentityKey:
-    """Some objects as a key: the same only as these themselves, whatever they are equal to."""
-
-    __slots__ = ("each",)
-
-    def __init__(self, *each: object) -> None:
-        self.each = each
-
-    def __hash__(self) -> int:
-        return hash(tuple(map(id, self.each)))
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, IdentityKey) and tuple(map(id, self.each)) == tuple(
-            map(id, other.each)
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class TileIndex:
-    """Which tile is whose. Arrays are read-only.
+    """Which tile is whose, by how many each hand has. Arrays are read-only.
 
     Attributes
     ----------
+    counts : tuple of int, length H
+        Tiles of each hand, of which all else follows.
     hand, finger : ndarray of int, shape (T,)
         Of each tile, the fingers counted through all hands.
     first, first_finger : ndarray of int, shape (H,)
@@ -97,6 +80,7 @@ class TileIndex:
         Nails, whether they hook or not.
     """
 
+    counts: tuple[int, ...]
     hand: Indices
     finger: Indices
     first: Indices
@@ -107,6 +91,12 @@ class TileIndex:
     bases: Indices
     base_fingers: Indices
     nails: Indices
+
+    def __hash__(self) -> int:
+        return hash(self.counts)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TileIndex) and self.counts == other.counts
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -130,6 +120,7 @@ def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
     phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
     bases = np.flatnonzero(phalanx == "base")
     places = TileIndex(
+        counts=counts,
         hand=hand,
         finger=finger,
         first=np.searchsorted(hand, hands),
@@ -142,7 +133,8 @@ def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
         nails=np.flatnonzero(phalanx == NAIL),
     )
     for array in vars(places).values():
-        array.setflags(write=False)
+        if isinstance(array, np.ndarray):
+            array.setflags(write=False)
     return places
 
 
@@ -173,9 +165,8 @@ class ContactPattern(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def contact_pattern_of(key: IdentityKey) -> ContactPattern:
-    """Return what hands with these tuples of tiles touch."""
-    hands: tuple[tuple[Tile, ...], ...] = key.each  # type: ignore[assignment]
+def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
+    """Return what hands with these tiles touch."""
     places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
     away = contacts != TOUCHING
@@ -228,44 +219,42 @@ class HandBatch:
     bends: Array
     palm_limits: Array
 
+    @classmethod
+    def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
+        """Return what settled hands say."""
+        tiles = tuple([hand.tiles for hand in hands])
+        positions = [hand.positions for hand in hands]
+        angles = concatenated([hand.postures.angles for hand in hands])
+        bends = angles.copy()
+        bends[:, 1:] -= angles[:, :-1]
+        limits = [
+            (hand.palm.shear_limit, hand.palm.pressing_limit) if hand.palm.engaged else UNLIMITED
+            for hand in hands
+        ]
+        points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
+        axes = concatenated([hand.axes for hand in hands])
+        engagement = concatenated([hand.engagement for hand in hands])
+        # plans show them
+        points.setflags(write=False)
+        axes.setflags(write=False)
+        engagement.setflags(write=False)
+        return cls(
+            tuple(hands),
+            tile_index_of(tuple(map(len, tiles))),
+            contact_pattern_of(tiles),
+            points,
+            axes,
+            engagement,
+            concatenated([hand.lateral_shares for hand in hands]),
+            angles,
+            bends,
+            np.array(limits),
+        )
+
     @cached_property
     def stops(self) -> NDArray[np.int8]:
         """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
-
-
-@lru_cache(maxsize=KEPT)
-def batch_of(hands: tuple[SettledHand, ...]) -> HandBatch:
-    """Return what settled hands say, found once for the same hands."""
-    tiles = [hand.tiles for hand in hands]
-    positions = [hand.positions for hand in hands]
-    postures = [hand.postures for hand in hands]
-    angles = concatenated([posture.angles for posture in postures])
-    bends = angles.copy()
-    bends[:, 1:] -= angles[:, :-1]
-    limits = [
-        (hand.palm.shear_limit, hand.palm.pressing_limit) if hand.palm.engaged else UNLIMITED
-        for hand in hands
-    ]
-    points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
-    axes = concatenated([hand.axes for hand in hands])
-    engagement = concatenated([hand.engagement for hand in hands])
-    # plans show them
-    points.setflags(write=False)
-    axes.setflags(write=False)
-    engagement.setflags(write=False)
-    return HandBatch(
-        hands,
-        tile_index_of(tuple(map(len, tiles))),
-        contact_pattern_of(IdentityKey(*tiles)),
-        points,
-        axes,
-        engagement,
-        concatenated([hand.lateral_shares for hand in hands]),
-        angles,
-        bends,
-        np.array(limits),
-    )
 
 
 def concatenated(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:

@@ -19,12 +19,13 @@ from hand_models.base import Array
 from hand_models.compliance import FloatingWrist, PalmMode
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import programs
-from planner.prepare.stance_constraints import StanceConstraints
+from planner.prepare.stance_constraints import NOTHING, StanceConstraints
 from planner.programs import (
     TWIST_UNIT,
     WRIST_RANGE,
     HandData,
     Outcome,
+    ScaledRows,
     StanceData,
     scaled_rows,
     scaled_transports,
@@ -128,6 +129,8 @@ class HandSets:
     ----------
     spaces : tuple of WrenchSpace
         Of floating hands, at rest with idle palms.
+    scaled : tuple of ScaledRows
+        Their rows.
     wrists : tuple of FloatingWrist or None
         None for hands with a fixed wrist.
     transports : ndarray, shape (hands, 6, 6)
@@ -144,6 +147,7 @@ class HandSets:
     """
 
     spaces: tuple[WrenchSpace, ...]
+    scaled: tuple[ScaledRows, ...]
     wrists: tuple[FloatingWrist | None, ...]
     transports: Array
     wrench: Array
@@ -155,15 +159,25 @@ class HandSets:
         """Whether any wrist floats."""
         return any(wrist is not None for wrist in self.wrists)
 
+    @property
+    def own(self) -> bool:
+        """Whether sets are of this stance alone: a wrist floats, or the stance adds rows."""
+        return self.floating or any(rows is not NOTHING for rows in self.added)
+
     @cached_property
     def _fixed(self) -> tuple[HandData, ...]:
         """Data of hands with a fixed wrist; of floating ones a place to fill."""
         return tuple(
-            HandData.carried(scaled_rows(space), with_held(carried, held))
-            for space, carried, held in zip(
-                self.spaces, scaled_transports(self.transports), self.held, strict=True
+            HandData.carried(rows, with_held(carried, held))
+            for rows, carried, held in zip(
+                self.scaled, scaled_transports(self.transports), self.held, strict=True
             )
         )
+
+    def with_sets(self, spaces: Sequence[WrenchSpace]) -> HandSets:
+        """Return the same stance with other sets of its hands."""
+        scaled = tuple([scaled_rows(space) for space in spaces])
+        return replace(self, spaces=tuple(spaces), scaled=scaled)
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""

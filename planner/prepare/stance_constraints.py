@@ -20,7 +20,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import FINGERS, HELD
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.programs import JOINT_TORQUE, Names
+from planner.programs import JOINT_TORQUE
 
 __all__ = ["FORCE_CAP", "NOTHING", "TENSION_CHANGE", "JointLoads", "StanceConstraints"]
 
@@ -30,7 +30,7 @@ FORCE_CAP: Final = "force_cap"
 TENSION_CHANGE: Final = "tension_change"
 """Name of the hard rows that keep tensions near the present ones."""
 
-KEPT: Final = 1024
+KEPT: Final = 256
 """Lists of names that are kept."""
 
 AXES: Final = ("fx", "fy", "fz")
@@ -122,7 +122,7 @@ class StanceConstraints:
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,
-            rows=_joined(Names(space), apart, limits, constraints + hard),
+            rows=_joined(space.rows, apart, limits, constraints + hard),
             L=np.concatenate([space.L[:apart], D @ space.generators, space.L[apart:]]),
             l0=np.concatenate([space.l0[:apart], D @ space.origin + d0, space.l0[apart:]]),
             s=np.concatenate([space.s[:apart], s, space.s[apart:]]),
@@ -198,10 +198,10 @@ NOTHING: Final = StanceConstraints()
 
 @lru_cache(maxsize=KEPT)
 def _joined(
-    names: Names, apart: int, limits: tuple[Row, ...], hard: tuple[Row, ...]
+    names: tuple[Row, ...], apart: int, limits: tuple[Row, ...], hard: tuple[Row, ...]
 ) -> tuple[Row, ...]:
     """Return the names of a set's rows with further limit rows, after so many, and hard rows."""
-    return (*names.rows[:apart], *limits, *names.rows[apart:], *hard)
+    return (*names[:apart], *limits, *names[apart:], *hard)
 
 
 @lru_cache(maxsize=KEPT)

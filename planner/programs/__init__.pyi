@@ -5,7 +5,7 @@ from .row_scaling import (
     LOAD_UNIT as LOAD_UNIT,
     TWIST_UNIT as TWIST_UNIT,
     WRIST_RANGE as WRIST_RANGE,
-    Names as Names,
+    ScaledRows as ScaledRows,
     is_effort as is_effort,
     scaled_rows as scaled_rows,
 )

@@ -1,16 +1,13 @@
 """A hand's set in the units of the conic programs, wherever the hand is.
 
-All of a hand's data but its part of the balance. They are worked out once for each set and kept as
-long as the set is, so a hand that is asked about again gives the programs the very same arrays.
-What names alone decide (which rows are efforts, which capacity measures a load) is found once for
-each list of names.
+All of a hand's data but its part of the balance. What names alone decide (which rows are efforts,
+which capacity measures a load) is found once for each list of names.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 from typing import Final, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -24,7 +21,6 @@ __all__ = [
     "LOAD_UNIT",
     "TWIST_UNIT",
     "WRIST_RANGE",
-    "Names",
     "ScaledRows",
     "is_effort",
     "scaled_rows",
@@ -48,7 +44,7 @@ SECONDARY: Final = 1e-4
 LIGHT: Final = 0.1
 """How much less of that weight they have where the effort itself is least."""
 
-KEPT: Final = 1024
+KEPT: Final = 256
 """Lists of names that are kept."""
 
 
@@ -74,31 +70,6 @@ class ScaledRows(NamedTuple):
     tie: Array
     rest: Array
     unit: Array
-
-
-class Names:
-    """Names of a set's columns and rows, the same only as themselves.
-
-    Parameters
-    ----------
-    space : WrenchSpace
-    """
-
-    __slots__ = ("columns", "limits", "rows")
-
-    def __init__(self, space: WrenchSpace) -> None:
-        self.columns, self.rows, self.limits = space.columns, space.rows, len(space.s)
-
-    def __hash__(self) -> int:
-        return id(self.rows)
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Names)
-            and self.rows is other.rows
-            and self.columns == other.columns
-            and self.limits == other.limits
-        )
 
 
 class _Roles(NamedTuple):
@@ -135,20 +106,9 @@ class _Roles(NamedTuple):
     efforts: slice | Indices
 
 
-_kept: WeakKeyDictionary[WrenchSpace, ScaledRows] = WeakKeyDictionary()
-"""Of sets that somebody still has."""
-
-
 def scaled_rows(space: WrenchSpace) -> ScaledRows:
-    """Return what a hand's set gives the programs, worked out once."""
-    found = _kept.get(space)
-    if found is None:
-        found = _kept[space] = _worked_out(space)
-    return found
-
-
-def _worked_out(space: WrenchSpace) -> ScaledRows:
-    roles = _roles(Names(space))
+    """Return what a hand's set gives the programs."""
+    roles = _roles(space.columns, space.rows, len(space.s))
     scale, s = roles.scale, space.s
     L, l0 = space.L * (scale / s[:, None]), space.l0 / s
     if roles.over is None:
@@ -177,8 +137,9 @@ def _worked_out(space: WrenchSpace) -> ScaledRows:
 
 
 @lru_cache(maxsize=KEPT)
-def _roles(names: Names) -> _Roles:
-    columns, limits = names.columns, names.rows[: names.limits]
+def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Roles:
+    """Return the roles of names; ``count`` of the rows are limits."""
+    limits = rows[:count]
     floats = columns == WRIST
     tensions = np.array([name.endswith("/tension") for name in columns])
     place = {name: j for j, name in enumerate(columns)}
@@ -190,7 +151,7 @@ def _roles(names: Names) -> _Roles:
             measures[place.get(row.limit)] = i
     measures.pop(None, None)
     # hard rows are in newtons, but for those of a wrist's range
-    ranges = np.array([row.limit == WRIST_RANGE for row in names.rows[names.limits :]])
+    ranges = np.array([row.limit == WRIST_RANGE for row in rows[count:]])
     efforts = np.flatnonzero([is_effort(row) for row in limits])
     weight = np.where(tensions, 1.0, SECONDARY)
     measured = np.array(list(measures), dtype=np.intp)

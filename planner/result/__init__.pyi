@@ -1,6 +1,6 @@
 from .floating_load_recovery import recover_floating_hand as recover_floating_hand
 from .hand_plan import HandPlan as HandPlan, WristPlan as WristPlan
-from .load_recovery import LoadRecovery as LoadRecovery, load_recovery_of as load_recovery_of
+from .load_recovery import LoadRecovery as LoadRecovery
 from .plan import (
     Certificate as Certificate,
     LimitName as LimitName,

@@ -8,7 +8,7 @@ from hand_models.compliance import CompliantHand
 from hand_models.hand import SettledHand
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import batch_of
+from planner.prepare import HandBatch
 from planner.result.hand_plan import HandPlan, PalmPlan, WristPlan
 from planner.result.load_recovery import drawn_tendons
 
@@ -40,7 +40,7 @@ def recover_floating_hand(
     magnitudes = np.column_stack([loads[:, :2], np.abs(loads[:, 2])])
     used = (magnitudes @ planes.T / capacities).max(axis=1)
     used /= np.where(settled.touching, settled.engagement, np.inf)
-    known, drive = batch_of((settled,)), settled.hand.drive
+    known, drive = HandBatch.of((settled,)), settled.hand.drive
     # the winch stands still from the preload on
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)

@@ -16,7 +16,6 @@ from planner.prepare import (
     CONTACTS,
     KEPT_NAMES,
     TOUCHING,
-    IdentityKey,
     concatenated,
     contact_pattern_of,
     tile_index_of,
@@ -75,20 +74,20 @@ class _HandLayout(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _hand_layout(key: IdentityKey, limits: int) -> _HandLayout:
+def _hand_layout(
+    tiles: tuple[Tile, ...], columns: tuple[str, ...], names: tuple[Row, ...], limits: int
+) -> _HandLayout:
     """Return the layout of a hand.
 
     Parameters
     ----------
-    key : IdentityKey
-        Its tiles; columns and rows of its set.
+    tiles : tuple of Tile
+    columns : tuple of str
+    names : tuple of Row
+        Of the rows of its set.
     limits : int
         Limit rows of each tile, of which a hand has the first, tile by tile.
     """
-    tiles: tuple[Tile, ...]
-    columns: tuple[str, ...]
-    names: tuple[Row, ...]
-    tiles, columns, names = key.each  # type: ignore[assignment]
     rows = [row for row in names if row.kind == "limit"]
     touching = sum(CONTACTS[tile.contact] == TOUCHING for tile in tiles)
     place = {name: i for i, name in enumerate(columns, start=1)}
@@ -151,21 +150,24 @@ class LoadLayout(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def layout_of(key: IdentityKey, limits: tuple[int, ...]) -> LoadLayout:
+def layout_of(
+    tiles: tuple[tuple[Tile, ...], ...],
+    columns: tuple[tuple[str, ...], ...],
+    names: tuple[tuple[Row, ...], ...],
+    limits: tuple[int, ...],
+) -> LoadLayout:
     """Return the layout of all hands.
 
     Parameters
     ----------
-    key : IdentityKey
-        The tiles of each hand; then columns and rows of the set of each.
+    tiles, columns, names : tuple
+        Of `_hand_layout`, for each.
     limits : tuple of int
         Of `_hand_layout`, for each.
     """
     count = len(limits)
-    tiles: tuple[tuple[Tile, ...], ...] = key.each[:count]  # type: ignore[assignment]
-    names = zip(tiles, key.each[count::2], key.each[count + 1 :: 2], strict=True)
-    hands = [_hand_layout(IdentityKey(*own), rows) for own, rows in zip(names, limits, strict=True)]
-    places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(IdentityKey(*tiles))
+    hands = [_hand_layout(*own) for own in zip(tiles, columns, names, limits, strict=True)]
+    places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(tiles)
     ends = list(accumulate((len(hand.least) for hand in hands), initial=1))
     found = np.array([hand.places + at * hand.has for hand, at in zip(hands, ends, strict=False)])
     found -= np.sign(found)
@@ -179,14 +181,14 @@ def layout_of(key: IdentityKey, limits: tuple[int, ...]) -> LoadLayout:
     hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
     of_tile[hooked, 0] = axials[places.finger[hooked]]
     pairs = list(zip(first_row, hands, strict=True))
-    columns = np.zeros((count, max(len(hand.least) for hand in hands)), dtype=np.intp)
-    for own, end, hand in zip(columns, ends, hands, strict=False):
+    loads = np.zeros((count, max(len(hand.least) for hand in hands)), dtype=np.intp)
+    for own, end, hand in zip(loads, ends, hands, strict=False):
         own[: len(hand.least)] = end + np.arange(len(hand.least))
     shape = count, WRENCH + max(hand.rows for hand in hands)
     kept = np.zeros(len(places.hand), dtype=np.intp)
     kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
     return LoadLayout(
-        columns=columns,
+        columns=loads,
         shape=shape,
         limits=concatenated(
             [

@@ -10,24 +10,16 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger import PHALANGES
-from hand_models.hand import HandModel, SettledHand
-from hand_models.tile import HalfPlane, Surface, inner_half_planes
+from hand_models.hand import HandModel
+from hand_models.tile import HalfPlane, inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import (
-    KEPT,
-    KEPT_NAMES,
-    HandBatch,
-    IdentityKey,
-    TileIndex,
-    batch_of,
-    concatenated,
-)
-from planner.programs import LOAD_UNIT, scaled_rows
+from planner.prepare import KEPT, HandBatch, TileIndex, concatenated
+from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
 from planner.result.hand_plan import HandPlan, PalmPlan
 from planner.result.load_layout import COUNT, WRENCH, ZERO, layout_of
 from planner.result.plan_arrays import PlanArrays
 
-__all__ = ["LoadRecovery", "RecoveredLoads", "drawn_tendons", "load_recovery_of"]
+__all__ = ["LoadRecovery", "RecoveredLoads", "drawn_tendons"]
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Which way a palm shears and presses along x and z."""
@@ -50,35 +42,35 @@ class RecoveredLoads(NamedTuple):
     effort: float
 
 
-def load_recovery_of(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> LoadRecovery:
-    """Return what recovers loads of hands, made once for the same hands and sets."""
-    return _reader_of(IdentityKey(*settled), IdentityKey(*spaces))
-
-
-@lru_cache(maxsize=KEPT)
-def _reader_of(settled: IdentityKey, spaces: IdentityKey) -> LoadRecovery:
-    return LoadRecovery(settled.each, spaces.each)  # type: ignore[arg-type]
-
-
 class LoadRecovery:
     """Reads loads of hands with fixed wrists, all hands at once; made once for their rows.
 
     Parameters
     ----------
-    settled : sequence of SettledHand
+    known : HandBatch
     spaces : sequence of WrenchSpace
         Their sets.
+    scaled : sequence of ScaledRows, optional
+        Their rows, if these are known.
     """
 
-    def __init__(self, settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> None:
-        self._spaces = spaces
-        self._known = known = batch_of(tuple(settled))
-        names = [name for space in spaces for name in (space.columns, space.rows)]
-        pieces = _pieces_of(IdentityKey(*[hand.surface for hand in settled]))
+    def __init__(
+        self,
+        known: HandBatch,
+        spaces: Sequence[WrenchSpace],
+        scaled: Sequence[ScaledRows] | None = None,
+    ) -> None:
+        self._spaces, self._known, settled = spaces, known, known.hands
+        pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
-        tiles = [hand.tiles for hand in settled]
-        self._layout = layout = layout_of(IdentityKey(*tiles, *names), tuple(limits))
+        tiles = tuple([hand.tiles for hand in settled])
+        self._layout = layout = layout_of(
+            tiles,
+            tuple([space.columns for space in spaces]),
+            tuple([space.rows for space in spaces]),
+            tuple(limits),
+        )
 
         laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
@@ -89,16 +81,16 @@ class LoadRecovery:
         # rows of all hands, each of as many, and as long, as the largest has: wrench, then limits
         self._rows = np.zeros((*layout.shape, layout.columns.shape[1]))
         self._at_rest = np.zeros(layout.shape)
-        for mine, rest, space in zip(self._rows, self._at_rest, spaces, strict=True):
-            own = scaled_rows(space)
+        of_sets = [scaled_rows(space) for space in spaces] if scaled is None else scaled
+        for mine, rest, own in zip(self._rows, self._at_rest, of_sets, strict=True):
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
             rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
         joints, _, nails = drawn_tendons(known)
-        self._drives, self._per_shear = _drives_of(known.places, IdentityKey(settled[0].hand))
+        self._drives, self._per_shear = _drives_of(known.places, settled[0].hand)
         self._winches = (joints + nails) / settled[0].hand.drive.winch_radius
         self._fixed = (
-            tuple(tiles),
+            tiles,
             pieces,
             tuple([hand.palm.engaged for hand in settled]),
             (None,) * len(settled),
@@ -216,13 +208,13 @@ def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
         [m]
     """
     hand = known.hands[0].hand
-    radii, losses = _losses(known.places, IdentityKey(hand))
+    radii, losses = _losses(known.places, hand)
     nails = hand.nail.pulley_radius * concatenated([each.nail_angles for each in known.hands])
     return known.bends @ radii, losses, nails
 
 
 @lru_cache(maxsize=KEPT)
-def _drives_of(places: TileIndex, key: IdentityKey) -> tuple[Array, float]:
+def _drives_of(places: TileIndex, hand: HandModel) -> tuple[Array, float]:
     """Return what tensions and tiles' shears do to motors and winches, affine in them.
 
     Returns
@@ -233,9 +225,7 @@ def _drives_of(places: TileIndex, key: IdentityKey) -> tuple[Array, float]:
     per_shear : float
         Of the winches' angles, per newton of the shears of a tendon's tiles [rad/N].
     """
-    (hand,) = key.each
-    assert isinstance(hand, HandModel)
-    drive, (_, losses) = hand.drive, _losses(places, key)
+    drive, (_, losses) = hand.drive, _losses(places, hand)
     none, one = np.zeros_like(losses), np.ones_like(losses)
     at_zero, at_one = (
         np.array([drive.torque(f), drive.current(f), drive.winch_angle(none, f, none, losses)])
@@ -244,18 +234,9 @@ def _drives_of(places: TileIndex, key: IdentityKey) -> tuple[Array, float]:
     return np.array([at_zero, at_one - at_zero]), drive.winch_angle(0.0, 0.0, 1.0, 0.0)
 
 
-@lru_cache(maxsize=KEPT_NAMES)
-def _pieces_of(key: IdentityKey) -> tuple[tuple[HalfPlane, ...], ...]:
-    """Return the half-planes of tiles on these surfaces."""
-    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
-    return tuple([inner_half_planes(surface) for surface in surfaces])
-
-
 @lru_cache(maxsize=KEPT)
-def _losses(places: TileIndex, key: IdentityKey) -> tuple[Array, Array]:
+def _losses(places: TileIndex, hand: HandModel) -> tuple[Array, Array]:
     """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
-    (hand,) = key.each
-    assert isinstance(hand, HandModel)
     sums = np.add.accumulate((1.0 - hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0))
     losses = np.full(len(places.phalanges), sums[-2])
     losses[places.base_fingers] = sums[-1]

@@ -9,22 +9,21 @@ from functools import cached_property
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.hand import SettledHand
 from planner import deadline, programs
 from planner.deadline import Budget, Overlap, Unfinished
 from planner.explanation import ActiveLimits, LimitUse, idle_preloads, joint_name
 from planner.floating import PROGRAMS, LargestFactor, WristSolution
-from planner.prepare import HandSets, Posture
+from planner.prepare import HandBatch, HandSets, Posture
 from planner.programs import Outcome
 from planner.question import Question
 from planner.result import (
     Certificate,
     HandPlan,
+    LoadRecovery,
     PlanArrays,
     RobustLoadFactor,
     TensionPath,
     WristPlan,
-    load_recovery_of,
     recover_floating_hand,
 )
 from planner.solving.prepared_checks import PreparedChecks, prepare_checks
@@ -39,20 +38,20 @@ class Answer:
         self,
         question: Question,
         where: Posture | None,
-        settled: Sequence[SettledHand],
+        batch: HandBatch,
         hands: HandSets,
         wrench: Array,
         checks: PreparedChecks | None,
     ) -> None:
         self.question = question
         self.where = where
-        self.settled = settled
+        self.batch = batch
         self.parts = hands
         self.spaces, self.data = hands.sets(hands.at_rest(hands.idle))
         self.wrench = wrench
         self.limbs = [hand.limb for hand in question.stance.hands]
         self.idle = _idle_joints(where, self.limbs)
-        self.idle_preloads = idle_preloads(self.limbs, settled, hands.wrists)
+        self.idle_preloads = idle_preloads(self.limbs, batch.hands, hands.wrists)
         self.search: WristSolution | None = None
         self.least_used: WristSolution | None = None
         self.budget = Budget(PROGRAMS)
@@ -112,15 +111,14 @@ class Answer:
 
     def prepare(self) -> PreparedChecks:
         """Return what reads and checks plans, made anew."""
-        spaces = None if self.parts.floating else self.spaces
-        return prepare_checks(self.question, self.where, self.settled, spaces)
+        return prepare_checks(self.question, self.where, self.batch, self.parts)
 
     def _read_hand(self, index: int, y: Array) -> HandPlan:
         """Read one hand of a stance of which some float."""
-        limb, settled = self.limbs[index], self.settled[index]
+        limb, settled = self.limbs[index], self.batch.hands[index]
         space, wrist, search = self.spaces[index], self.parts.wrists[index], self.search
         if wrist is None or search is None:
-            reader = load_recovery_of((settled,), (space,))
+            reader = LoadRecovery(HandBatch.of((settled,)), (space,))
             return reader.hands((limb,), reader.read((y,)).arrays)[0]
         pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
         return recover_floating_hand(limb, settled, wrist.hand, space, pose)

@@ -38,8 +38,7 @@ class KnownStance:
         hands = prepared.hands
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None and not hands.floating:
-            spaces, _ = hands.sets(hands.at_rest(hands.idle))
-            checks = prepare_checks(question, None, prepared.settled, spaces)
+            checks = prepare_checks(question, None, prepared.batch, hands)
             prepared = prepared._replace(checks=checks)
         self.prepared = prepared
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -56,7 +55,7 @@ def find_robust_load_factor(answer: Answer) -> None:
     at_once = AT_ONCE if deadline.seconds() is None else 1
     # drawn in the order of their names, whatever the order of the question
     order = np.argsort(answer.limbs)
-    settled = [answer.settled[i] for i in order.tolist()]
+    settled = [answer.batch.hands[i] for i in order.tolist()]
     places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter, at_once)
     factors: list[float] = []
     refused: Counter[str] = Counter()
@@ -83,7 +82,7 @@ def _most_elsewhere(answer: Answer, settled: Sequence[SettledHand]) -> float | N
         return None
     spaces = wrench_spaces(settled, answer.question.limits.tendon_tension)
     pairs = zip(answer.parts.added, spaces, strict=True)
-    moved = replace(answer.parts, spaces=tuple(rows.on(space) for rows, space in pairs))
+    moved = answer.parts.with_sets([rows.on(space) for rows, space in pairs])
     return _most(moved, moved.sets(moved.at_rest(moved.idle)).data)
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Hashable
+from typing import Final, NamedTuple
 
-from hand_models.hand import SettledHand
-from hand_models.wrench_spaces import WrenchSpace
+from hand_models.base import BoundedStore
 from planner.explanation import warnings
-from planner.prepare import Posture
+from planner.prepare import HandBatch, HandSets, Posture
 from planner.question import Question
-from planner.result import LoadRecovery, load_recovery_of
+from planner.result import LoadRecovery
 from planner.verification import Check
 
 __all__ = ["PreparedChecks", "prepare_checks"]
@@ -34,28 +33,40 @@ class PreparedChecks(NamedTuple):
     oddities: tuple[str, ...]
 
 
+RECOVERIES: Final[BoundedStore[Hashable, LoadRecovery]] = BoundedStore(64)
+"""What reads loads, by the hands and the cap on tensions: those asked for last."""
+
+
 def prepare_checks(
-    question: Question,
-    where: Posture | None,
-    settled: Sequence[SettledHand],
-    spaces: Sequence[WrenchSpace] | None,
+    question: Question, where: Posture | None, batch: HandBatch, hands: HandSets
 ) -> PreparedChecks:
     """Return what reading and checking plans needs of the hands alone.
 
-    It changes nothing but caches that threads may share, so it may run beside a solver.
+    It changes nothing but a store that threads may share, so it may run beside a solver.
 
     Parameters
     ----------
     question : Question
     where : Posture or None
         The joints; None if the question says nothing of them.
-    settled : sequence of SettledHand
+    batch : HandBatch
         The hands on their holds.
-    spaces : sequence of WrenchSpace or None
-        Their sets; None where a wrist floats.
+    hands : HandSets
+        Their sets.
     """
     return PreparedChecks(
-        reader=None if spaces is None else load_recovery_of(settled, spaces),
-        check=Check(question, settled, where),
-        oddities=warnings(question.stance, settled),
+        reader=None if hands.floating else _reader(batch, hands, question.limits.tendon_tension),
+        check=Check(question, batch, where),
+        oddities=warnings(question.stance, batch),
     )
+
+
+def _reader(batch: HandBatch, hands: HandSets, cap: float | None) -> LoadRecovery:
+    if hands.own:
+        return LoadRecovery(batch, hands.spaces, hands.scaled)
+    key = batch.hands, cap
+    found = RECOVERIES.find([key])[0]
+    if found is None:
+        found = LoadRecovery(batch, hands.spaces, hands.scaled)
+        RECOVERIES.keep([(key, found)])
+    return found

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.hand import SettledHand
-from planner.prepare import HandSets, Posture, assemble, posture
+from planner.prepare import HandBatch, HandSets, Posture, assemble, posture
 from planner.question import Question
 from planner.solving.prepared_checks import PreparedChecks
 
@@ -22,7 +20,7 @@ class PreparedStance(NamedTuple):
     question : Question
     where : Posture or None
         The joints; None if the question says nothing of them.
-    settled : sequence of SettledHand
+    batch : HandBatch
         The hands on their holds.
     hands : HandSets
         What the programs need of them.
@@ -34,7 +32,7 @@ class PreparedStance(NamedTuple):
 
     question: Question
     where: Posture | None
-    settled: Sequence[SettledHand]
+    batch: HandBatch
     hands: HandSets
     wrench: Array
     checks: PreparedChecks | None = None
@@ -66,5 +64,4 @@ def prepare_stance(question: Question) -> PreparedStance:
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
     except InvalidInputError as error:
         raise error.within("load") from None
-    settled, hands = assemble(question, where, wrench)
-    return PreparedStance(question, where, settled, hands, wrench)
+    return PreparedStance(question, where, *assemble(question, where, wrench), wrench)

@@ -68,7 +68,7 @@ def read_plan(answer: Answer, times: Times, start: float) -> Plan:
     elif answer.certificate is not None:
         status = "infeasible"
         verified = True
-        touching = any(h.holding.any() or h.palm.engaged for h in answer.settled)
+        touching = any(h.holding.any() or h.palm.engaged for h in answer.batch.hands)
         reason = shortfall_sentence(answer.certificate, touching, floating=answer.floating)
     elif answer.search is not None:
         reason = "no pose of the floating wrists was found that balances the body"

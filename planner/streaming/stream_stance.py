@@ -14,12 +14,13 @@ import numpy as np
 
 from hand_models.base import Array, UnsupportedError
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
-from hand_models.hand import FINGERS, NAIL, SettledHand
+from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
+from planner.prepare import HandBatch
 from planner.programs import WRENCH_UNIT, Outcome
 from planner.question import Question
-from planner.result import Plan, load_recovery_of
+from planner.result import LoadRecovery, Plan
 from planner.solving import KnownStance, is_least, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import LoadsCheck
@@ -106,9 +107,11 @@ class StreamStance:
         self.columns = tuple(space.columns for space in spaces)
         sizes = [len(names) for names in self.columns]
         self.shape = len(spaces), max(sizes)
-        self.check = LoadsCheck(prepared.question, prepared.settled, self.columns, prepared.where)
-        self.drive = prepared.settled[0].hand.drive
-        self.winches = _winches(prepared.settled, spaces)
+        self.check = LoadsCheck(
+            prepared.question, prepared.batch.hands, self.columns, prepared.where
+        )
+        self.drive = prepared.batch.hands[0].hand.drive
+        self.winches = _winches(prepared.batch, spaces)
         self._least = np.zeros(self.shape)
         limits = max(len(space.s) for space in spaces)
         self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
@@ -191,9 +194,9 @@ class StreamStance:
         return np.maximum(whole, self._least)
 
 
-def _winches(settled: Sequence[SettledHand], spaces: Sequence[WrenchSpace]) -> Array:
+def _winches(batch: HandBatch, spaces: Sequence[WrenchSpace]) -> Array:
     """Return the winches' angles without tension and per newton, which no other load changes."""
-    reader, tendons = load_recovery_of(settled, spaces), len(FINGERS)
+    reader, tendons = LoadRecovery(batch, spaces), len(FINGERS)
     loads = [np.zeros(len(space.columns)) for space in spaces]
     at_zero = reader.read(loads).arrays.drives[-1]
     for y in loads:

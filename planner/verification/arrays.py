@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import SKEW, Array, Indices
 from hand_models.hand import FINGERS, HandModel
 from hand_models.tile import HalfPlane, Surface, inner_half_planes
-from planner.prepare import KEPT, HandBatch, IdentityKey, TileIndex
+from planner.prepare import KEPT, HandBatch, TileIndex
 from planner.verification.equilibrium import tendons_of
 from planner.verification.limit_surface import LimitCurves
 from planner.verification.sentences import DRIVES
@@ -108,15 +108,16 @@ class TileLimits(NamedTuple):
     curves: LimitCurves
 
 
-def limits_of(surfaces: IdentityKey, known: HandBatch) -> TileLimits:
-    """Return the limits of tiles of hands on these surfaces."""
+def limits_of(known: HandBatch) -> TileLimits:
+    """Return the limits of tiles of hands."""
+    surfaces = tuple([hand.surface for hand in known.hands])
     limits = _limits_of(surfaces, known.places)
     if (known.engagement == 1.0).all():
         return limits
     shares = np.where(known.touch.away, 1.0, known.engagement)
     return limits._replace(
         planes=limits.planes * _whole_per_part(known),
-        curves=LimitCurves(surfaces.each, known.places.hand, shares),  # type: ignore[arg-type]
+        curves=LimitCurves(surfaces, known.places.hand, shares),
     )
 
 
@@ -127,9 +128,8 @@ def _whole_per_part(known: HandBatch) -> Array:
 
 
 @lru_cache(maxsize=KEPT)
-def _limits_of(key: IdentityKey, places: TileIndex) -> TileLimits:
-    """Return the limits of tiles that all touch; ``key``: the surfaces."""
-    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
+def _limits_of(surfaces: tuple[Surface, ...], places: TileIndex) -> TileLimits:
+    """Return the limits of tiles that all touch."""
     pieces = tuple(inner_half_planes(surface) for surface in surfaces)
     return TileLimits(pieces, _planes(pieces, places), LimitCurves(surfaces, places.hand))
 
@@ -194,20 +194,18 @@ class Uses(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def uses_of(places: TileIndex, key: IdentityKey, strength: float) -> Uses:
+def uses_of(places: TileIndex, hand: HandModel, strength: float) -> Uses:
     """Return what tensions do.
 
     Parameters
     ----------
     places : TileIndex
-    key : IdentityKey
-        The `HandModel` that all hands are.
+    hand : HandModel
+        Which all hands are.
     strength : float
         What every tendon may hold [N].
     """
-    (hand,) = key.each
-    assert isinstance(hand, HandModel)
-    drive, tendons, structure = hand.drive, tendons_of(places, key), hand.structure
+    drive, tendons, structure = hand.drive, tendons_of(places, hand), hand.structure
     torque = drive.winch_radius / drive.gear_ratio / drive.efficiency
     current, idle = torque / drive.torque_constant, drive.no_load_current
     driven = [torque / drive.maximum_torque, current / drive.maximum_current]

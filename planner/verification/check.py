@@ -15,19 +15,19 @@ it is worked out by how much each is off, and how much it may be; `verify_words`
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, BoundedStore
 from hand_models.hand import FINGERS, SettledHand
-from planner.prepare import IdentityKey, Posture, batch_of
-from planner.question import Question
+from planner.prepare import HandBatch, Posture
+from planner.question import HandOnHold, Question
 from planner.result import HandPlan, PlanArrays
 from planner.verification.arrays import CROSS, LOAD, UTILISATION, roles_of
 from planner.verification.limbs import LimbUse, check_asked, check_limbs, force_use
-from planner.verification.recomputation import STOP, recomputing_of
+from planner.verification.recomputation import STOP, Recomputing
 from planner.verification.sentences import Recomputed
 
 __all__ = ["BALANCE", "LOAD", "STOP", "UTILISATION", "Check", "problems"]
@@ -70,7 +70,7 @@ def problems(
     effort : float, optional
         The plan's.
     """
-    check = Check(question, settled, where)
+    check = Check(question, HandBatch.of(settled), where)
     found = [
         f"{place.limb}: the plan is of {hand.limb}"
         for place, hand in zip(question.stance.hands, hands, strict=True)
@@ -86,24 +86,19 @@ class Check:
     ----------
     question : Question
         Its body wrench only counts where joints bear the robot's own weight.
-    settled : sequence of SettledHand
+    known : HandBatch
         The hands on their holds.
     where : Posture, optional
         The joints; None if the question says nothing of them.
     """
 
-    def __init__(
-        self, question: Question, settled: Sequence[SettledHand], where: Posture | None = None
-    ) -> None:
-        hands = tuple(settled)
-        stance, limits = question.stance, question.limits
-        self.question, self.where = question, where
-        self.known = known = batch_of(hands)
+    def __init__(self, question: Question, known: HandBatch, where: Posture | None = None) -> None:
+        hands, stance, limits = known.hands, question.stance, question.limits
+        self.question, self.where, self.known = question, where, known
         self.limbs = tuple([place.limb for place in stance.hands])
         cap, most = limits.tendon_tension, hands[0].hand.maximum_tension
         self.strength = most if cap is None else min(most, cap)
-        preloads = IdentityKey(*[place.tendon_preload for place in stance.hands])
-        self.again = recomputing_of(known, self.limbs, self.strength, preloads)
+        self.again = _recomputing(known, self.limbs, self.strength, stance.hands)
         self.floating = [h for h, place in enumerate(stance.hands) if place.wrist == "floating"]
         self.asked = [
             h
@@ -230,3 +225,20 @@ class Check:
             check_asked(found, self.question, places[h], wrench, tensions, error)
             used[h] = max(used[h], force_use(found, self.question, places[h], wrench, error))
         return used
+
+
+KNOWN: Final[BoundedStore[Hashable, Recomputing]] = BoundedStore(64)
+"""What recomputes plans, by the hands, limbs, strength and preloads: those asked for last."""
+
+
+def _recomputing(
+    known: HandBatch, limbs: tuple[str, ...], strength: float, places: Sequence[HandOnHold]
+) -> Recomputing:
+    preloads = [place.tendon_preload for place in places]
+    told = tuple([None if tensions is None else tuple(tensions) for tensions in preloads])
+    key = known.hands, limbs, strength, told
+    found = KNOWN.find([key])[0]
+    if found is None:
+        found = Recomputing(known, limbs, strength, preloads)
+        KNOWN.keep([(key, found)])
+    return found

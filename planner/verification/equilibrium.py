@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES, STOPS
-from hand_models.hand import FINGERS, HandModel, SettledHand
+from hand_models.hand import FINGERS, HandModel
 from planner.prepare import (
     KEPT,
     NONE,
     NOTHING,
     HandBatch,
-    IdentityKey,
     TileIndex,
-    batch_of,
     concatenated,
 )
 
@@ -70,18 +68,16 @@ class Equilibrium(NamedTuple):
     stop_joints: Indices
 
 
-@lru_cache(maxsize=KEPT)
-def equilibrium(hands: tuple[SettledHand, ...]) -> Equilibrium:
-    """Solve the equilibrium of all fingers of settled hands, once for the same hands.
+def equilibrium(known: HandBatch) -> Equilibrium:
+    """Solve the equilibrium of all fingers of settled hands.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If contacts do not hold the joints that are free.
     """
-    known = batch_of(hands)
-    places = known.places
-    tendons = tendons_of(places, IdentityKey(hands[0].hand))
+    hands, places = known.hands, known.places
+    tendons = tendons_of(places, hands[0].hand)
     contacts = known.touch.contacts[places.phalanges]
     closing = np.array([hand.closing_tension for hand in hands])
     loads, left = _solved(known, contacts, tendons, closing.repeat(len(FINGERS))[:, None])
@@ -152,10 +148,8 @@ class TendonEffects(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def tendons_of(places: TileIndex, key: IdentityKey) -> TendonEffects:
-    """Return what the tendons of hands do; ``key``: the `HandModel` that all of them are."""
-    (hand,) = key.each
-    assert isinstance(hand, HandModel)
+def tendons_of(places: TileIndex, hand: HandModel) -> TendonEffects:
+    """Return what the tendons of hands do, all of one model."""
     model, drive = hand.finger, hand.drive
     loss = 1.0 - model.friction
     # what is left of the tension at each phalanx's tile; a base tile comes first

@@ -17,7 +17,7 @@ from hand_models.base import Array, skew
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS, HELD, NAIL, SettledHand
 from hand_models.tile import inner_half_planes
-from planner.prepare import BALL
+from planner.prepare import BALL, HandBatch
 from planner.question import HandOnHold, Question
 from planner.verification.arrays import LOAD
 from planner.verification.equilibrium import equilibrium
@@ -170,7 +170,7 @@ class _Rows:
 
 def _finger(rows: _Rows, question: Question, hand: SettledHand, index: int) -> None:
     name, model = FINGERS[index], hand.hand.finger
-    structure, solved = hand.hand.structure, equilibrium((hand,))
+    structure, solved = hand.hand.structure, equilibrium(HandBatch.of((hand,)))
     tension = rows.load(f"{name}/tension")
 
     def affine(rest: Array, slope: Array) -> Array:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.hand import HandModel
-from planner.prepare import KEPT, NONE, NOTHING, HandBatch, IdentityKey
+from planner.prepare import KEPT, NONE, NOTHING, HandBatch
 from planner.verification.equilibrium import JOINTS, SIDES, tendons_of
 
 __all__ = ["LEVER", "JointBalance"]
@@ -59,7 +59,7 @@ class JointBalance:
 
     def __init__(self, known: HandBatch) -> None:
         hands, places, touch = known.hands, known.places, known.touch
-        self._places, body = places, IdentityKey(hands[0].hand)
+        self._places, body = places, hands[0].hand
         self._tendons = tendons = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
         self._shear = tendons.engaged * closing.take(places.hand) * known.engagement
@@ -130,10 +130,8 @@ class _Planes(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT)
-def _planes_of(key: IdentityKey, rotations: tuple[float, ...]) -> _Planes:
-    """Return the planes of hands turned so far; ``key``: the `HandModel` that all of them are."""
-    (hand,) = key.each
-    assert isinstance(hand, HandModel)
+def _planes_of(hand: HandModel, rotations: tuple[float, ...]) -> _Planes:
+    """Return the planes of hands of one model turned so far."""
     frames = [frame for rotation in rotations for frame in hand.frames(rotation)]
     axes, turns = np.zeros((len(frames), 1, 6)), np.zeros((len(frames), 2, 6))
     for axis, turn, frame in zip(axes[:, 0], turns, frames, strict=True):

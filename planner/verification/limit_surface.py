@@ -16,7 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.tile import Surface
-from planner.prepare import KEPT_NAMES, IdentityKey
+from planner.prepare import KEPT_NAMES
 
 __all__ = ["LimitCurves"]
 
@@ -42,7 +42,7 @@ class LimitCurves:
         self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array | None = None
     ) -> None:
         flat, loss, per_radian, gain = (
-            numbers.take(of_tile, -1) for numbers in _numbers(IdentityKey(*surfaces))
+            numbers.take(of_tile, -1) for numbers in _numbers(tuple(surfaces))
         )
         if shares is not None:
             flat[0] *= shares
@@ -95,8 +95,7 @@ class _Numbers(NamedTuple):
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _numbers(key: IdentityKey) -> _Numbers:
-    surfaces: tuple[Surface, ...] = key.each  # type: ignore[assignment]
+def _numbers(surfaces: tuple[Surface, ...]) -> _Numbers:
     flat, loss = np.zeros((2, 2, len(surfaces)))
     for i, surface in enumerate(surfaces):
         share = surface.lateral_limit / surface.shear_limit

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS, HELD
-from planner.prepare import KEPT, HandBatch, IdentityKey
+from planner.prepare import HandBatch
 from planner.result import PlanArrays
 from planner.verification.arrays import (
     DRIVEN,
@@ -34,13 +34,13 @@ from planner.verification.arrays import (
     roles_of,
     uses_of,
 )
-from planner.verification.equilibrium import equilibrium
+from planner.verification.equilibrium import Equilibrium, equilibrium
 from planner.verification.floating import ClaimedFinger, check_finger, check_palm
 from planner.verification.joint_balance import LEVER, JointBalance
 from planner.verification.nails import check_nails, nail_angles
 from planner.verification.sentences import Recomputed
 
-__all__ = ["PULLING", "STOP", "Recomputing", "recomputing_of"]
+__all__ = ["PULLING", "STOP", "Recomputing"]
 
 STOP: Final = 1e-6
 """How much torque a joint's stop may seem to pull, by rounding [N·m]."""
@@ -62,14 +62,6 @@ PALM_SIGNS: Final = PALM_SIDES[::2]
 """The same along x and z: of its shear and pressing."""
 
 
-@lru_cache(maxsize=KEPT)
-def recomputing_of(
-    known: HandBatch, limbs: tuple[str, ...], strength: float, preloads: IdentityKey
-) -> Recomputing:
-    """Return what recomputes plans of hands, made once for the same hands; see `Recomputing`."""
-    return Recomputing(known, limbs, strength, preloads)
-
-
 class Recomputing:
     """Recomputes plans of the same settled hands.
 
@@ -79,19 +71,22 @@ class Recomputing:
     limbs : tuple of str
     strength : float
         What every tendon may hold [N].
-    preloads : IdentityKey
+    preloads : sequence of ndarray or None
         Tensions (4,) to which the motors of each hand have tightened its tendons if its wrist
         floats [N]; None for the closing tension.
     """
 
     def __init__(
-        self, known: HandBatch, limbs: tuple[str, ...], strength: float, preloads: IdentityKey
+        self,
+        known: HandBatch,
+        limbs: tuple[str, ...],
+        strength: float,
+        preloads: Sequence[Array | None],
     ) -> None:
-        hands, places, body = known.hands, known.places, IdentityKey(known.hands[0].hand)
-        self.known, self.limbs, self._body = known, limbs, known.hands[0].hand
-        self._preloads: tuple[Array | None, ...] = preloads.each  # type: ignore[assignment]
+        hands, places, body = known.hands, known.places, known.hands[0].hand
+        self.known, self.limbs, self._body, self._preloads = known, limbs, body, preloads
         self._balance = JointBalance(known)
-        self._limits = limits_of(IdentityKey(*[hand.surface for hand in hands]), known)
+        self._limits = limits_of(known)
         self._arms = arms_of(known.points)
         self._palm_shares = PALM_SIGNS / known.palm_limits
         self._uses = uses = uses_of(places, body, strength)
@@ -245,9 +240,13 @@ class Recomputing:
         shear, normal, _ = self._solved(arrays.tensions)
         return again._replace(shear=shear, normal=normal)
 
+    @cached_property
+    def _equilibrium(self) -> Equilibrium:
+        return equilibrium(self.known)
+
     def _solved(self, tensions: Array) -> tuple[Array, Array, Array]:
         """Return shear and normal of each tile (T,), and what presses on stops (k,), by Eq. 6."""
-        solved = equilibrium(self.known.hands)
+        solved = self._equilibrium
         rows = solved.rows[0] + solved.rows[1] * tensions[solved.fingers]
         tiles, fingers, _ = self.known.places.shape
         shear, normal = rows[: 2 * tiles].reshape(2, tiles)
@@ -300,7 +299,7 @@ class Recomputing:
         """
         hand, limb, wrist = self.known.hands[h], self.limbs[h], arrays.wrists[h]
         assert wrist is not None
-        (preloads, shear, normal, stops), eq = loads, equilibrium(self.known.hands)
+        (preloads, shear, normal, stops), eq = loads, self._equilibrium
         allowed = float(self.allowed(arrays)[h])
         for i, name in enumerate(FINGERS):
             finger = COUNT * h + i

@@ -141,7 +141,7 @@ def _tiles(sizes: Sequence[int], rounds: int, tick: Callable[[], object]) -> Cur
     ways: dict[tuple[str, int], Way] = {}
     for size in sizes:
         fewer = [
-            replace(hands, spaces=tuple(_with_tiles(space, size) for space in hands.spaces))
+            hands.with_sets([_with_tiles(space, size) for space in hands.spaces])
             for hands in stances
         ]
         ways |= _programs(size, [hands.sets(hands.at_rest(hands.idle)) for hands in fewer])

@@ -231,7 +231,7 @@ def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
     """Other ways from the hands' sets to the loads."""
     # the same sets as new objects, so that nothing is known of them
     stances = [
-        replace(each.hands, spaces=tuple(replace(space) for space in each.hands.spaces))
+        each.hands.with_sets([replace(space) for space in each.hands.spaces])
         for each in rivals.stances
     ]
 

@@ -29,7 +29,7 @@ from hand_models.hand import closing_sequence
 from hand_models.rock import Hold
 from planner.explanation import warnings
 from planner.pictures import plot_plan, plot_wrench_space
-from planner.prepare import settle_hand
+from planner.prepare import HandBatch, settle_hand
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
@@ -457,7 +457,7 @@ def test_a_nail_that_touches_nothing_may_carry_nothing():
     stance = one_hand(hold=Profile(sides))
     settled = settle_hand(stance.hands[0], stance)
     assert contacts(settled) == ["nail", "nail", "none", "none"]
-    assert "front_left: 2 of 4 nails hook" in warnings(stance, [settled])
+    assert "front_left: 2 of 4 nails hook" in warnings(stance, HandBatch.of([settled]))
     force = np.array([-100.0, 0.0, 5.0])
     wrench = np.zeros(6)
     for row in nail_rows(settled)[:2]:

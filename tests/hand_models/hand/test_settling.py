@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import pickle
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,11 +16,12 @@ from hypothesis import given, settings, strategies as st
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
 from hand_models.base import BoundedStore
 from hand_models.finger import ClosedFinger, OpenFinger, close_all, settle_finger
-from hand_models.hand import FINGERS, Placement, SettledHand, SpinyHand, spiny_hand
+from hand_models.hand import FINGERS, HandModel, Placement, SettledHand, SpinyHand, spiny_hand
 from hand_models.hand.spinyhand import _rock_bytes
 from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
 from planner.prepare.settled_stance import settle_stance
+from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand
 from tests.suite.helpers.rocks import (
     cylinder_mesh,
@@ -475,3 +478,19 @@ def test_hands_at_one_place_are_seated_on_rock_that_is_cut_once(monkeypatch):
         np.testing.assert_array_equal(one.seating.pose.position, each.pose.position)
     # two under the inner fingers, five under the palm; then those of the fingers themselves
     assert len(cuts) == 7 + 4 * len(placements)
+
+
+def test_hands_of_the_same_numbers_are_equal_in_every_process():
+    one, other = SpinyHand(HAND.table), spiny_hand()
+    assert one is not other
+    assert one == other
+    assert hash(one) == hash(other)
+    assert one != changed_hand("tendon", "closing_tension", 31.0)
+    asked = (
+        "import pickle, sys; from tests.suite.helpers.hands import HAND; "
+        "assert pickle.load(sys.stdin.buffer) in {HAND: 1}"
+    )
+    for each in (one, HandModel(HAND.table)):
+        subprocess.run(
+            [sys.executable, "-c", asked], input=pickle.dumps(each), check=True, cwd=ROOT
+        )

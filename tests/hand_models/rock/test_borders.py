@@ -13,6 +13,7 @@ from hand_models import Cylinder, Grasp, Plane, Pose
 from hand_models.rock import Mesh
 from hand_models.rock.triangles import bridge, cut
 from planner.explanation import warnings
+from planner.prepare import HandBatch
 from planner.prepare.settled_stance import settle_stance
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import height_map, random_axes, random_mesh
@@ -77,7 +78,7 @@ def test_rock_without_a_border_does_not_end():
 )
 def test_a_plan_warns_of_rock_that_ends_within_a_fingers_reach(hold, ends):
     stance = on_wall(hold, outer_rotation=0.0)
-    told = [w for w in warnings(stance, settle_stance(stance)) if "rock ends" in w]
+    told = [w for w in warnings(stance, HandBatch.of(settle_stance(stance))) if "rock ends" in w]
     assert len(told) == ends * len(stance.hands)
     for words, place in zip(told, stance.hands, strict=False):
         assert words.startswith(f"{place.limb}: its rock ends 0.")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import math
-import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -141,29 +139,22 @@ def test_wrenches_of_all_hands_are_carried_as_those_of_each(seed):
 def test_a_hand_elsewhere_gives_the_very_same_rows():
     """Only its part of the balance is new, where the body is turned and hands stay on holds."""
     question = ask(on_wall(Cylinder(0.4)))
-    # kept: sets are known again only as long as somebody has them
     hands, data = gathered(question)
     turned = replace(question.stance, body=question.stance.body @ Pose(np.full(3, 0.1), np.eye(3)))
     there, other = gathered(replace(question, stance=turned))
     assert all(a is b for a, b in zip(hands.spaces, there.spaces, strict=True))
     for a, b in zip(data.hands, other.hands, strict=True):
         assert not np.allclose(a.G, b.G)
-        assert all(one is two for one, two in zip(a[2:], b[2:], strict=True))
+        assert all(np.array_equal(*pair) for pair in zip(a[2:], b[2:], strict=True))
     check(replace(question, stance=turned))
 
 
-def test_scaled_rows_are_worked_out_once_and_kept_as_long_as_their_set():
+def test_scaled_rows_cannot_be_written_to():
     hands, _ = gathered(ask(on_wall(Cylinder(0.41), limbs=("front_left",))))
-    space = replace(hands.spaces[0])
-    rows = scaled_rows(space)
-    assert scaled_rows(space) is rows
+    rows = scaled_rows(hands.spaces[0])
     for name in ("generators", "origin", "L", "l0", "H", "h", "E", "e0", "tie", "rest", "unit"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(rows, name)[...] = 1.0
-    gone = weakref.ref(space)
-    del space
-    gc.collect()
-    assert gone() is None
 
 
 def test_where_the_stance_is_in_the_world_changes_no_number():

@@ -10,7 +10,7 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Edge
 from hand_models.tile import inner_half_planes
-from planner.prepare import KEPT, IdentityKey, assemble, batch_of, settle_hand
+from planner.prepare import HandBatch, assemble, settle_hand
 from planner.result import LoadRecovery, PlanArrays
 from tests.suite.helpers.stances import ask, on_wall, random_stance
 
@@ -45,11 +45,11 @@ def cases():
 def read(stance, seed=0):
     """Settled hands, their sets, random loads, and what is read of these."""
     rng = np.random.default_rng(seed)
-    settled, hands = assemble(ask(stance), None, np.zeros(6))
+    batch, hands = assemble(ask(stance), None, np.zeros(6))
     spaces, data = hands.sets(hands.at_rest(hands.idle))
     loads = [random_loads(rng, space) for space in spaces]
-    reader = LoadRecovery(settled, spaces)
-    return settled, spaces, data, loads, reader
+    reader = LoadRecovery(batch, spaces)
+    return batch.hands, spaces, data, loads, reader
 
 
 def named(space, y):
@@ -133,7 +133,7 @@ def test_hands_are_read_alone_as_together(stance):
     carried = reader.read(loads).arrays
     alone = []
     for limb, hand, space, y in zip(limbs, settled, spaces, loads, strict=True):
-        one = LoadRecovery([hand], [space])
+        one = LoadRecovery(HandBatch.of([hand]), [space])
         alone += one.hands([limb], one.read([y]).arrays)
     for got in (PlanArrays.of(alone), PlanArrays.of(reader.hands(limbs, carried))):
         for name, mine, expected in zip(carried._fields, got, carried, strict=True):
@@ -174,7 +174,7 @@ def test_the_same_holds_give_the_same_arrays_for_hands_that_are_settled_anew():
     settled, spaces, _, loads, reader = read(stance)
     again = [replace(settle_hand(hand, stance)) for hand in stance.hands]
     assert all(a is not b for a, b in zip(settled, again, strict=True))
-    one, other = (r.read(loads).arrays for r in (reader, LoadRecovery(again, spaces)))
+    one, other = (r.read(loads).arrays for r in (reader, LoadRecovery(HandBatch.of(again), spaces)))
     np.testing.assert_array_equal(one.forces, other.forces)
     np.testing.assert_array_equal(one.drives, other.drives)
 
@@ -186,20 +186,3 @@ def test_what_is_kept_of_hands_cannot_be_written_to():
     for array in (hands[1].positions, hands[1].axes, hands[1].palm.position):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-
-
-def test_what_is_kept_is_found_by_the_hands_themselves_and_has_an_end():
-    """Two hands that are equal are two; the arrays of a stance go when many others came."""
-    stance = on_wall()
-    hands = [settle_hand(hand, stance) for hand in stance.hands[:1]]
-    known = batch_of((hands[0],))
-    assert batch_of((hands[0],)) is known
-    copies = [replace(hands[0]) for _ in range(KEPT)]
-    assert all(batch_of((copy,)) is not known for copy in copies)
-    assert batch_of.cache_info().currsize == KEPT
-    assert batch_of((hands[0],)) is not known
-    one, other = settle_hand(stance.hands[0], stance).grasp, replace(stance.hands[0].grasp)
-    assert one == other
-    assert IdentityKey(one) == IdentityKey(one)
-    assert IdentityKey(one) != IdentityKey(other)
-    assert len({IdentityKey(one), IdentityKey(other), IdentityKey(one)}) == 2

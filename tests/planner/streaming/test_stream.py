@@ -58,8 +58,8 @@ def checked_by(question: Question):
     known = StreamStance(question)
     prepared = KnownStance(replace(question, body_wrench=known.first)).prepared
     spaces, data = prepared.hands.sets(prepared.hands.at_rest(prepared.hands.idle))
-    check = Check(prepared.question, prepared.settled, prepared.where)
-    return known, data, LoadRecovery(prepared.settled, spaces), check
+    check = Check(prepared.question, prepared.batch, prepared.where)
+    return known, data, LoadRecovery(prepared.batch, spaces), check
 
 
 def complaints(question: Question, points: SetPoints) -> list[str]:

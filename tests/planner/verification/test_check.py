@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hand_models.rock import Cylinder
-from planner.prepare import settle_hand
+from planner.prepare import HandBatch, settle_hand
 from planner.result import Plan, PlanArrays
 from planner.solving import plan
 from planner.verification import Check, problems, recomputation
@@ -215,7 +215,7 @@ def test_equilibrium_is_the_affine_map_of_tension():
     stances = [random_stance(np.random.default_rng(seed)) for seed in range(12)]
     for stance in (on_wall(), on_wall(Cylinder(0.7), closing_tension=50.0), *stances):
         hands = tuple(settle_hand(hand, stance) for hand in stance.hands)
-        found = equilibrium(hands)
+        found = equilibrium(HandBatch.of(hands))
         laws = np.concatenate([hand.loads for hand in hands])
         np.testing.assert_allclose(found.shear, laws[:, 0].T, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found.normal, laws[:, 1].T, rtol=1e-9, atol=1e-9)
@@ -228,7 +228,7 @@ def test_equilibrium_is_the_affine_map_of_tension():
 def test_the_check_of_known_hands_is_made_once():
     """Another body wrench on the same settled hands: one `Check` finds what a new one does."""
     settled = tuple(settle_hand(hand, QUESTION.stance) for hand in QUESTION.stance.hands)
-    check = Check(QUESTION, settled)
+    check = Check(QUESTION, HandBatch.of(settled))
     for lateral in (0.0, 0.1, -0.1):
         answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, lateral, 0.0))))
         numbers = PlanArrays.of(answer.hands), answer.utilisation, answer.body_wrench

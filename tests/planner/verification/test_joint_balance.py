@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import wrench_transport
 from hand_models.rock import Cylinder
-from planner.prepare import NOTHING, HandBatch, batch_of, settle_hand
+from planner.prepare import NOTHING, HandBatch, settle_hand
 from planner.result import PlanArrays
 from planner.solving.prepared_stance import prepare_stance
 from planner.solving.solve import plan_on
@@ -28,7 +28,7 @@ STANCES = {
 
 
 def of_stance(stance) -> HandBatch:
-    return batch_of(tuple(settle_hand(hand, stance) for hand in stance.hands))
+    return HandBatch.of([settle_hand(hand, stance) for hand in stance.hands])
 
 
 def wrenches(known: HandBatch, loads: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def wrenches(known: HandBatch, loads: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("stance", STANCES.values(), ids=STANCES.keys())
 def test_loads_by_equation_6_balance_at_any_tension(stance):
     known = of_stance(stance())
-    balance, solved = JointBalance(known), equilibrium(known.hands)
+    balance, solved = JointBalance(known), equilibrium(known)
     rng = np.random.default_rng(1)
     f = rng.uniform(5.0, 300.0, len(known.angles))
     of_tile = f[known.places.finger]
@@ -109,7 +109,7 @@ def test_tiles_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agree(w
     question = ask(on_wall())
     prepared = prepare_stance(question)
     answer = plan_on(prepared, time.perf_counter())
-    check = Check(question, prepared.settled, None)
+    check = Check(question, prepared.batch, None)
     honest = PlanArrays.of(answer.hands)
     tiles = [
         t
