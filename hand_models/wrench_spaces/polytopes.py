@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
 from hand_models.base import Array, Indices, SolverError
+from hand_models.wrench_spaces.linear_programs import linear_program
 
 __all__ = ["TOLERANCE", "Polytope", "distinct", "hull", "hull_facets", "polytope"]
 
@@ -80,18 +81,11 @@ def polytope(A: Array, b: Array) -> Polytope:
     # the centre of the largest ball inside
     cost = np.zeros(d + 1)
     cost[-1] = -1.0
-    ball = linprog(
-        cost,
-        A_ub=np.column_stack([A, np.ones(len(b))]),
-        b_ub=b,
-        bounds=[(None, None)] * d + [(0.0, None)],
-        method="highs",
-    )
-    if ball.status != 0 or ball.x is None:
-        raise SolverError(f"a block of {d} columns: {ball.message}")
-    if ball.x[-1] <= TOLERANCE:
+    what, bounds = f"a block of {d} columns", [(None, None)] * d + [(0.0, None)]
+    ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
+    if ball is None or ball[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
-    cut = HalfspaceIntersection(np.column_stack([A, -b]), ball.x[:-1])
+    cut = HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
 
 
@@ -150,22 +144,12 @@ def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
     ends = np.empty((2, d))
     for j in range(d):
         for k, sign in enumerate((1.0, -1.0)):
-            result = linprog(
-                sign * np.eye(d)[j],
-                A_ub=A,
-                b_ub=b / unit,
-                bounds=[(None, None)] * d,
-                method="highs",
-                options={
-                    "primal_feasibility_tolerance": TIGHT,
-                    "dual_feasibility_tolerance": TIGHT,
-                },
+            found = linear_program(
+                sign * np.eye(d)[j], A, b / unit, f"a block of {d} columns", tolerance=TIGHT
             )
-            if result.status == 2:
+            if found is None:
                 return None
-            if result.status != 0 or result.x is None:
-                raise SolverError(f"a block of {d} columns is not bounded: {result.message}")
-            ends[k, j] = unit * result.x[j]
+            ends[k, j] = unit * found[j]
     return 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
 
 

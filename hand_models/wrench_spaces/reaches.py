@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.optimize import linprog
 
-from hand_models.base import Array, SolverError
+from hand_models.base import Array
+from hand_models.wrench_spaces.linear_programs import linear_program
 
 __all__ = ["ends_along", "farthest"]
 
@@ -23,19 +23,7 @@ def farthest(slopes: Array, A: Array, b: Array) -> Array | None:
     SolverError
         If the program fails.
     """
-    result = linprog(
-        -slopes,
-        A_ub=A,
-        b_ub=b,
-        bounds=[(None, None)] * len(slopes),
-        method="highs",
-        options={"primal_feasibility_tolerance": EXACT, "dual_feasibility_tolerance": EXACT},
-    )
-    if result.status == 2:
-        return None
-    if result.status != 0 or result.x is None:
-        raise SolverError(f"support: {result.message}")
-    return np.asarray(result.x)
+    return linear_program(-slopes, A, b, "support", tolerance=EXACT)
 
 
 def ends_along(
@@ -63,23 +51,8 @@ def ends_along(
     for sign in (1.0, -1.0):
         cost = np.zeros(m + 1)
         cost[-1] = sign
-        # the presolve of an older HiGHS leaves some of these undecided
-        for presolve in (True, False):
-            result = linprog(
-                cost,
-                A_ub=rows,
-                b_ub=b,
-                A_eq=equations,
-                b_eq=-origin,
-                bounds=[(None, None)] * (m + 1),
-                method="highs",
-                options={"presolve": presolve},
-            )
-            if result.status in (0, 2):
-                break
-        if result.status == 2:
+        found = linear_program(cost, rows, b, "capability", A_eq=equations, b_eq=-origin)
+        if found is None:
             return None
-        if result.status != 0 or result.x is None:
-            raise SolverError(f"capability: {result.message}")
-        ends.append(float(result.x[-1]))
+        ends.append(float(found[-1]))
     return ends[0], ends[1]

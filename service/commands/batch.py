@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 from collections import Counter
@@ -200,10 +201,11 @@ def _lines(source: str) -> tuple[list[int], list[bytes]]:
 def _check_output(file: Path, requests: str, resume: bool) -> None:
     """Refuse a file for replies that is the requests' own, or that nothing can be resumed in."""
     try:
-        if requests != "-" and file.exists() and file.samefile(requests):
-            raise InvalidInputError(f"{file}: the requests are there", field="-o")
         if resume and file.exists() and not file.is_file():
             raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
+        given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
+        if file.is_file() and os.path.samestat(file.stat(), given):
+            raise InvalidInputError(f"{file}: the requests are there", field="-o")
     except OSError:
         # reading or writing tells
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
 import signal
 from pathlib import Path
@@ -27,6 +28,7 @@ from service.commands.terminal import draw_plan, note, say, show
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving import (
     CruxClient,
+    ended_in_time,
     listening,
     open_session,
     start_zenoh_log,
@@ -107,7 +109,7 @@ def serve(
     start_zenoh_log()
     closed(config)
     endpoints = listening(config)
-    with open_session(config) as session:
+    with ended_in_time(open_session(config)) as session:
         service = PlanService(session, robot, hand, workers=workers, seconds=seconds)
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
@@ -117,6 +119,7 @@ def serve(
                 "reach either; --no-multicast-scouting keeps services apart"
             )
         with service:
+            stop.waits_for()
             if as_json:
                 say({"v": 1, "keys": service.keys, "listen": endpoints})
             where = ", ".join(endpoints) or "no address"
@@ -130,7 +133,7 @@ def serve(
 
 
 class _StopSignal:
-    """SIGTERM or Ctrl-C, from now on.
+    """SIGTERM or Ctrl-C, from now on: at first they end this process and those that it started.
 
     A signal may well arrive in a thread of zenoh's or of a solver's, and does not wake the main
     thread then; what does is the byte that its handler writes to a pipe.
@@ -143,6 +146,11 @@ class _StopSignal:
         os.set_blocking(wakeup, False)
         signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
         for number in self.NUMBERS:
+            signal.signal(number, _leave)
+
+    def waits_for(self) -> None:
+        """From now on there are questions that are to be told of the end."""
+        for number in self.NUMBERS:
             signal.signal(number, lambda *_: None)
 
     def wait(self) -> None:
@@ -150,6 +158,12 @@ class _StopSignal:
         os.read(self._arrived, 1)
         for number in self.NUMBERS:
             signal.signal(number, signal.SIG_DFL)
+
+
+def _leave(*_: object) -> None:
+    for process in multiprocessing.active_children():
+        process.kill()
+    os._exit(0)
 
 
 @click.command()

@@ -6,6 +6,7 @@ A process can be killed at any time, which costs the questions in its lanes and 
 from __future__ import annotations
 
 import os
+import pickle
 import sys
 import threading
 from collections.abc import Callable
@@ -26,6 +27,9 @@ times as long, in which a short question would wait for a long one at each of it
 
 ROOM: Final = 2**14
 """Bytes that a pipe has room for, wherever."""
+
+PART: Final = 2**13
+"""Bytes of an answer that are sent at once: so few that no process can be stopped within them."""
 
 LAST_MOMENT: Final = 0.2
 """Longest time between the end of a process's pipes and its own [s]."""
@@ -56,6 +60,7 @@ class Lane(Generic[T, R]):
         self.number = number
         self.pipe = pipe
         self.ready = False
+        self._parts: list[bytes] = []
         self._sender: threading.Thread | None = None
 
     def give(self, question: T, size: int = 0) -> None:
@@ -81,7 +86,10 @@ class Lane(Generic[T, R]):
         self.pipe.close()
 
     def take(self) -> R | None:
-        """Return what has come; None for the word that the lane is ready.
+        """Return what has come; None for the word that the lane is ready, or a part of an answer.
+
+        To be called where something has come; it waits for nothing more, though a process may
+        stand still within its answer.
 
         Raises
         ------
@@ -89,9 +97,15 @@ class Lane(Generic[T, R]):
             If the process has died.
         """
         try:
-            found: R | None = self.pipe.recv()
+            self._parts.append(self.pipe.recv_bytes())
+            while len(self._parts[-1]) == PART:
+                if not self.pipe.poll():
+                    return None
+                self._parts.append(self.pipe.recv_bytes())
         except OSError:
             raise EOFError from None
+        whole, self._parts = b"".join(self._parts), []
+        found: R | None = pickle.loads(whole)
         self.ready = True
         return found
 
@@ -171,16 +185,23 @@ def _answer_each(pipes: list[Connection], memory: int | None) -> None:
 def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
     """Answer what comes through one pipe."""
     with suppress(EOFError, OSError):
-        pipe.send(None)
+        _send_parts(pipe, None)
         while True:
             question = pipe.recv()
             try:
                 result = answer(question)
-                pipe.send(result)
+                _send_parts(pipe, result)
             except MemoryError:
                 # nothing here can be trusted to go on
                 os._exit(OUT_OF_MEMORY)
             del question, result
+
+
+def _send_parts(pipe: Connection, result: object) -> None:
+    """Send a result in parts that are there whole or not at all; the last is a shorter one."""
+    whole = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
+    for at in range(0, len(whole) + 1, PART):
+        pipe.send_bytes(whole[at : at + PART])
 
 
 def _keep_to(memory: int | None) -> None:

@@ -1,6 +1,7 @@
 from .client import TIMEOUT as TIMEOUT, CruxClient as CruxClient
 from .config import (
     closed as closed,
+    ended_in_time as ended_in_time,
     exposed as exposed,
     listening as listening,
     open_session as open_session,

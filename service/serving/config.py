@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import socket
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from ipaddress import ip_address
 from pathlib import Path
@@ -22,6 +25,7 @@ from service.wire import NoServiceError
 __all__ = [
     "MODES",
     "closed",
+    "ended_in_time",
     "exposed",
     "listening",
     "open_session",
@@ -29,6 +33,11 @@ __all__ = [
     "zenoh_config",
     "zenoh_options",
 ]
+
+log = logging.getLogger(__name__)
+
+CLOSES: Final = 0.5
+"""How long a session may take to close [s]."""
 
 MODES: Final = ("peer", "client", "router")
 
@@ -116,6 +125,33 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise NoServiceError(f"no zenoh session: {_first_line(error)}") from None
+
+
+@contextmanager
+def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
+    """Close a session afterwards; if that takes long, end this process, whose work is done.
+
+    Zenoh waits for links whose other ends take nothing.
+    """
+    done = False
+    try:
+        yield session
+        done = True
+    finally:
+        closed = threading.Event()
+
+        def close() -> None:
+            try:
+                session.close()
+            except zenoh.ZError as error:
+                log.warning("%s", _first_line(error))
+            closed.set()
+
+        threading.Thread(target=close, name="crux-close", daemon=True).start()
+        if not closed.wait(CLOSES) and done:
+            logging.shutdown()
+            sys.stdout.flush()
+            os._exit(0)
 
 
 def listening(config: zenoh.Config) -> list[str]:

@@ -115,11 +115,10 @@ class Crew:
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
         return sum(each is not None and each.dear for each in asked)
 
-    def ends(self, lane: Lane[Job, Done]) -> tuple[float, float] | None:
-        """Return when a lane's question and then its process are given up; None without one."""
+    def ends(self, lane: Lane[Job, Done]) -> tuple[float, float]:
+        """Return when the question that a lane works on, and then its process, are given up."""
         question = self.work[lane]
-        if question is None:
-            return None
+        assert question is not None
         late = question.deadline + GRACE
         return late, question.deadline + HANGS if self.has_streams(lane) else late
 

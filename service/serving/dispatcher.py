@@ -64,6 +64,9 @@ UNNAMED: Final = 8
 OPERATORS: Final = "operators"
 """One more, as which those are who ask how the service is."""
 
+AWAKE: Final = 0.1
+"""How often who waits for the start is awake [s]."""
+
 AT_ONCE: Final = 32
 """Of what has come, how much is taken in before processes are looked at again."""
 
@@ -115,7 +118,9 @@ class Dispatcher:
             If processes die before they are ready.
         """
         self._thread.start()
-        self._started.wait()
+        # now and then awake for signals, which may come in another thread
+        while not self._started.wait(AWAKE):
+            continue
         if not self._crew.up:
             self.stop()
             self.close()
@@ -209,14 +214,15 @@ class Dispatcher:
         """Return how long there is nothing to do unless something comes [s]."""
         now = time.perf_counter()
         times = [self._waiting.first_deadline()]
-        for lane in self._crew.work:
-            times += self._crew.ends(lane) or ()
-        if self._stops_at is None:
-            times.append(self._crew.rests_until)
-        else:
-            times += [self._stops_at, self._quiet_from]
-        least = min(each - now for each in [*times, math.inf] if each > now)
-        return None if least == math.inf else least
+        for lane, asked in self._crew.work.items():
+            if asked is not None:
+                told, ends = self._crew.ends(lane)
+                times.append(ends if asked.replied else told)
+        ending = self._stops_at
+        own = [self._crew.rests_until] if ending is None else [ending, self._quiet_from]
+        times += [each for each in own if each > now]
+        least = min(times)
+        return None if least == math.inf else max(least - now, 0.0)
 
     # questions -----------------------------------------------------------------------------------
 
@@ -322,11 +328,12 @@ class Dispatcher:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.overdue(now):
-            missing = "it was its turn"
-            self._refuse(question, DeadlineError(question.seconds, missing))
+            self._refuse(question, DeadlineError(question.seconds, "it was its turn"))
         for lane, asked in list(self._crew.work.items()):
-            ends = self._crew.ends(lane) if lane in self._crew.work else None
-            if asked is None or ends is None or ends[0] > now:
+            if asked is None or lane not in self._crew.work:
+                continue
+            ends = self._crew.ends(lane)
+            if ends[0] > now:
                 continue
             if not asked.replied:
                 missing = "there was an answer, and its work was broken off"

@@ -175,5 +175,6 @@ def _value(field: msgspec.Raw, form: Format) -> Any:
         return None
     try:
         return form.decode(data, Any)
-    except MalformedError:
+    except (MalformedError, msgspec.ValidationError):
+        # of a number that is none, its process tells
         return None

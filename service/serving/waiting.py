@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from enum import Enum
 from typing import Final
@@ -21,7 +21,13 @@ ALL: Final = 256
 """Questions of all clients that wait in a queue."""
 
 HELD: Final = 2**28
-"""Bytes of all questions that wait."""
+"""Bytes of all large questions that wait."""
+
+SHARE: Final = 2**26
+"""Bytes of those of one client, unless it is one question."""
+
+LARGE: Final = 2**18
+"""Bytes from which on a question is a large one."""
 
 STALE: Final = 16
 """Deadlines that are kept for each question that waits, of those that waited before."""
@@ -94,7 +100,8 @@ class Waiting:
     def __init__(self) -> None:
         self._queues = {kind: FairQueue() for kind in Kind}
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
-        self._bytes = 0
+        self._bytes: Counter[str] = Counter()
+        """Of large questions, by client."""
         self._ends: list[tuple[float, int, Question]] = []
         """A heap; also of questions that wait no longer."""
         self._order = itertools.count()
@@ -108,12 +115,19 @@ class Waiting:
 
     def has_room(self, kind: Kind, question: Question) -> bool:
         """Whether a question may wait, too."""
-        fits = not self._bytes or self._bytes + len(question.payload) <= HELD
-        return fits and self._queues[kind].has_room(question.client)
+        return self._fits(question) and self._queues[kind].has_room(question.client)
+
+    def _fits(self, question: Question) -> bool:
+        """Whether there is room for a large question: what is small is no matter of bytes."""
+        size, own = len(question.payload), self._bytes[question.client]
+        if size <= LARGE or not self._bytes:
+            return True
+        return (not own or own + size <= SHARE) and self._bytes.total() + size <= HELD
 
     def put(self, kind: Kind, question: Question) -> None:
         """Let a question wait."""
-        self._bytes += len(question.payload)
+        if len(question.payload) > LARGE:
+            self._bytes[question.client] += len(question.payload)
         self._queues[kind].put(question)
         question.waits = True
         heapq.heappush(self._ends, (question.deadline, next(self._order), question))
@@ -170,4 +184,8 @@ class Waiting:
 
     def _let_go(self, question: Question) -> None:
         question.waits = False
-        self._bytes -= len(question.payload)
+        size, client = len(question.payload), question.client
+        if size > LARGE:
+            self._bytes[client] -= size
+            if not self._bytes[client]:
+                del self._bytes[client]

@@ -11,10 +11,11 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from hand_models import EmptySetError, InvalidInputError, WrenchSpace
-from hand_models.base import LimitError, SolverError
-from hand_models.wrench_spaces import SCALE, Row, hull_facets
+from hand_models.base import LimitError, SolverError, UnsupportedError
+from hand_models.wrench_spaces import SCALE, Row, hull_facets, linear_programs
 from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import Facets
+from hand_models.wrench_spaces.linear_programs import linear_program
 from hand_models.wrench_spaces.polytopes import polytope
 from tests.suite.helpers.shares import given_some
 
@@ -428,3 +429,32 @@ def test_cuts_leave_what_qhull_says_of_all_half_spaces_together(seed, r):
     bounding = {tuple(row) for row in np.round(said.equations, 6) + 0.0}
     ours = np.round(np.column_stack([left.normals, -left.offsets]), 6) + 0.0
     assert {tuple(row) for row in ours} == bounding
+
+
+# Linear programs ----------------------------------------------------------------------------------
+
+
+def test_a_linear_program_is_solved_or_empty_or_has_no_bound():
+    cost, b = np.array([1.0, 2.0]), np.array([1.0, 1.0, 3.0, 0.5])
+    np.testing.assert_allclose(linear_program(cost, BOX, b, "it"), [-1.0, -0.5])
+    assert linear_program(cost, BOX, np.array([1.0, -2.0, 1.0, 1.0]), "it") is None
+    with pytest.raises(UnsupportedError, match="it has no bound"):
+        linear_program(cost, BOX[:3], b[:3], "it", tolerance=1e-9)
+
+
+def test_what_a_presolve_leaves_undecided_is_asked_again_without(monkeypatch):
+    asked = []
+
+    def undecided(*arguments, options, **more):
+        asked.append(options["presolve"])
+        found = linprog(*arguments, options=options, **more)
+        if options["presolve"]:
+            found.status, found.x = 4, None
+        return found
+
+    monkeypatch.setattr(linear_programs, "linprog", undecided)
+    np.testing.assert_allclose(linear_program(np.ones(2), BOX, np.ones(4), "it"), [-1.0, -1.0])
+    assert asked == [True, False]
+    monkeypatch.setattr(linear_programs, "PRESOLVED", (True,))
+    with pytest.raises(SolverError, match="it: "):
+        linear_program(np.ones(2), BOX, np.ones(4), "it")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import resource
+import shlex
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,9 +15,11 @@ import pytest
 from hand_models.base import whole_file
 from service.commands.cli import run
 from service.commands.interruption import Interrupted
-from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint, result
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, result
 from tests.suite.helpers.processes import begun, ended, loaded, until, watched, workers
 from tests.suite.helpers.requests import HEAVY, wall_request
+from tests.suite.helpers.served import free_endpoint
 
 SIGNALS = (signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow))
 COUNT = 24
@@ -199,3 +204,37 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     assert link.is_symlink()
     assert path.read_text(encoding="utf-8") == "new"
     assert len(list(tmp_path.iterdir())) == 2
+
+
+@watched
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_service_that_starts_ends_at_once_with_its_processes(number: int) -> None:
+    process = begun("serve", "-l", free_endpoint(), "--workers", "3")
+    until(lambda: workers(process), process)
+    process.send_signal(number)
+    # a process that has just been born may say that its parent is gone
+    assert ended(process)[0] == DONE
+
+
+@watched
+@pytest.mark.parametrize("missing", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_standard_streams_that_are_closed_cost_nothing_but_themselves(missing: str) -> None:
+    own = f"{shlex.quote(sys.executable)} -c 'from service.commands import main; main()'"
+    done = subprocess.run(
+        ["sh", "-c", f"{own} plan wall-300 --json {missing}"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (DONE, "")
+    assert (done.stdout == "") == (" >&-" in f" {missing}")
+
+
+def test_a_batch_does_not_write_where_its_requests_come_from(lines: Path) -> None:
+    before = lines.read_bytes()
+    with lines.open("rb") as given:
+        process = begun("batch", "-", "-o", str(lines), stdin=given)
+        status, error = ended(process)
+    assert (status, error) == (BAD_INPUT, f"crux: -o: {lines}: the requests are there\n")
+    assert lines.read_bytes() == before

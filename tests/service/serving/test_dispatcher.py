@@ -275,6 +275,7 @@ def test_what_takes_long_leaves_a_process_to_others(site: Site, client: Client) 
     other = site.client()
     with until(site) as go_on:
         dear = [client.send(go_on, WRENCH_SPACE) for _ in range(3)]
+        site.wait_until(other, lambda health: "working" in states(health))
         assert len({other.ask({"echo": i})["pid"] for i in range(10)}) == 1
         health = site.health(client)
         assert (states(health).count("working"), health["waiting"]["dear"]) == (1, 2)

@@ -1,0 +1,60 @@
+"""Linear programs, asked again where a solver's presolve leaves them undecided."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from scipy.optimize import linprog
+
+from hand_models.base import Array, SolverError, UnsupportedError
+
+__all__ = ["linear_program"]
+
+SOLVED, EMPTY, UNBOUNDED = 0, 2, 3
+"""Statuses of `scipy.optimize.linprog`."""
+
+PRESOLVED: Final = (True, False)
+
+
+def linear_program(
+    cost: Array, A: Array, b: Array, what: str, *, tolerance: float | None = None, **more: Any
+) -> Array | None:
+    """Return the x of min cost · x, A x ≤ b; None where none is possible.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (n,)
+    A, b : ndarray, shapes (k, n), (k,)
+    what : str
+        What it is of, for errors.
+    tolerance : float, optional
+        Of feasibility; the solver's own by default.
+    **more
+        Of `scipy.optimize.linprog`; x is free where no bounds are given.
+
+    Raises
+    ------
+    UnsupportedError
+        If it has no bound.
+    SolverError
+        If it is not decided.
+    """
+    options: Any = {}
+    if tolerance is not None:
+        options = {
+            "primal_feasibility_tolerance": tolerance,
+            "dual_feasibility_tolerance": tolerance,
+        }
+    more = {"bounds": [(None, None)] * len(cost), **more}
+    for presolve in PRESOLVED:
+        found: Any = linprog(
+            cost, A_ub=A, b_ub=b, method="highs", options=options | {"presolve": presolve}, **more
+        )
+        if found.status == SOLVED and found.x is not None:
+            return np.asarray(found.x)
+        if found.status == EMPTY:
+            return None
+    if found.status == UNBOUNDED:
+        raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
+    raise SolverError(f"{what}: {found.message}")
