@@ -59,8 +59,9 @@ from hand_models.sections import Flags, Outlines
 
 __all__ = ["Path"]
 
-MOST_STEPS: Final = 2400
-"""On a path."""
+MOST_STEPS, LONG = 1200, 600
+"""Increments on a path, and from which on it is a long one; of 9,940 fingers on rough walls that
+come to rest nine had more than 400, and one more than 900."""
 
 INCREMENT: Final = 2.0 / 37.0
 """Most of the tension in an increment, in parts of the closing tension."""
@@ -121,7 +122,7 @@ class Path:
         rock, drive, state, around = self._rock, self._drive, self.end, self.around
         slow = np.zeros(len(going), dtype=np.intp)
         for step in range(MOST_STEPS):
-            balanced = BALANCED[step > MOST_STEPS // 4]
+            balanced = BALANCED[step > LONG]
             after, rests = self._increment(drive, state, around, balanced)
             slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)
             ends = rests | (slow > PATIENCE)
