@@ -6,20 +6,45 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from threading import Lock
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
+from weakref import WeakSet
 
-__all__ = ["BoundedStore", "StoreInfo"]
+__all__ = ["BoundedStore", "StoreInfo", "stores"]
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
 class StoreInfo(NamedTuple):
-    """How a store has served: answers found and missed since it was cleared, and kept now."""
+    """How stores of a name have served.
+
+    Attributes
+    ----------
+    hits, misses : int
+        Answers found and missed since they were cleared.
+    kept, most : int
+        Answers kept now, and at most.
+    """
 
     hits: int
     misses: int
     kept: int
+    most: int
+
+
+_stores: WeakSet[BoundedStore[Any, Any]] = WeakSet()
+"""All that their owners still have."""
+
+
+def stores() -> dict[str, StoreInfo]:
+    """Return how the stores of this process have served, those of one name together."""
+    found: dict[str, StoreInfo] = {}
+    for store in sorted(_stores, key=lambda each: each.name):
+        own, known = store.info(), found.get(store.name)
+        found[store.name] = (
+            own if known is None else StoreInfo(*map(sum, zip(own, known, strict=True)))
+        )
+    return found
 
 
 class BoundedStore(Generic[K, V]):
@@ -29,6 +54,8 @@ class BoundedStore(Generic[K, V]):
 
     Parameters
     ----------
+    name : str
+        What its answers are; several stores may have one name, each with its own owner.
     most : int
         Answers kept; the one that was asked for longest ago goes first.
     size : callable, optional
@@ -39,17 +66,19 @@ class BoundedStore(Generic[K, V]):
 
     def __init__(
         self,
+        name: str,
         most: int,
         size: Callable[[Iterable[V]], float] | None = None,
         largest: float = math.inf,
     ) -> None:
-        self.most = most
+        self.name, self.most = name, most
         self._size, self._largest = size, largest
         self._lock = Lock()
         self.clear()
+        _stores.add(self)
 
     def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[object, ...]]:
-        return type(self), (self.most, self._size, self._largest)
+        return type(self), (self.name, self.most, self._size, self._largest)
 
     def clear(self) -> None:
         """Forget all."""
@@ -60,7 +89,7 @@ class BoundedStore(Generic[K, V]):
     def info(self) -> StoreInfo:
         """Return how the store has served."""
         with self._lock:
-            return StoreInfo(self._hits, self._misses, len(self._answers))
+            return StoreInfo(self._hits, self._misses, len(self._answers), self.most)
 
     def find(self, questions: Sequence[K]) -> list[V | None]:
         """Return the answer to each question, None where it is not known."""

@@ -75,12 +75,12 @@ class SpinyHand(HandModel):
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         super().__init__(table)
-        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore(KEPT)
+        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore("settled hands", KEPT)
         self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(
-            KEPT, _rock_bytes, SCANNED
+            "settled hands on scans", KEPT, _rock_bytes, SCANNED
         )
         self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(
-            KEPT, _rock_bytes, SCANNED
+            "best seats", KEPT, _rock_bytes, SCANNED
         )
 
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:

@@ -27,7 +27,9 @@ NO_AIMS: Final = np.zeros(0)
 """The values of that."""
 
 
-KNOWN: Final[BoundedStore[Hashable, tuple[HandBatch, tuple[ScaledRows, ...]]]] = BoundedStore(64)
+KNOWN: Final[BoundedStore[Hashable, tuple[HandBatch, tuple[ScaledRows, ...]]]] = BoundedStore(
+    "hands in arrays", 64
+)
 """Hands of stances in arrays, and their sets' rows, by the hands and the cap on tensions: those
 that were asked for last."""
 

@@ -33,7 +33,7 @@ class PreparedChecks(NamedTuple):
     oddities: tuple[str, ...]
 
 
-RECOVERIES: Final[BoundedStore[Hashable, LoadRecovery]] = BoundedStore(64)
+RECOVERIES: Final[BoundedStore[Hashable, LoadRecovery]] = BoundedStore("load recoveries", 64)
 """What reads loads, by the hands and the cap on tensions: those asked for last."""
 
 

@@ -227,7 +227,7 @@ class Check:
         return used
 
 
-KNOWN: Final[BoundedStore[Hashable, Recomputing]] = BoundedStore(64)
+KNOWN: Final[BoundedStore[Hashable, Recomputing]] = BoundedStore("recomputing", 64)
 """What recomputes plans, by the hands, limbs, strength and preloads: those asked for last."""
 
 

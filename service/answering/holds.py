@@ -19,7 +19,7 @@ __all__ = ["Rocks", "SharedRock", "placed", "pose_of", "rocks_of"]
 KEPT: Final = 8
 """Meshes that are kept, those asked for last: on the same object hands are found settled."""
 
-MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore(KEPT)
+MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", KEPT)
 """By all that they are built of."""
 
 

@@ -34,7 +34,7 @@ class MeshFiles:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._read: BoundedStore[Hashable, Mesh] = BoundedStore(KEPT)
+        self._read: BoundedStore[Hashable, Mesh] = BoundedStore("mesh files", KEPT)
 
     def whole(self, request: R) -> R:
         """Return a request with vertices and faces in place of the files that it names.

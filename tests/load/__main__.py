@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,8 @@ import zenoh
 from rich.console import Console
 from rich.table import Table
 
+from hand_models.base import stores
+from service import processes as proc
 from service.answering import dispatch
 from tests.load.asking import (
     PLAN,
@@ -30,6 +33,7 @@ from tests.load.asking import (
     mixed,
     new_stances,
     new_wrenches,
+    random_plans,
     spoilt,
 )
 from tests.suite.helpers.checkout import ROOT
@@ -371,6 +375,27 @@ def fuzz(count: int, seed: int) -> None:
             client.close()
     console.print(f"{dict(tally.statuses)}; the slowest reply took {tally.slowest:.2f} s")
     console.print(f"last failure: {state['last_failure']}")
+
+
+@main.command()
+@click.option("--first", default=5_000, show_default=True)
+@click.option("--last", default=20_000, show_default=True)
+@click.option("--seed", default=0, show_default=True)
+def memory(first: int, last: int, seed: int) -> None:
+    """Answer varied questions in one process, and compare its memory after many and after more."""
+    sizes, statuses = {}, Counter[str]()
+    kinds = [new_wrenches(seed), new_stances(seed), random_plans(seed), random_plans(seed + 1)]
+    for i in range(last):
+        payload = next(kinds[i % len(kinds)])
+        statuses[dispatch.handle("plan", payload).status] += 1
+        if i + 1 in (100, first, last):
+            size = proc.resident(os.getpid())
+            assert size is not None
+            sizes[i + 1] = size
+            console.print(f"after {i + 1:,} questions {size / 2**20:.0f} MB, {dict(statuses)}")
+    console.print(f"{sizes[last] / sizes[first]:.2f} times as much")
+    for name, info in stores().items():
+        console.print(f"{name}: {info.kept} of {info.most} kept, {info.hits:,} hits")
 
 
 if __name__ == "__main__":

@@ -47,6 +47,12 @@ def new_stances(seed: int = 0) -> Iterator[bytes]:
         yield msgspec.json.encode(request)
 
 
+def random_plans(seed: int = 0) -> Iterator[bytes]:
+    """Plans of all sorts, of hands and holds of all sorts."""
+    for i in itertools.count():
+        yield msgspec.json.encode(random_request(seed * 10**6 + i) | {"deadline": 5.0})
+
+
 def dear_questions(seed: int = 0) -> Iterator[Asked]:
     """The dearest that are legal: many half-planes, robust, floating hands, sections of spaces."""
     rng = random.Random(seed)
