@@ -1,4 +1,5 @@
 from .bounded_store import BoundedStore as BoundedStore, stores as stores
+from .breaking_off import broken_off_by as broken_off_by, go_on as go_on
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,

@@ -33,7 +33,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, go_on
 from hand_models.finger.contact_states import RESTS, ROUNDING, contact_states, forces_on
 from hand_models.finger.path_state import (
     CAUGHT,
@@ -122,6 +122,7 @@ class Path:
         rock, drive, state, around = self._rock, self._drive, self.end, self.around
         slow = np.zeros(len(going), dtype=np.intp)
         for step in range(MOST_STEPS):
+            go_on()
             balanced = BALANCED[step > LONG]
             after, rests = self._increment(drive, state, around, balanced)
             slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)

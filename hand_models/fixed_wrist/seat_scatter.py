@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Pose
+from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -23,10 +23,6 @@ TENTH: Final = 10.0
 
 AT_ONCE: Final = 64
 """Hands that are closed together, by default: all the draws of one, unless more are asked for."""
-
-
-FEW: Final = 10
-"""The same where something else may end it."""
 
 
 class Robustness(NamedTuple):
@@ -61,7 +57,6 @@ def robustness(
     draws: int = DRAWS,
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
-    between: Callable[[], object] | None = None,
 ) -> Robustness:
     """Close a hand anew at random places about its own, and tell how far it still reaches.
 
@@ -76,8 +71,6 @@ def robustness(
     scatter : tuple of float, optional
         To either side along each axis of H [m], and about each [rad], about the middle of the palm;
         evenly distributed. As in the hand's parameters by default.
-    between : callable, optional
-        Called again and again on the way; what it raises ends it.
 
     Raises
     ------
@@ -92,11 +85,8 @@ def robustness(
             f"must be from 0 m, and from 0 to π rad, got {position:g} and {angle:g}",
             field="scatter",
         )
-    go_on = between or (lambda: None)
-    at_once = AT_ONCE if between is None else FEW
     there = []
-    for (each,) in scattered_hands(hand, [settled], draws, seed, (position, angle), at_once):
-        go_on()
+    for (each,) in scattered_hands(hand, [settled], draws, seed, (position, angle)):
         there += [each] if isinstance(each, SettledHand) else []
     ways, reaches = np.atleast_2d(np.asarray(directions, dtype=float)), []
     for space in wrench_spaces(there):

@@ -28,6 +28,7 @@ from hand_models.base import (
     InvalidInputError,
     Pose,
     finite_vector,
+    go_on,
 )
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand
@@ -184,6 +185,7 @@ class _Search:
             if isinstance(outcome, InvalidInputError):
                 self._refused[i] = self._refused[i] or outcome
                 continue
+            go_on()
             reach = _reach(next(spaces), self._direction)
             best = self.best[i]
             if best is None or reach > best.reach:

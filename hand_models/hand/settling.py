@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, go_on
 from hand_models.finger import BALANCE, NONE, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import BASES
@@ -218,6 +218,7 @@ def _placed(
         if each.hold_in_hand is not None:
             seatings.append(seating_given(each.hold_in_hand))
             continue
+        go_on()
         seating, on_contact = propose(hand, each.hold, each.grasp, each.at, under)
         if on_contact and shape is None:
             seating, on_contact = seat(hand, each.hold, each.grasp), False

@@ -1,7 +1,7 @@
 """How long an answer may still take: a clock that reaches every solver it starts.
 
 The clock is that of the thread's context, so that nothing on the way has to hand it on. Solvers ask
-it at each of their iterations, searches before each of their steps.
+it at each of their iterations, searches before each of their steps, hands while they close.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, NamedTuple
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError, InvalidInputError, broken_off_by
 
 __all__ = ["DeadlineError", "check", "expired", "left", "possible", "seconds", "within"]
 
@@ -87,9 +87,14 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
         clock = own if clock is None or own.end < clock.end else clock
     token = _clock.set(clock)
     try:
-        yield
+        with broken_off_by(None if clock is None else _mind_hands):
+            yield
     finally:
         _clock.reset(token)
+
+
+def _mind_hands() -> None:
+    check("the hands were closed on their holds")
 
 
 def seconds() -> float | None:

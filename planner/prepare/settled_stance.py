@@ -10,7 +10,6 @@ from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
 from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WrenchSpace
-from planner import deadline
 from planner.prepare.hand_sets import widest_at_rest
 from planner.question import HandOnHold, Stance
 
@@ -69,23 +68,9 @@ def settle_each(
     for way in set(ways):
         own = [i for i, each in enumerate(ways) if each == way]
         group = [placements[i] for i in own]
-        found.update(zip(own, _seated(kind, group, way), strict=True))
+        seated = kind.settle_each(group) if way is None else best_seats(kind, group, way)
+        found.update(zip(own, seated, strict=True))
     return [found[i] for i in range(len(hands))]
-
-
-def _seated(
-    kind: SpinyHand, placements: Sequence[Placement], way: tuple[float, ...] | None
-) -> list[SettledHand | InvalidInputError]:
-    """Return hands at rest, or where they hold most; of these under a deadline one by one."""
-    if way is None:
-        return kind.settle_each(placements)
-    if deadline.seconds() is None:
-        return best_seats(kind, placements, way)
-    found = []
-    for placement in placements:
-        deadline.check("the best seats of all hands were found")
-        found += best_seats(kind, [placement], way)
-    return found
 
 
 def _direction(hand: HandOnHold) -> tuple[float, ...]:

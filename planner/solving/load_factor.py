@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.fixed_wrist import AT_ONCE, DRAWS, TENTH, scattered_hands, wrench_spaces
+from hand_models.fixed_wrist import DRAWS, TENTH, scattered_hands, wrench_spaces
 from hand_models.hand import SettledHand
 from planner import deadline, programs
+from planner.deadline import DeadlineError
 from planner.floating import NO_WRENCH, most_load
 from planner.prepare import HandSets
 from planner.programs import SLACK, StanceData
@@ -51,22 +52,23 @@ def find_robust_load_factor(answer: Answer) -> None:
     if "robust" not in answer.question.want or not _needs_hands(answer):
         return
     hand = answer.question.stance.robot.hand
-    # with a deadline draw by draw, since closing hands is not cut short
-    at_once = AT_ONCE if deadline.seconds() is None else 1
     # drawn in the order of their names, whatever the order of the question
     order = np.argsort(answer.limbs)
     settled = [answer.batch.hands[i] for i in order.tolist()]
-    places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter, at_once)
+    places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter)
     factors: list[float] = []
     refused: Counter[str] = Counter()
-    while not deadline.expired() and (drawn := next(places, None)) is not None:
-        draw = [drawn[i] for i in np.argsort(order).tolist()]
-        there = [each for each in draw if isinstance(each, SettledHand)]
-        pairs = zip(answer.limbs, draw, strict=True)
-        refused.update(limb for limb, each in pairs if not isinstance(each, SettledHand))
-        factor = _most_elsewhere(answer, there) if len(there) == len(draw) else None
-        factors += [] if factor is None else [factor]
-    if deadline.expired():
+    try:
+        for drawn in places:
+            deadline.check("all draws were planned")
+            draw = [drawn[i] for i in np.argsort(order).tolist()]
+            there = [each for each in draw if isinstance(each, SettledHand)]
+            pairs = zip(answer.limbs, draw, strict=True)
+            refused.update(limb for limb, each in pairs if not isinstance(each, SettledHand))
+            factor = _most_elsewhere(answer, there) if len(there) == len(draw) else None
+            factors += [] if factor is None else [factor]
+        deadline.check("all draws were planned")
+    except DeadlineError:
         answer.mind_time("robust")
         return
     without = DRAWS - len(factors)

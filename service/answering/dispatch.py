@@ -145,7 +145,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
-        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS, between=_mind_time)
+        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     reply = wrench_space_reply(
         asked.robot.name,

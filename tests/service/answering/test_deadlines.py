@@ -87,7 +87,7 @@ def test_a_deadline_ends_an_answer_soon_wherever_it_comes(
 
     reply, whole = late(10**9)
     assert not refused(reply)
-    assert whole > 100
+    assert whole > 40
     for part in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
         looks = 2 + int(part * (whole - 3))
         reply, needed = late(looks)
@@ -127,14 +127,13 @@ def test_best_seats_are_looked_for_until_the_deadline(monkeypatch: pytest.Monkey
     ]
     with monkeypatch.context() as patched:
         patched.setattr("planner.deadline.clock.time", Clock(2))
-        said = "before the best seats of all hands were found"
+        said = "before the hands were closed on their holds"
         with deadline.within(LONG), pytest.raises(DeadlineError, match=said):
             settle_each(kind, hands)
     with deadline.within(LONG):
-        one_by_one = settle_each(kind, hands)
+        in_time = settle_each(kind, hands)
     kind.seated_best.clear()
-    together = settle_each(kind, hands)
-    for one, other in zip(one_by_one, together, strict=True):
+    for one, other in zip(in_time, settle_each(kind, hands), strict=True):
         ours, theirs = one.seating.pose, other.seating.pose
         np.testing.assert_allclose(ours.position, theirs.position, atol=1e-12)
         np.testing.assert_allclose(ours.rotation, theirs.rotation, atol=1e-12)
