@@ -161,9 +161,12 @@ class _StopSignal:
 
 
 def _leave(*_: object) -> None:
-    for process in multiprocessing.active_children():
-        process.kill()
-    os._exit(0)
+    try:
+        # one may be in the middle of being started
+        for process in multiprocessing.active_children():
+            process.kill()
+    finally:
+        os._exit(0)
 
 
 @click.command()
