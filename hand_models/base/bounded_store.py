@@ -106,6 +106,14 @@ class BoundedStore(Generic[K, V]):
                 found.append(answer)
             return found
 
+    def get(self, question: K, make: Callable[[], V]) -> V:
+        """Return the answer to a question, made and kept where it is not known."""
+        (answer,) = self.find([question])
+        if answer is None:
+            answer = make()
+            self.keep([(question, answer)])
+        return answer
+
     def keep(self, answers: Iterable[tuple[K, V]]) -> None:
         """Add answers, and let those go that were not asked for longest."""
         with self._lock:

@@ -26,7 +26,6 @@ from hand_models.compliance.grasp import Evaluation, Verdict, range_rows
 from hand_models.compliance.rolling import Numbers
 from hand_models.fixed_wrist import KEPT, RowLayout, layout_of
 from hand_models.hand import FINGERS, HELD
-from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = ["PALM_MODES", "WRIST", "FloatingWrist", "PalmMode"]
@@ -78,7 +77,7 @@ class FloatingWrist:
     def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
         """Of `RowLayout.planes`, capacities of each tile's spines on the rock."""
         settled = self.hand.settled
-        tile, *slopes, capacity = self.layout.planes(inner_half_planes(settled.surface))
+        tile, *slopes, capacity = self.layout.planes(settled.surface)
         a_shear, a_normal, a_lateral = slopes
         return tile, a_shear, a_normal, a_lateral, capacity * settled.engagement[tile]
 

@@ -24,6 +24,7 @@ the other without a jump.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -245,12 +246,16 @@ class PhalanxShape(NamedTuple):
 
     def _alone(self, lengths: Array) -> Array:
         """Return how far beds sink that are nothing but one point each [m]."""
-        root = self.fine * np.sqrt(self.far - self.near)
-        return np.asarray(np.minimum(root / np.sqrt(lengths), self.far))
+        return np.asarray(np.minimum(self._root / np.sqrt(lengths), self.far))
+
+    @property
+    def _root(self) -> float:
+        """Of the energy that sinks a bed to its level."""
+        return self.fine * math.sqrt(self.far - self.near)
 
     def _level(self, depths: Array, near: NearPoints) -> Array:
         """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
-        root = self.fine * np.sqrt(self.far - self.near)
+        root = self._root
         first = stretch_minima(depths, near.first)
         level = depths[first] + self._alone(near.lengths[first])
         for _ in range(MOST_STEPS):

@@ -23,7 +23,6 @@ from .row_layout import (
     named_row as named_row,
 )
 from .seat_scatter import (
-    AT_ONCE as AT_ONCE,
     DRAWS as DRAWS,
     TENTH as TENTH,
     Robustness as Robustness,

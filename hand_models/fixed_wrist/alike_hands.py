@@ -10,15 +10,13 @@ hold the wrenches of all columns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, skew
-from hand_models.fixed_wrist.row_layout import RowLayout
+from hand_models.fixed_wrist.row_layout import RowLayout, surface_planes
 from hand_models.hand import FINGERS, HELD, HandModel, SettledHand
-from hand_models.tile import Surface, inner_half_planes
 
 __all__ = ["HELD_ROWS", "AlikeHands"]
 
@@ -52,17 +50,6 @@ def _moments() -> Array:
 
 MOMENTS: Final = _moments()
 """From (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
-
-
-@lru_cache(maxsize=256)
-def surface_planes(surface: Surface) -> Array:
-    """Return the half-planes of whole tiles on a surface, shape (p, 4).
-
-    Coefficients of shear, normal and lateral load, and capacity [N].
-    """
-    return np.array(
-        [(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in inner_half_planes(surface)]
-    )
 
 
 class AlikeHands(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FINGERTIP_FORCE, HELD, NAIL, NAIL_SHEAR, SettledHand, Tile
-from hand_models.tile import HalfPlane, Surface, inner_half_planes
+from hand_models.tile import Surface, inner_half_planes
 from hand_models.wrench_spaces import Row
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "layout_of",
     "named_row",
     "row_layout",
+    "surface_planes",
 ]
 
 PALM_SHEAR = "palm_shear"
@@ -40,6 +41,17 @@ TENDON_LIMITS = (TENDON_TENSION, "motor_torque", "motor_current")
 
 KEPT: Final = 512
 """Layouts that are kept, those used last; each takes some 30 kB."""
+
+
+@lru_cache(maxsize=256)
+def surface_planes(surface: Surface) -> Array:
+    """Return the half-planes of whole tiles on a surface, shape (p, 4).
+
+    Coefficients of shear, normal and lateral load, and capacity [N].
+    """
+    return np.array(
+        [(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in inner_half_planes(surface)]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +72,6 @@ class RowLayout:
     plane_tiles, plane_pieces, plane_signs : ndarray of int
         Tile, half-plane, and sign of the lateral load (0 where there is none), of each limit row of
         a tile.
-    pieces : int
-        How many half-planes limit each tile.
     engaged, reacting, drawing : tuple of int
         Fingers with a tile on rock; those of them that resist sideways; the engaged ones and those
         whose nail hooks.
@@ -87,7 +97,6 @@ class RowLayout:
     plane_tiles: Indices
     plane_pieces: Indices
     plane_signs: Indices
-    pieces: int
     engaged: tuple[int, ...]
     reacting: tuple[int, ...]
     drawing: tuple[int, ...]
@@ -97,7 +106,7 @@ class RowLayout:
     palm: bool
     sticking: bool
 
-    def planes(self, pieces: Sequence[HalfPlane]) -> tuple[Indices, Array, Array, Array, Array]:
+    def planes(self, surface: Surface) -> tuple[Indices, Array, Array, Array, Array]:
         """Return what each of the tiles' limit rows says.
 
         Returns
@@ -108,8 +117,7 @@ class RowLayout:
         capacity : ndarray
             Of a whole tile [N].
         """
-        table = np.array([(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in pieces])
-        shear, normal, lateral, capacity = table[self.plane_pieces].T
+        shear, normal, lateral, capacity = surface_planes(surface)[self.plane_pieces].T
         return self.plane_tiles, shear, normal, lateral * self.plane_signs, capacity
 
 
@@ -235,7 +243,6 @@ def row_layout(
         plane_tiles=_kept(plane_tiles),
         plane_pieces=_kept(plane_pieces),
         plane_signs=_kept(plane_signs),
-        pieces=len(pieces),
         engaged=tuple(engaged),
         reacting=tuple(reacting),
         drawing=tuple(drawing),

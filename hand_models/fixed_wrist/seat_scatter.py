@@ -13,7 +13,7 @@ from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_o
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
-__all__ = ["AT_ONCE", "DRAWS", "TENTH", "Robustness", "robustness", "scattered_hands"]
+__all__ = ["DRAWS", "TENTH", "Robustness", "robustness", "scattered_hands"]
 
 DRAWS: Final = 50
 """Places of a hand that are drawn, unless another number is asked for."""
@@ -22,7 +22,7 @@ TENTH: Final = 10.0
 """Percentile that is told beside the least."""
 
 AT_ONCE: Final = 64
-"""Hands that are closed together, by default: all the draws of one, unless more are asked for."""
+"""Hands that are closed together: all the draws of one, unless more are asked for."""
 
 
 class Robustness(NamedTuple):
@@ -109,7 +109,6 @@ def scattered_hands(
     draws: int,
     seed: int,
     scatter: tuple[float, float],
-    at_once: int = AT_ONCE,
 ) -> Iterator[list[SettledHand | InvalidInputError]]:
     """Close hands anew at random places about their own, each drawn apart from the others.
 
@@ -120,8 +119,6 @@ def scattered_hands(
     settled : sequence of SettledHand
     draws, seed, scatter
         As of `robustness`.
-    at_once : int, optional
-        How many are closed together, but all of a draw.
 
     Yields
     ------
@@ -130,7 +127,7 @@ def scattered_hands(
     """
     position, angle = scatter
     drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, len(settled), 6))
-    step = max(1, at_once // len(settled))
+    step = max(1, AT_ONCE // len(settled))
     for start in range(0, draws, step):
         placements = [
             Placement(

@@ -36,11 +36,6 @@ __all__ = ["BodyPrograms", "size_of"]
 MISSING: Final = "it was known what the stance can hold"
 """What a deadline may come before."""
 
-UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
-
-EMPTY: Final = ("infeasible", "infeasible_inaccurate")
-"""The solver's words for a set in which there is nothing."""
-
 
 class BodyPrograms:
     """What a question's stance can hold, direction by direction.
@@ -119,7 +114,7 @@ class BodyPrograms:
         """Return the utilisation to go up to, where a balance can be had within it."""
         outcome = programs.margin(data)
         if not outcome.solved:
-            if outcome.status not in EMPTY:
+            if outcome.status not in programs.PROVEN:
                 raise _unsolved(outcome)
             return None
         # where the least utilisation is the cap itself, rounding must not empty the set
@@ -202,7 +197,7 @@ def _solved(
     B = np.vstack([columns, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
     found = programs.reach(data, goal / size_of(goal), B, cap, K)
     if not found.outcome.solved:
-        if found.outcome.status not in EMPTY:
+        if found.outcome.status not in programs.PROVEN:
             raise _unsolved(found.outcome)
         return None
     if _error(data, found, B, cap, K) > SLACK * max(1.0, float(np.abs(found.t).max())):
@@ -288,7 +283,7 @@ def _error(
 
 def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING)
-    if outcome.status in UNBOUNDED:
+    if outcome.status in programs.UNBOUNDED:
         return UnsupportedError(
             "what the hands hold has no bound some way: sets of floating wrists, taken about this "
             "body wrench, do not hold them everywhere; ask about one that can nearly be held"

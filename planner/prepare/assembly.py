@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import Array, BoundedStore, wrench_transports
 from hand_models.fixed_wrist import wrench_spaces
 from planner.prepare.hand_batch import HandBatch
-from planner.prepare.hand_sets import HandSets
+from planner.prepare.hand_sets import HandSets, are_own
 from planner.prepare.joint_posture import Posture
 from planner.prepare.settled_stance import settle_stance, wrist_at
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
@@ -57,15 +57,12 @@ def assemble(
         for wrist, rows in zip(wrists, added, strict=True)
     ]
     held, aims = _held(question)
-    # what a stance adds to sets, and where wrists float, is known of no other
-    own = any(wrist is not None for wrist in wrists) or any(rows is not NOTHING for rows in added)
-    key = tuple(settled), cap
-    known = None if own else KNOWN.find([key])[0]
-    if known is None:
-        known = HandBatch.of(settled), tuple([scaled_rows(space) for space in spaces])
-        if not own:
-            KNOWN.keep([(key, known)])
-    batch, scaled = known
+
+    def made() -> tuple[HandBatch, tuple[ScaledRows, ...]]:
+        return HandBatch.of(settled), tuple([scaled_rows(space) for space in spaces])
+
+    own = are_own(wrists, added)
+    batch, scaled = made() if own else KNOWN.get((tuple(settled), cap), made)
     hands = HandSets(
         spaces=tuple(spaces),
         scaled=scaled,

@@ -32,7 +32,15 @@ from planner.programs import (
     with_held,
 )
 
-__all__ = ["ExactMeasure", "HandSets", "LinearisationPoint", "Sets", "slopes_of", "widest_at_rest"]
+__all__ = [
+    "ExactMeasure",
+    "HandSets",
+    "LinearisationPoint",
+    "Sets",
+    "are_own",
+    "slopes_of",
+    "widest_at_rest",
+]
 
 DIFFERENCE: Final = 1e-3
 """Step of the differences of slopes, in `TWIST_UNIT`."""
@@ -161,8 +169,8 @@ class HandSets:
 
     @property
     def own(self) -> bool:
-        """Whether sets are of this stance alone: a wrist floats, or the stance adds rows."""
-        return self.floating or any(rows is not NOTHING for rows in self.added)
+        """Whether sets are of this stance alone; see `are_own`."""
+        return are_own(self.wrists, self.added)
 
     @cached_property
     def _fixed(self) -> tuple[HandData, ...]:
@@ -275,6 +283,11 @@ class HandSets:
             if wrist is not None
         ]
         return max(moved, default=0.0)
+
+
+def are_own(wrists: Sequence[FloatingWrist | None], added: Sequence[StanceConstraints]) -> bool:
+    """Whether sets are of one stance alone: a wrist floats, or the stance adds rows."""
+    return any(wrist is not None for wrist in wrists) or any(rows is not NOTHING for rows in added)
 
 
 def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:

@@ -1,3 +1,4 @@
+from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED
 from .outcome import Outcome as Outcome, Reached as Reached
 from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
 from .row_scaling import (

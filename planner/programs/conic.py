@@ -30,6 +30,7 @@ __all__ = [
     "PRESENT",
     "PROVEN",
     "SOLVERS",
+    "UNBOUNDED",
     "ConicProgram",
     "Solution",
     "Solver",
@@ -62,6 +63,8 @@ PRESENT: Final = ("optimal", "optimal_inaccurate")
 
 PROVEN: Final = ("infeasible", "infeasible_inaccurate")
 """With multipliers that say why there is none."""
+
+UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
 
 ENDS: Final = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
 """After which nothing else is tried."""

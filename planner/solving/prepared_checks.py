@@ -62,11 +62,7 @@ def prepare_checks(
 
 
 def _reader(batch: HandBatch, hands: HandSets, cap: float | None) -> LoadRecovery:
-    if hands.own:
+    def made() -> LoadRecovery:
         return LoadRecovery(batch, hands.spaces, hands.scaled)
-    key = batch.hands, cap
-    found = RECOVERIES.find([key])[0]
-    if found is None:
-        found = LoadRecovery(batch, hands.spaces, hands.scaled)
-        RECOVERIES.keep([(key, found)])
-    return found
+
+    return made() if hands.own else RECOVERIES.get((batch.hands, cap), made)

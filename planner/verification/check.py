@@ -237,8 +237,4 @@ def _recomputing(
     preloads = [place.tendon_preload for place in places]
     told = tuple([None if tensions is None else tuple(tensions) for tensions in preloads])
     key = known.hands, limbs, strength, told
-    found = KNOWN.find([key])[0]
-    if found is None:
-        found = Recomputing(known, limbs, strength, preloads)
-        KNOWN.keep([(key, found)])
-    return found
+    return KNOWN.get(key, lambda: Recomputing(known, limbs, strength, preloads))

@@ -20,7 +20,7 @@ from hand_models.tile import inner_half_planes
 from planner.prepare import BALL, HandBatch
 from planner.question import HandOnHold, Question
 from planner.verification.arrays import LOAD
-from planner.verification.equilibrium import equilibrium
+from planner.verification.equilibrium import Equilibrium, equilibrium
 from planner.verification.recomputation import STOP
 
 __all__ = ["HandCheck", "JointUse", "hand_check"]
@@ -97,9 +97,9 @@ def hand_check(
     joints : JointUse or None
         Of its limb; None if nothing is said of joints.
     """
-    rows = _Rows(columns)
+    rows, solved = _Rows(columns), equilibrium(HandBatch.of((hand,)))
     for i in range(len(FINGERS)):
-        _finger(rows, question, hand, i)
+        _finger(rows, question, hand, i, solved)
     _palm(rows, hand)
     held = HELD @ rows.wrench[:3]
     rows.limit(held / hand.hand.structure.hand_load)
@@ -168,9 +168,11 @@ class _Rows:
         self.slack.append(np.tile([constant, growing], (len(rows), 1)))
 
 
-def _finger(rows: _Rows, question: Question, hand: SettledHand, index: int) -> None:
+def _finger(
+    rows: _Rows, question: Question, hand: SettledHand, index: int, solved: Equilibrium
+) -> None:
     name, model = FINGERS[index], hand.hand.finger
-    structure, solved = hand.hand.structure, equilibrium(HandBatch.of((hand,)))
+    structure = hand.hand.structure
     tension = rows.load(f"{name}/tension")
 
     def affine(rest: Array, slope: Array) -> Array:

@@ -150,10 +150,6 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
     if message.vertices is None or message.faces is None:
         missing = "vertices" if message.vertices is None else "faces"
         raise InvalidInputError("missing", field=missing)
-    given = msgspec.msgpack.encode((message.vertices, message.faces))
-    key = blake2b(given).digest(), numbers, anywhere
-    (mesh,) = MESHES.find([key])
-    if mesh is None:
-        mesh = Mesh(message.vertices, message.faces, numbers, anywhere=anywhere)
-        MESHES.keep([(key, mesh)])
-    return mesh
+    vertices, faces = message.vertices, message.faces
+    key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
+    return MESHES.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))

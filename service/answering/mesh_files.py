@@ -80,9 +80,9 @@ class MeshFiles:
         changed = None
         with suppress(OSError):  # of what is no file, reading tells
             changed = path.stat().st_mtime_ns
-        (known,) = self._read.find([(path, changed)])
-        if known is None:
+
+        def read() -> Mesh:
             vertices, faces = read_mesh(path)
-            known = Mesh(vertices=vertices.tolist(), faces=faces.tolist())
-            self._read.keep([((path, changed), known)])
-        return known
+            return Mesh(vertices=vertices.tolist(), faces=faces.tolist())
+
+        return self._read.get((path, changed), read)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-__all__ = ["Interrupted", "interruptible"]
+__all__ = ["Interrupted", "interruptible", "kill_children"]
 
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
@@ -74,15 +74,20 @@ def _importing(frame: FrameType | None) -> bool:
 def _end(number: int = 0, frame: FrameType | None = None) -> None:
     """End here and now, and all processes that were started."""
     try:
-        # it may be half imported, and then there are none
-        children = getattr(sys.modules.get("multiprocessing"), "active_children", None)
-        for process in children() if children is not None else ():
-            process.kill()
+        kill_children()
         if os.isatty(2):
             os.write(2, SHOW_CURSOR.encode())
         _tell("")
     finally:
         os._exit(STATUS)
+
+
+def kill_children() -> None:
+    """Kill all processes that were started."""
+    # it may be half imported, and then there are none
+    children = getattr(sys.modules.get("multiprocessing"), "active_children", None)
+    for process in children() if children is not None else ():
+        process.kill()
 
 
 _told: list[str] = []

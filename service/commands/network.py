@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import os
 import signal
 from pathlib import Path
@@ -14,6 +13,7 @@ import msgspec
 import zenoh
 
 from hand_models.parameters import ParameterTable
+from service.commands.interruption import kill_children
 from service.commands.options import (
     asked,
     check_picture,
@@ -163,8 +163,7 @@ class _StopSignal:
 def _leave(*_: object) -> None:
     try:
         # one may be in the middle of being started
-        for process in multiprocessing.active_children():
-            process.kill()
+        kill_children()
     finally:
         os._exit(0)
 

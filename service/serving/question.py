@@ -14,13 +14,13 @@ from service.processes import Job
 from service.requests import LONGEST_DEADLINE
 from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError, check_size
 
-__all__ = ["Question", "client_of", "take"]
+__all__ = ["LARGE", "Question", "client_of", "take"]
 
 READ: Final = 2**20
 """Bytes of a payload that is looked into before its turn; what is larger is a process's to read."""
 
 LARGE: Final = 2**18
-"""Bytes of one that may take long."""
+"""Bytes beyond which one is large: it may take long, and its bytes count while it waits."""
 
 SMALL: Final = 2**12
 """Bytes of a field that is read of it; what is longer is left to a process, too."""

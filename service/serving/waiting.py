@@ -10,7 +10,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
-from service.serving.question import Question
+from service.serving.question import LARGE, Question
 
 __all__ = ["FairQueue", "Kind", "Waiting"]
 
@@ -25,9 +25,6 @@ HELD: Final = 2**28
 
 SHARE: Final = 2**26
 """Bytes of those of one client, unless it is one question."""
-
-LARGE: Final = 2**18
-"""Bytes from which on a question is a large one."""
 
 STALE: Final = 16
 """Deadlines that are kept for each question that waits, of those that waited before."""

@@ -507,3 +507,16 @@ def test_one_function_tells_of_all_stores():
     assert after.misses - before.misses == 2
     assert after.most - before.most == hand.settled.most
     assert {"settled hands on scans", "best seats"} < set(stores())
+
+
+def test_what_a_store_does_not_know_is_made_once():
+    made: list[int] = []
+    store: BoundedStore[int, int] = BoundedStore("squares", 2)
+
+    def square(x: int) -> int:
+        made.append(x)
+        return x * x
+
+    asked = (3, 3, 4, 3, 5, 3, 4)
+    assert [store.get(x, lambda x=x: square(x)) for x in asked] == [x * x for x in asked]
+    assert made == [3, 4, 5, 4]

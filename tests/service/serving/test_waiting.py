@@ -15,8 +15,8 @@ from service.processes import Lane, Station
 from service.processes.stations import PART, _send_parts
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.question import Question, take
-from service.serving.waiting import HELD, LARGE, SHARE, Kind, Waiting
+from service.serving.question import LARGE, Question, take
+from service.serving.waiting import HELD, SHARE, Kind, Waiting
 from tests.suite.helpers.checkout import ROOT
 
 
