@@ -9,4 +9,8 @@ from .clock import (
     within as within,
 )
 from .overlap import Overlap as Overlap, begin_overlap as begin_overlap
-from .unfinished import Unfinished as Unfinished, late_sentence as late_sentence
+from .unfinished import (
+    Unfinished as Unfinished,
+    late as late,
+    late_sentence as late_sentence,
+)

@@ -24,6 +24,8 @@ class Overlap(Generic[T]):
     ----------
     work : callable
         Safe to call from another thread.
+    known : optional
+        What comes of it, where it is done already.
 
     Attributes
     ----------
@@ -31,12 +33,13 @@ class Overlap(Generic[T]):
         The work, once a solver has begun it.
     """
 
-    def __init__(self, work: Callable[[], T]) -> None:
-        self._work = work
+    def __init__(self, work: Callable[[], T], known: T | None = None) -> None:
+        self._work, self._known = work, known
         self.begun: Future[T] | None = None
 
     def __enter__(self) -> Self:
-        waiting.set(self)
+        if self._known is None:
+            waiting.set(self)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -44,9 +47,12 @@ class Overlap(Generic[T]):
 
     def result(self) -> T:
         """Return what comes of it; raises what it raises."""
-        begun = self.begun
-        # what still waits for the other thread is sooner done here
-        return self._work() if begun is None or begun.cancel() else begun.result()
+        if self._known is None:
+            begun = self.begun
+            # what still waits for the other thread is sooner done here
+            waits = begun is None or begun.cancel()
+            self._known = self._work() if begun is None or waits else begun.result()
+        return self._known
 
 
 def begin_overlap() -> None:

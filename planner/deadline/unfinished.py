@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, Literal
 
-__all__ = ["Unfinished", "late_sentence"]
+from planner.deadline.clock import expired
+
+__all__ = ["Unfinished", "late", "late_sentence"]
 
 Unfinished = Literal[
     "least_utilisation",
@@ -31,6 +33,11 @@ UNFINISHED: Final[dict[Unfinished, str]] = {
     "robust": "the load factor was found at all places of the hands",
 }
 """What was not there yet."""
+
+
+def late(name: Unfinished) -> tuple[Unfinished, ...]:
+    """Return the name of what is not finished, if that is for the time."""
+    return (name,) if expired() else ()
 
 
 def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:

@@ -25,6 +25,11 @@ from .joint_posture import (
     posture_at as posture_at,
     torque_limits as torque_limits,
 )
+from .prepared_stance import (
+    PreparedStance as PreparedStance,
+    checked_question as checked_question,
+    prepare_stance as prepare_stance,
+)
 from .settled_stance import (
     floating_wrist as floating_wrist,
     hand_space as hand_space,

@@ -3,59 +3,56 @@
 from __future__ import annotations
 
 from planner import deadline, programs
-from planner.deadline import Overlap
-from planner.solving.answer import Answer
-from planner.solving.unique_plan import LeastUtilisation, least_utilisation
+from planner.deadline import Overlap, late
+from planner.prepare import PreparedStance, Sets
+from planner.solving.prepared_checks import PreparedChecks, read_loads
+from planner.solving.solution import Solution
+from planner.solving.unique_plan import least_utilisation
 
-__all__ = ["settle_fixed", "settle_in_two"]
+__all__ = ["solve_fixed", "solve_in_two"]
 
 
-def settle_fixed(answer: Answer) -> None:
-    """Take the plan of least utilisation, of these that of least tensions.
+def solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> Solution:
+    """Return the plan of least utilisation, of these that of least tensions.
 
     One solve has its utilisation, and mostly its active rows, which give its last digits; else
-    a second solve has these.
+    a second solve has these. What reads and checks the loads is prepared meanwhile.
     """
-    found = _least(answer)
-    answer.outcome = found.outcome
+    sets, cap = prepared.at_rest, prepared.question.limits.utilisation
+    with checks:
+        found = least_utilisation(sets.data)
+    first = Solution(sets, found.outcome, cap, bound=found.bound if found.proven else None)
     if found.proven:
-        answer.bound = found.bound
         if found.loads is None:
-            _settle_tie(answer)
+            first = _tie_broken(prepared, checks.result(), first)
         else:
-            answer.take(found.loads)
-        if not answer.wrong:
-            return
-    one, bound = answer.outcome, answer.bound
-    settle_in_two(answer)
-    if one.solved and not answer.outcome.solved and deadline.expired():
-        answer.outcome, answer.bound = one, bound
-        answer.take(one.loads)
-        answer.mind_time("least_utilisation")
+            reading = read_loads(prepared, checks.result(), sets, found.loads)
+            first = first._replace(reading=reading)
+        if not first.wrong:
+            return first
+    second = solve_in_two(prepared, checks, sets)
+    second = second._replace(unfinished=first.unfinished + second.unfinished)
+    if found.outcome.solved and not second.outcome.solved and deadline.expired():
+        reading = read_loads(prepared, checks.result(), sets, found.outcome.loads)
+        return first._replace(reading=reading).late("least_utilisation")
+    return second
 
 
-def _least(answer: Answer) -> LeastUtilisation:
-    """Solve, and prepare meanwhile what reads and checks the loads."""
-    if answer.ready is not None:
-        return least_utilisation(answer.data)
-    with Overlap(answer.prepare) as answer.preparing:
-        return least_utilisation(answer.data)
+def solve_in_two(prepared: PreparedStance, checks: Overlap[PreparedChecks], sets: Sets) -> Solution:
+    """Return the plan of least effort among those of the very least utilisation."""
+    cap, outcome = prepared.question.limits.utilisation, programs.margin(sets.data)
+    found = Solution(sets, outcome, cap)
+    return _tie_broken(prepared, checks.result(), found) if outcome.solved else found
 
 
-def settle_in_two(answer: Answer) -> None:
-    """Take the plan of least effort among those of the very least utilisation."""
-    answer.outcome, answer.bound = programs.margin(answer.data), None
-    _settle_tie(answer)
-
-
-def _settle_tie(answer: Answer) -> None:
-    """Take the plan of least tensions among those of least utilisation."""
-    if not answer.outcome.solved:
-        return
-    tidy = programs.least_tensions(answer.data, answer.outcome.value)
+def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:
+    """Return the plan of least tensions among those of least utilisation."""
+    sets = found.sets
+    tidy = programs.least_tensions(sets.data, found.outcome.value)
     if tidy.solved:
-        answer.take(tidy.loads)
+        found = found._replace(reading=read_loads(prepared, checks, sets, tidy.loads))
     else:
-        answer.mind_time("tie_break")
-    if not tidy.solved or answer.wrong:
-        answer.take(answer.outcome.loads)
+        found = found.late(*late("tie_break"))
+    if not tidy.solved or found.wrong:
+        found = found._replace(reading=read_loads(prepared, checks, sets, found.outcome.loads))
+    return found

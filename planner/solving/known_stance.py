@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 
 from hand_models.base import Array, finite_vector
+from planner.prepare import prepare_stance
 from planner.question import Question, checked_body_wrench
 from planner.result import Plan
-from planner.solving.prepared_checks import prepare_checks
-from planner.solving.prepared_stance import checked_question, prepare_stance
+from planner.solving.prepared_checks import PreparedChecks, prepare_checks
 from planner.solving.solve import plan_on
 
 __all__ = ["KnownStance"]
@@ -34,13 +33,11 @@ class KnownStance:
     """
 
     def __init__(self, question: Question) -> None:
-        prepared = prepare_stance(checked_question(question))
-        hands = prepared.hands
+        self.prepared = prepared = prepare_stance(question)
+        self._checks: PreparedChecks | None = None
         # what joints bear changes with the wrench
-        if prepared.where is None and question.stance.joints is None and not hands.floating:
-            checks = prepare_checks(question, None, prepared.batch, hands)
-            prepared = prepared._replace(checks=checks)
-        self.prepared = prepared
+        if prepared.where is None and question.stance.joints is None and not prepared.floating:
+            self._checks = prepare_checks(prepared)
 
     def plan(self, body_wrench: Array) -> Plan:
         """Answer for another body wrench, as `planner.solving.plan` would.
@@ -57,7 +54,4 @@ class KnownStance:
         """
         start = time.perf_counter()
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
-        prepared = self.prepared
-        question = replace(prepared.question, body_wrench=wrench)
-        hands = prepared.hands.turned(wrench)
-        return plan_on(prepared._replace(question=question, hands=hands, wrench=wrench), start)
+        return plan_on(self.prepared.turned(wrench), start, self._checks)

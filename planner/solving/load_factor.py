@@ -4,57 +4,78 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.fixed_wrist import DRAWS, TENTH, scattered_hands, wrench_spaces
 from hand_models.hand import SettledHand
 from planner import deadline, programs
-from planner.deadline import DeadlineError
+from planner.deadline import Budget, DeadlineError, Unfinished, late
+from planner.explanation import LimitUse
 from planner.floating import NO_WRENCH, most_load
-from planner.prepare import HandSets
+from planner.prepare import HandSets, PreparedStance
 from planner.programs import SLACK, StanceData
 from planner.result import RobustLoadFactor
-from planner.solving.answer import Answer
+from planner.solving.solution import Solution
 
-__all__ = ["find_load_factor", "find_robust_load_factor"]
+__all__ = ["FoundFactor", "find_load_factor", "find_robust_load_factor", "needs_hands"]
 
 SEED: Final = 0
 """Of the places of hands that are drawn."""
 
 
-def find_load_factor(answer: Answer) -> None:
-    """Find how many times the body wrench could be held, if it can be known."""
-    if _overloaded_by_itself(answer):
-        return
-    if not _needs_hands(answer):
+class FoundFactor(NamedTuple):
+    """What was found of a load factor.
+
+    Attributes
+    ----------
+    factor : float or None
+    least : bool
+        Whether it is only known to be no less.
+    unbounded : bool
+        Whether any multiple of the body wrench can be held.
+    unfinished : tuple of str
+        What the deadline came before.
+    """
+
+    factor: float | None = None
+    least: bool = False
+    unbounded: bool = False
+    unfinished: tuple[Unfinished, ...] = ()
+
+
+def find_load_factor(
+    prepared: PreparedStance, found: Solution, idle: Sequence[LimitUse], budget: Budget
+) -> FoundFactor:
+    """Return how many times the body wrench could be held, if it can be known."""
+    if _overloaded_by_itself(idle):
+        return FoundFactor()
+    if not needs_hands(prepared):
         # any multiple of it can be held, or none
-        answer.unbounded = answer.outcome.solved and answer.outcome.value <= 1.0 + SLACK
-        return
+        held = found.outcome.solved and found.outcome.value <= 1.0 + SLACK
+        return FoundFactor(unbounded=held)
     if deadline.expired():
-        answer.mind_time("load_factor")
-        return
-    if answer.least_used is not None:
-        most = most_load(answer.parts, answer.least_used, answer.known_factor, answer.budget)
+        return FoundFactor(unfinished=("load_factor",))
+    if found.least_use is not None:
+        most = most_load(prepared.hands, found.least_use, found.factor, budget)
         if most is not None:
-            answer.load_factor, answer.least_factor = most.factor, not most.sure
-        else:
-            answer.mind_time("load_factor")
-        return
-    answer.load_factor = _most(answer.parts, answer.data)
-    if answer.load_factor is None:
-        answer.mind_time("load_factor")
+            return FoundFactor(most.factor, least=not most.sure)
+    else:
+        factor = _most(prepared.hands, found.sets.data)
+        if factor is not None:
+            return FoundFactor(factor)
+    return FoundFactor(unfinished=late("load_factor"))
 
 
-def find_robust_load_factor(answer: Answer) -> None:
-    """Find it where the hands are not quite where they were put, if that is asked for."""
-    if "robust" not in answer.question.want or not _needs_hands(answer):
-        return
-    hand = answer.question.stance.robot.hand
+def find_robust_load_factor(
+    prepared: PreparedStance, idle: Sequence[LimitUse]
+) -> RobustLoadFactor | None:
+    """Return it where the hands are not quite where they were put; None if time does not allow."""
+    hand, limbs = prepared.question.stance.robot.hand, prepared.limbs
     # drawn in the order of their names, whatever the order of the question
-    order = np.argsort(answer.limbs)
-    settled = [answer.batch.hands[i] for i in order.tolist()]
+    order = np.argsort(limbs)
+    settled = [prepared.batch.hands[i] for i in order.tolist()]
     places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter)
     factors: list[float] = []
     refused: Counter[str] = Counter()
@@ -63,39 +84,35 @@ def find_robust_load_factor(answer: Answer) -> None:
             deadline.check("all draws were planned")
             draw = [drawn[i] for i in np.argsort(order).tolist()]
             there = [each for each in draw if isinstance(each, SettledHand)]
-            pairs = zip(answer.limbs, draw, strict=True)
+            pairs = zip(limbs, draw, strict=True)
             refused.update(limb for limb, each in pairs if not isinstance(each, SettledHand))
-            factor = _most_elsewhere(answer, there) if len(there) == len(draw) else None
-            factors += [] if factor is None else [factor]
+            if len(there) == len(draw) and not _overloaded_by_itself(idle):
+                factor = _most_elsewhere(prepared, there)
+                factors += [] if factor is None else [factor]
         deadline.check("all draws were planned")
     except DeadlineError:
-        answer.mind_time("robust")
-        return
+        return None
     without = DRAWS - len(factors)
     worst, tenth = np.percentile(factors, [0.0, TENTH]).tolist() if factors else (None, None)
-    answer.robust = RobustLoadFactor(
-        DRAWS, without, dict(refused), *hand.seat_scatter, SEED, worst, tenth
-    )
+    return RobustLoadFactor(DRAWS, without, dict(refused), *hand.seat_scatter, SEED, worst, tenth)
 
 
-def _most_elsewhere(answer: Answer, settled: Sequence[SettledHand]) -> float | None:
+def _most_elsewhere(prepared: PreparedStance, settled: Sequence[SettledHand]) -> float | None:
     """Return the load factor of the same hands closed elsewhere; None if there is none."""
-    if _overloaded_by_itself(answer):
-        return None
-    spaces = wrench_spaces(settled, answer.question.limits.tendon_tension)
-    pairs = zip(answer.parts.added, spaces, strict=True)
-    moved = answer.parts.with_sets([rows.on(space) for rows, space in pairs])
+    spaces = wrench_spaces(settled, prepared.question.limits.tendon_tension)
+    pairs = zip(prepared.hands.added, spaces, strict=True)
+    moved = prepared.hands.with_sets([rows.on(space) for rows, space in pairs])
     return _most(moved, moved.sets(moved.at_rest(moved.idle)).data)
 
 
-def _overloaded_by_itself(answer: Answer) -> bool:
+def _overloaded_by_itself(idle: Sequence[LimitUse]) -> bool:
     """Whether a limb without a hand cannot bear itself, whatever the body needs."""
-    return any(used.utilisation > 1.0 + SLACK for used in answer.idle)
+    return any(used.utilisation > 1.0 + SLACK for used in idle)
 
 
-def _needs_hands(answer: Answer) -> bool:
+def needs_hands(prepared: PreparedStance) -> bool:
     """Whether anything is asked of the hands."""
-    return bool(np.abs(answer.data.wrench[:6]).max() > NO_WRENCH)
+    return bool(np.abs(prepared.hands.wrench[:6]).max() > NO_WRENCH)
 
 
 def _most(hands: HandSets, data: StanceData) -> float | None:

@@ -1,18 +1,28 @@
-"""What reading and checking plans needs of the hands alone, made before there are loads."""
+"""Loads recovered and checked, by what is made for that before there are loads."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from typing import Final, NamedTuple
 
-from hand_models.base import BoundedStore
-from planner.explanation import warnings
-from planner.prepare import HandBatch, HandSets, Posture
-from planner.question import Question
-from planner.result import LoadRecovery
+import numpy as np
+
+from hand_models.base import Array, BoundedStore
+from planner import programs
+from planner.explanation import LimitUse, joint_name, warnings
+from planner.floating import WristSolution
+from planner.prepare import HandBatch, PreparedStance, Sets
+from planner.result import (
+    HandPlan,
+    LoadRecovery,
+    PlanArrays,
+    WristPlan,
+    recover_floating_hand,
+)
+from planner.solving.solution import Reading
 from planner.verification import Check
 
-__all__ = ["PreparedChecks", "prepare_checks"]
+__all__ = ["PreparedChecks", "prepare_checks", "read_loads"]
 
 
 class PreparedChecks(NamedTuple):
@@ -20,16 +30,19 @@ class PreparedChecks(NamedTuple):
 
     Attributes
     ----------
-    reader : LoadRecovery or None
+    recovery : LoadRecovery or None
         Reads loads; None where a wrist floats.
     check : Check
         What every plan must pass.
+    idle : tuple of LimitUse
+        How much of their joints' torque limbs without a hand use.
     oddities : tuple of str
         What is odd about the stance.
     """
 
-    reader: LoadRecovery | None
+    recovery: LoadRecovery | None
     check: Check
+    idle: tuple[LimitUse, ...]
     oddities: tuple[str, ...]
 
 
@@ -37,32 +50,81 @@ RECOVERIES: Final[BoundedStore[Hashable, LoadRecovery]] = BoundedStore("load rec
 """What reads loads, by the hands and the cap on tensions: those asked for last."""
 
 
-def prepare_checks(
-    question: Question, where: Posture | None, batch: HandBatch, hands: HandSets
-) -> PreparedChecks:
-    """Return what reading and checking plans needs of the hands alone.
+def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
+    """Return what reading and checking plans of a stance needs.
 
     It changes nothing but a store that threads may share, so it may run beside a solver.
-
-    Parameters
-    ----------
-    question : Question
-    where : Posture or None
-        The joints; None if the question says nothing of them.
-    batch : HandBatch
-        The hands on their holds.
-    hands : HandSets
-        Their sets.
     """
+    hands = prepared.hands
     return PreparedChecks(
-        reader=None if hands.floating else _reader(batch, hands, question.limits.tendon_tension),
-        check=Check(question, batch, where),
-        oddities=warnings(question.stance, batch),
+        recovery=None if hands.floating else _recovery(prepared),
+        check=Check(prepared.question, prepared.batch, prepared.where),
+        idle=_idle_joints(prepared),
+        oddities=warnings(prepared.question.stance, prepared.batch),
     )
 
 
-def _reader(batch: HandBatch, hands: HandSets, cap: float | None) -> LoadRecovery:
+def _recovery(prepared: PreparedStance) -> LoadRecovery:
+    batch, hands = prepared.batch, prepared.hands
+
     def made() -> LoadRecovery:
         return LoadRecovery(batch, hands.spaces, hands.scaled)
 
+    cap = prepared.question.limits.tendon_tension
     return made() if hands.own else RECOVERIES.get((batch.hands, cap), made)
+
+
+def _idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
+    where = prepared.where
+    return tuple(
+        LimitUse(joint_name(limb, name), abs(float(torque)), float(most))
+        for limb, joints in ({} if where is None else where.joints).items()
+        if limb not in prepared.limbs
+        for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)
+    )
+
+
+def read_loads(
+    prepared: PreparedStance,
+    checks: PreparedChecks,
+    sets: Sets,
+    loads: tuple[Array, ...],
+    search: WristSolution | None = None,
+) -> Reading:
+    """Return what loads do, recovered and checked.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : PreparedChecks
+    sets : Sets
+        That the loads are of.
+    loads : tuple of ndarray
+        y of each hand.
+    search : WristSolution, optional
+        Where floating wrists are.
+    """
+    hands: tuple[HandPlan, ...] = ()
+    if checks.recovery is None:
+        hands = tuple(_read_hand(prepared, sets, i, y, search) for i, y in enumerate(loads))
+        arrays, used = PlanArrays.of(hands), programs.used(sets.data, loads)
+        effort = programs.used_effort(sets.data, loads)
+    else:
+        arrays, used, effort = checks.recovery.read(loads)
+    utilisation = float(np.maximum.reduce(arrays.utilisations))
+    whole = max([utilisation, *(each.utilisation for each in checks.idle)])
+    wrong = checks.check.problems(arrays, whole, prepared.wrench, effort)
+    return Reading(loads, arrays, hands, used, effort, utilisation, whole, tuple(wrong))
+
+
+def _read_hand(
+    prepared: PreparedStance, sets: Sets, index: int, y: Array, search: WristSolution | None
+) -> HandPlan:
+    """Read one hand of a stance of which some float."""
+    limb, settled = prepared.limbs[index], prepared.batch.hands[index]
+    space, wrist = sets.spaces[index], prepared.hands.wrists[index]
+    if wrist is None or search is None:
+        recovery = LoadRecovery(HandBatch.of((settled,)), (space,))
+        return recovery.hands((limb,), recovery.read((y,)).arrays)[0]
+    pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
+    return recover_floating_hand(limb, settled, wrist.hand, space, pose)

@@ -1,19 +1,23 @@
-"""From a question to a verified plan: settle the hands, solve, read, check, explain."""
+"""From a question to a verified plan: prepare, solve, recover the loads, verify, explain."""
 
 from __future__ import annotations
 
 import time
+from functools import partial
 
 from planner import deadline
+from planner.deadline import Budget, Overlap
+from planner.floating import PROGRAMS
+from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.question import Question
 from planner.result import Plan, Times
-from planner.solving.answer import Answer
-from planner.solving.effort import settle_effort
-from planner.solving.fixed import settle_fixed
-from planner.solving.floating import settle_floating
-from planner.solving.load_factor import find_load_factor
-from planner.solving.prepared_stance import PreparedStance, checked_question, prepare_stance
-from planner.solving.reading import read_plan
+from planner.solving.effort import solve_effort
+from planner.solving.explained import explained_plan
+from planner.solving.fixed import solve_fixed
+from planner.solving.floating import solve_floating
+from planner.solving.load_factor import FoundFactor, find_load_factor
+from planner.solving.prepared_checks import PreparedChecks, prepare_checks
+from planner.solving.solution import Solution
 from planner.solving.why_not import look_again
 
 __all__ = ["plan", "plan_on"]
@@ -42,7 +46,7 @@ def plan(question: Question) -> Plan:
         return plan_on(prepare_stance(question), start)
 
 
-def plan_on(prepared: PreparedStance, start: float) -> Plan:
+def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None = None) -> Plan:
     """Answer a question of a prepared stance.
 
     Parameters
@@ -50,33 +54,40 @@ def plan_on(prepared: PreparedStance, start: float) -> Plan:
     prepared : PreparedStance
     start : float
         When it began, on the clock of `time.perf_counter`.
+    known : PreparedChecks, optional
+        What reads and checks its plans; by default it is made beside the solver.
 
     Raises
     ------
     DeadlineError
         If the deadline comes before anything is found that passes the checks.
     """
-    with deadline.within(prepared.question.deadline, started=start):
+    question = prepared.question
+    with deadline.within(question.deadline, started=start):
         modelled = time.perf_counter()
         deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
-        answer = Answer(*prepared)
-        _solve(answer)
+        checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
+        found, proof = _solve(prepared, checks, budget), None
+        if not found.passes:
+            if found.outcome.balance_dual is None:
+                deadline.check("a plan was found")
+            found, proof = look_again(prepared, checks, found, budget)
+            if proof is None and not found.passes:
+                deadline.check("a plan was found, or proven away")
+        ready, factor = checks.result(), FoundFactor()
+        if "load_factor" in question.want:
+            factor = find_load_factor(prepared, found, ready.idle, budget)
         solved = time.perf_counter()
-        return read_plan(answer, Times(modelled - start, solved - modelled, 0.0), start)
+        times = Times(modelled - start, solved - modelled, 0.0)
+        return explained_plan(prepared, ready, found, proof, factor, times, start)
 
 
-def _solve(answer: Answer) -> None:
-    """Find the loads, or the certificate that there are none."""
-    if answer.parts.floating:
-        settle_floating(answer)
+def _solve(prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget) -> Solution:
+    """Return the plan that is asked for."""
+    if prepared.hands.floating:
+        found = solve_floating(prepared, checks, budget)
     else:
-        settle_fixed(answer)
-    settle_effort(answer)
-    if not answer.outcome.solved or answer.wrong:
-        if answer.outcome.balance_dual is None:
-            deadline.check("a plan was found")
-        look_again(answer)
-    if answer.certificate is None and (not answer.outcome.solved or answer.wrong):
-        deadline.check("a plan was found, or proven away")
-    if "load_factor" in answer.question.want:
-        find_load_factor(answer)
+        found = solve_fixed(prepared, checks)
+    if prepared.question.objective == "min_effort":
+        found = solve_effort(prepared, checks, found, budget)
+    return found

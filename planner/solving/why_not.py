@@ -2,68 +2,97 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from planner import programs
-from planner.explanation import InfeasibleStance, certify, certify_idle
+from planner.deadline import Budget, Overlap, Unfinished, late
+from planner.explanation import InfeasibleStance, LimitUse, certify, certify_idle
+from planner.prepare import PreparedStance, Sets
 from planner.programs import SLACK
 from planner.result import Certificate
-from planner.solving.answer import Answer
-from planner.solving.effort import settle_effort
-from planner.solving.fixed import settle_in_two
+from planner.solving.effort import solve_effort
+from planner.solving.fixed import solve_in_two
+from planner.solving.prepared_checks import PreparedChecks
+from planner.solving.solution import Solution
 
-__all__ = ["look_again", "overload"]
+__all__ = ["given_wrench", "look_again", "overload", "unexplained"]
 
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
 
-def look_again(answer: Answer) -> None:
-    """Tell no balance at all from a solver that failed."""
-    nearest = programs.nearest(answer.data)
-    far = BALANCED * max(1.0, float(np.linalg.norm(answer.data.wrench)))
+def look_again(
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    found: Solution,
+    budget: Budget,
+) -> tuple[Solution, Certificate | None]:
+    """Tell no balance at all, with the proof of it, from a solver that failed."""
+    data = found.sets.data
+    nearest = programs.nearest(data)
+    far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
     if not nearest.solved or nearest.value > far:
-        given = len(answer.data.wrench) > len(answer.wrench)
-        if not answer.held_floating:
-            answer.certificate = certify(
-                _hindered(answer, None), None if given else nearest, answer.outcome
-            )
-        if answer.certificate is not None:
-            answer.mind_explained(answer.certificate)
-            answer.outcome = replace(answer.outcome, solved=False)
-    elif not answer.outcome.solved and not answer.parts.floating:
-        # rounding put the wrench a hair outside: plan for the nearest that can be had
-        inside = programs.body_wrench(answer.data, nearest.loads)
-        answer.data = answer.data.turned(inside)
-        settle_in_two(answer)
-        settle_effort(answer)
+        if given_wrench(prepared):
+            return found, None
+        given = len(data.wrench) > len(prepared.wrench)
+        stance = _infeasible(prepared, found.sets, None)
+        proof = certify(stance, None if given else nearest, found.outcome)
+        if proof is not None:
+            found = found._replace(outcome=replace(found.outcome, solved=False))
+            found = found.late(*unexplained(proof))
+        return found, proof
+    if found.outcome.solved or prepared.hands.floating:
+        return found, None
+    # rounding put the wrench a hair outside: plan for the nearest that can be had
+    inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
+    again = solve_in_two(prepared, checks, inside).late(*found.unfinished)
+    if prepared.question.objective == "min_effort":
+        again = solve_effort(prepared, checks, again, budget)
+    return again, None
 
 
-def _hindered(answer: Answer, cap: float | None) -> InfeasibleStance:
+def given_wrench(prepared: PreparedStance) -> bool:
+    """Whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
+    return any(
+        hand.wrist == "floating" and hand.wrench is not None
+        for hand in prepared.question.stance.hands
+    )
+
+
+def unexplained(proof: Certificate) -> tuple[Unfinished, ...]:
+    """Return that a proof is not explained, if it is not, and that is for the time."""
+    whole = proof.irreducible is not None and proof.sufficient is not None
+    return () if whole else late("explanation")
+
+
+def _infeasible(prepared: PreparedStance, sets: Sets, cap: float | None) -> InfeasibleStance:
     """Return what a proof is made of: at any utilisation, or within a cap."""
-    held, limits = answer.parts.held, answer.question.limits
-    return InfeasibleStance(answer.data, answer.limbs, answer.spaces, held, cap, limits)
+    held, limits = prepared.hands.held, prepared.question.limits
+    return InfeasibleStance(sets.data, prepared.limbs, sets.spaces, held, cap, limits)
 
 
-def overload(answer: Answer) -> Certificate | None:
+def overload(
+    prepared: PreparedStance, found: Solution, idle: Sequence[LimitUse]
+) -> Certificate | None:
     """Return the proof that no plan keeps to the cap on the utilisation; None without one.
 
     Of floating hands with their sets linearised at the plan.
     """
-    cap = answer.question.limits.utilisation
-    most = max(answer.idle, key=lambda used: used.utilisation, default=None)
-    beyond = [used for used in answer.idle if used.utilisation > cap + SLACK]
-    if most is not None and beyond and most.utilisation >= answer.utilisation:
+    cap = prepared.question.limits.utilisation
+    most = max(idle, key=lambda used: used.utilisation, default=None)
+    beyond = [used for used in idle if used.utilisation > cap + SLACK]
+    if most is not None and beyond and most.utilisation >= found.utilisation:
         alone: bool | None = len(beyond) == 1
-        if answer.utilisation > cap + SLACK:
-            alone = None if answer.unproven else False
+        if found.utilisation > cap + SLACK:
+            alone = None if found.unproven else False
         return certify_idle(most, cap, alone)
-    if answer.unproven:
+    if found.unproven:
         return None
-    proof = certify(_hindered(answer, cap), known=answer.outcome)
+    proof = certify(_infeasible(prepared, found.sets, cap), known=found.outcome)
     # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
     return replace(proof, sufficient=()) if proof is not None and beyond else proof

@@ -102,8 +102,7 @@ class StreamStance:
         self.first = prepared.wrench
         self.cap = question.limits.utilisation
         self.limbs = tuple(hand.limb for hand in question.stance.hands)
-        hands = prepared.hands
-        spaces, self._data = hands.sets(hands.at_rest(hands.idle))
+        spaces, self._data = prepared.at_rest
         self.columns = tuple(space.columns for space in spaces)
         sizes = [len(names) for names in self.columns]
         self.shape = len(spaces), max(sizes)

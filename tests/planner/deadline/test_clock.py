@@ -23,15 +23,15 @@ from planner.deadline import Budget, DeadlineError
 from planner.explanation import certificate
 from planner.explanation.infeasibility import vertex
 from planner.floating import continuation
+from planner.prepare import prepared_stance
 from planner.programs import WRENCH_UNIT, solvers
 from planner.question import Limits, Question
 from planner.result import Plan
 from planner.robots import pose_search
 from planner.solving import (
     dual_bounds,
+    explained,
     plan,
-    prepared_stance,
-    reading,
     solve,
     unique_plan,
 )
@@ -75,7 +75,7 @@ class Clock:
 def clock(monkeypatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr("planner.deadline.clock.time", clock)
-    for module in (solve, reading):
+    for module in (solve, explained):
         monkeypatch.setattr(module, "time", clock)
     return clock
 
@@ -337,7 +337,7 @@ def held(question: Question, ticks: int, monkeypatch) -> tuple[Plan | None, int]
     clock = Clock(tick=1.0)
     with monkeypatch.context() as patch:
         patch.setattr("planner.deadline.clock.time", clock)
-        for module in (solve, reading):
+        for module in (solve, explained):
             patch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
         begun = clock.now
         try:

@@ -12,7 +12,7 @@ import pytest
 from planner import deadline
 from planner.deadline import Overlap, begin_overlap, overlap
 from planner.programs import solvers
-from planner.solving import KnownStance, answer, solve
+from planner.solving import KnownStance, solve
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.stances import ask, on_wall, program_data
@@ -95,7 +95,7 @@ def test_plans_are_made_while_the_interpreter_ends():
 
 def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monkeypatch):
     threads = []
-    prepare, begin = answer.prepare_checks, deadline.begin_overlap
+    prepare, begin = solve.prepare_checks, deadline.begin_overlap
     taken = threading.Event()
 
     def noted(*given):
@@ -109,7 +109,7 @@ def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monke
         begin()
         assert not waits or taken.wait(PATIENCE)
 
-    monkeypatch.setattr(answer, "prepare_checks", noted)
+    monkeypatch.setattr(solve, "prepare_checks", noted)
     monkeypatch.setattr(deadline, "begin_overlap", begun)
     question = ask(on_wall())
     found = solve.plan(question)

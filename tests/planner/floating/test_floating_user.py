@@ -95,7 +95,7 @@ def test_budget_ends_a_search(monkeypatch):
     """With next to no programs left an answer comes at once, and is honest."""
     asked, whole = all_float()
     assert SOLVED[0] <= 1.2 * continuation.PROGRAMS
-    monkeypatch.setattr("planner.solving.answer.PROGRAMS", 30)
+    monkeypatch.setattr("planner.solving.solve.PROGRAMS", 30)
     with counted() as solved:
         answer = plan(asked)
     assert len(solved) <= 90 < SOLVED[0]

@@ -8,9 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import wrench_transport
 from hand_models.rock import Cylinder
-from planner.prepare import NOTHING, HandBatch, settle_hand
+from planner.prepare import NOTHING, HandBatch, prepare_stance, settle_hand
 from planner.result import PlanArrays
-from planner.solving.prepared_stance import prepare_stance
 from planner.solving.solve import plan_on
 from planner.verification import Check
 from planner.verification.equilibrium import equilibrium

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hand_models.rock import Cylinder, Plane
-from planner.prepare import assemble
+from planner.prepare import prepare_stance
 from planner.result import PlanArrays
 from planner.solving import plan
 from planner.solving.prepared_checks import prepare_checks
@@ -16,8 +16,7 @@ HOLDS = [*(Cylinder(0.28 + 0.011 * k) for k in range(5)), Plane()]
 
 
 def prepared(question):
-    batch, hands = assemble(question, None, question.needed_wrench())
-    return prepare_checks(question, None, batch, hands)
+    return prepare_checks(prepare_stance(question))
 
 
 def test_what_threads_prepare_for_new_hands_checks_their_plans_and_no_others():

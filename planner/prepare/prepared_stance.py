@@ -1,19 +1,23 @@
-"""What is known of a question before a solver is asked."""
+"""A question's stance, prepared: all that is known before a solver is asked."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from hand_models.base import Array, InvalidInputError
-from planner.prepare import HandBatch, HandSets, Posture, assemble, posture
+from planner.prepare.assembly import assemble
+from planner.prepare.hand_batch import HandBatch
+from planner.prepare.hand_sets import HandSets, Sets
+from planner.prepare.joint_posture import Posture, posture
 from planner.question import Question
-from planner.solving.prepared_checks import PreparedChecks
 
 __all__ = ["PreparedStance", "checked_question", "prepare_stance"]
 
 
-class PreparedStance(NamedTuple):
-    """All that is known of a question before a solver is asked.
+@dataclass(frozen=True, eq=False)
+class PreparedStance:
+    """All that is known of a question before a solver is asked; the owner of its arrays.
 
     Attributes
     ----------
@@ -26,8 +30,6 @@ class PreparedStance(NamedTuple):
         What the programs need of them.
     wrench : ndarray, shape (6,)
         The body wrench that is planned for, in B [N, N·m].
-    checks : PreparedChecks or None
-        What reads and checks its plans; by default it is made with each.
     """
 
     question: Question
@@ -35,7 +37,27 @@ class PreparedStance(NamedTuple):
     batch: HandBatch
     hands: HandSets
     wrench: Array
-    checks: PreparedChecks | None = None
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Of the hands, in the order of all arrays."""
+        return tuple([hand.limb for hand in self.question.stance.hands])
+
+    @property
+    def floating(self) -> list[str]:
+        """Limbs whose hands' wrists float."""
+        pairs = zip(self.limbs, self.hands.wrists, strict=True)
+        return [limb for limb, wrist in pairs if wrist is not None]
+
+    @cached_property
+    def at_rest(self) -> Sets:
+        """The hands' sets, of floating ones at rest with idle palms, and the programs' data."""
+        return self.hands.sets(self.hands.at_rest(self.hands.idle))
+
+    def turned(self, wrench: Array) -> PreparedStance:
+        """Return the same stance for another body wrench, shape (6,) [N, N·m], in B."""
+        question = replace(self.question, body_wrench=wrench)
+        return replace(self, question=question, hands=self.hands.turned(wrench), wrench=wrench)
 
 
 def checked_question(question: Question) -> Question:
@@ -59,6 +81,7 @@ def prepare_stance(question: Question) -> PreparedStance:
     InvalidInputError
         If it cannot be understood; the field is relative to the question.
     """
+    checked_question(question)
     where = posture(question)
     try:
         wrench = question.needed_wrench(None if where is None else where.body_wrench)

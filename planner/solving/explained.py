@@ -1,0 +1,294 @@
+"""From a solution to the plan that is told: proven, explained, with its warnings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array
+from planner import deadline
+from planner.deadline import Unfinished, late, late_sentence
+from planner.explanation import (
+    LEAST_FACTOR,
+    NO_FACTOR,
+    UNKNOWN,
+    UNPROVEN,
+    ActiveLimits,
+    LimitUse,
+    far_wrists,
+    idle_preloads,
+    limit_sentence,
+    overload_sentence,
+    shortfall_sentence,
+    strained_preloads,
+    tension_path,
+    unit_of,
+    unsafe_sentence,
+)
+from planner.prepare import PreparedStance
+from planner.programs import SLACK, SOLVER
+from planner.result import (
+    Certificate,
+    HandPlan,
+    LimitName,
+    Plan,
+    Price,
+    SolverInfo,
+    Status,
+    TensionPath,
+    Times,
+)
+from planner.solving import dual_bounds
+from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
+from planner.solving.prepared_checks import PreparedChecks
+from planner.solving.solution import Reading, Solution
+from planner.solving.unique_plan import is_least
+from planner.solving.why_not import given_wrench, overload, unexplained
+
+__all__ = ["explained_plan"]
+
+
+class _Verdict(NamedTuple):
+    """What is to be said of a solution: of a plan that may leave, or of none."""
+
+    status: Status
+    reason: str
+    plan: Reading | None = None
+    limiting: LimitName | None = None
+    prices: tuple[Price, ...] | None = None
+    path: TensionPath | None = None
+    proof: Certificate | None = None
+    unfinished: tuple[Unfinished, ...] = ()
+
+
+def explained_plan(
+    prepared: PreparedStance,
+    checks: PreparedChecks,
+    found: Solution,
+    proof: Certificate | None,
+    factor: FoundFactor,
+    times: Times,
+    start: float,
+) -> Plan:
+    """Return the plan, verified and explained.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : PreparedChecks
+    found : Solution
+    proof : Certificate or None
+        That there is no balance.
+    factor : FoundFactor
+    times : Times
+        Of what came before.
+    start : float
+        When all began, on the clock of `time.perf_counter`.
+    """
+    question, where = prepared.question, prepared.where
+    if found.outcome.solved and found.reading is not None:
+        told = _of_plan(prepared, checks, found, found.reading)
+    elif proof is not None:
+        touching = any(h.holding.any() or h.palm.engaged for h in prepared.batch.hands)
+        reason = shortfall_sentence(proof, touching, floating=prepared.floating)
+        told = _Verdict("infeasible", reason, proof=proof)
+    else:
+        told = _Verdict("failed", _no_answer(prepared, found))
+    robust, unfinished = None, found.unfinished + factor.unfinished + told.unfinished
+    if "robust" in question.want and needs_hands(prepared):
+        # last: it takes the longest
+        robust = find_robust_load_factor(prepared, checks.idle)
+        unfinished += late("robust") if robust is None else ()
+    read, hands = told.plan, None if told.plan is None else told.plan.hands
+    return Plan(
+        status=told.status,
+        body_wrench=prepared.wrench,
+        utilisation=None if read is None else read.whole,
+        effort=None if read is None else read.effort,
+        load_factor=factor.factor,
+        load_factor_unbounded=factor.unbounded,
+        limiting=told.limiting,
+        hands=hands,
+        prices=told.prices,
+        effort_prices=None if read is None else _effort_prices(prepared, found),
+        certificate=told.proof,
+        residual=None if read is None else _residual(prepared, read),
+        joints=None if where is None else where.angles,
+        joint_torque=_joint_torque(prepared, hands),
+        joint_torque_limit=None
+        if where is None
+        else {limb: joints.limits for limb, joints in where.joints.items()},
+        path=told.path,
+        verified=told.status != "failed",
+        reason=told.reason,
+        warnings=(
+            *checks.oddities,
+            *_warnings(prepared, found, factor, told, unfinished),
+        ),
+        solver=SolverInfo(SOLVER, found.outcome.status, found.outcome.iterations),
+        time=Times(times.model, times.solve, time.perf_counter() - start),
+        unfinished=unfinished,
+        robust=robust,
+    )
+
+
+def _of_plan(
+    prepared: PreparedStance, checks: PreparedChecks, found: Solution, read: Reading
+) -> _Verdict:
+    """Return what is to be said of a plan."""
+    question, idle = prepared.question, checks.idle
+    wrong = found.wrong or _not_least(found)
+    if wrong:
+        return _Verdict("failed", f"the solver's plan does not pass the checks: {wrong[0]}")
+    if checks.recovery is not None:
+        read = read._replace(hands=checks.recovery.hands(prepared.limbs, read.arrays))
+    cap = question.limits.utilisation
+    binding = ActiveLimits(prepared.limbs, found.sets.spaces, found.outcome.limit_duals)
+    limiting, reason = _explain(binding, read, idle, cap)
+    told = _Verdict("optimal", reason, read, limiting)
+    if "prices" in question.want:
+        told = told._replace(prices=_prices(binding, found, read, idle))
+    if question.present:
+        spaces, data = found.sets
+        path = tension_path(data, prepared.limbs, spaces, read.loads, question.present, cap, idle)
+        told = told._replace(path=path, unfinished=late("path") if path is None else ())
+    if read.whole <= cap + SLACK:
+        return told
+    proof = overload(prepared, found, idle)
+    missing = late("certificate") if proof is None else unexplained(proof)
+    return told._replace(
+        status="overloaded",
+        reason=reason + overload_sentence(proof, floating=prepared.floating),
+        proof=proof,
+        unfinished=told.unfinished + missing,
+    )
+
+
+def _no_answer(prepared: PreparedStance, found: Solution) -> str:
+    """Return why there is neither a plan nor a proof of none."""
+    if found.search is None:
+        return f"the solver gave no usable answer ({found.outcome.status})"
+    reason = "no pose of the floating wrists was found that balances the body"
+    if given_wrench(prepared):
+        reason += " with the wrenches that they are given; that is no proof of none"
+    idle = _idle_preloads(prepared)
+    return f"{reason}; {idle[0]}" if idle else reason
+
+
+def _idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
+    return idle_preloads(prepared.limbs, prepared.batch.hands, prepared.hands.wrists)
+
+
+def _warnings(
+    prepared: PreparedStance,
+    found: Solution,
+    factor: FoundFactor,
+    told: _Verdict,
+    unfinished: Sequence[Unfinished],
+) -> Iterator[str]:
+    """Yield what a caller should know besides."""
+    question, seconds = prepared.question, deadline.seconds()
+    if unfinished and seconds is not None:
+        yield late_sentence(seconds, unfinished)
+    yield from _idle_preloads(prepared)
+    cap = question.limits.tendon_tension
+    yield from strained_preloads(prepared.limbs, prepared.hands.wrists, cap)
+    if found.outcome.solved and found.reading is not None:
+        yield from far_wrists(found.reading.hands)
+    if found.unproven:
+        yield UNPROVEN
+    if told.path is not None and not told.path.safe:
+        yield unsafe_sentence(told.path)
+    unknown = told.plan is not None and question.present and told.path is None
+    if unknown and "path" not in unfinished:
+        yield UNKNOWN
+    asked = "load_factor" in question.want and not factor.unbounded
+    asked = asked and "load_factor" not in unfinished
+    if found.search is not None and asked and factor.factor is None:
+        yield NO_FACTOR
+    if factor.least:
+        yield LEAST_FACTOR
+
+
+def _not_least(found: Solution) -> list[str]:
+    """Return what is wrong if the multipliers do not prove the plan the best.
+
+    With floating hands, the best of their sets about the plan.
+    """
+    if found.unproven or "least_utilisation" in found.unfinished:
+        return []
+    data, bound = found.sets.data, found.bound
+    if found.effort is None:
+        used = found.utilisation
+    else:
+        used = found.outcome.value
+        if found.least_use is not None:
+            # of these sets, which are about another point, the outcome is
+            data = found.least_use.sets.data
+    if bound is None:
+        bound = dual_bounds.least_bound(data, found.outcome)
+    if not is_least(used, bound):
+        return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
+    if found.effort is not None:
+        effort = found.effort.value if found.search is None else found.search.measure.effort
+        bound = dual_bounds.least_effort_bound(found.sets.data, found.effort, found.cap)
+        if not is_least(effort, bound):
+            return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
+    return []
+
+
+def _residual(prepared: PreparedStance, read: Reading) -> Array:
+    """Return the body wrench of the hands' wrenches less the one planned for."""
+    arrays = prepared.hands.transports @ read.arrays.wrenches[:, :, None]
+    return np.asarray(-prepared.wrench - np.add.reduce(arrays).ravel())
+
+
+def _joint_torque(
+    prepared: PreparedStance, hands: Sequence[HandPlan] | None
+) -> dict[str, Array] | None:
+    """Return the torques of all joints [N·m], as the hands' wrenches make them."""
+    if prepared.where is None or hands is None:
+        return None
+    wrenches = {hand.limb: hand.wrench for hand in hands}
+    return {
+        limb: joints.torques(wrenches.get(limb, np.zeros(6)))
+        for limb, joints in prepared.where.joints.items()
+    }
+
+
+def _explain(
+    binding: ActiveLimits, read: Reading, idle: Sequence[LimitUse], cap: float
+) -> tuple[LimitName | None, str]:
+    """Return the limit with the largest utilisation, and a sentence about it."""
+    most = binding.limiting(read.used, read.whole, idle)
+    if most is None:
+        return None, "nothing limits this stance"
+    held = read.whole <= 1.0 + SLACK
+    hand = next((hand for hand in read.hands if hand.limb == most.name.limb), None)
+    sentence = limit_sentence(most, hand, held=held)
+    if held and read.whole > cap + SLACK:
+        sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
+    return most.name, sentence
+
+
+def _prices(
+    binding: ActiveLimits, found: Solution, read: Reading, idle: Sequence[LimitUse]
+) -> tuple[Price, ...]:
+    """Return what more of each limit that binds would take off the utilisation."""
+    most = max(idle, key=lambda used: used.utilisation, default=None)
+    if most is not None and most.utilisation > read.utilisation + SLACK:
+        # a limb without a hand bears the most: nothing else counts
+        price = most.utilisation / most.capacity
+        return (Price(most.name, price, unit_of(most.name.limit)),)
+    return binding.prices(found.outcome.value)
+
+
+def _effort_prices(prepared: PreparedStance, found: Solution) -> tuple[Price, ...] | None:
+    """Return what more of each limit that binds would take off the effort."""
+    if found.effort is None:
+        return None
+    duals = found.effort.limit_duals
+    return ActiveLimits(prepared.limbs, found.sets.spaces, duals).prices(found.cap)
