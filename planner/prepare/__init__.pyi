@@ -1,4 +1,3 @@
-from .assembly import assemble as assemble
 from .hand_batch import (
     CONTACTS as CONTACTS,
     KEPT as KEPT,
@@ -27,6 +26,7 @@ from .joint_posture import (
 )
 from .prepared_stance import (
     PreparedStance as PreparedStance,
+    assemble as assemble,
     checked_question as checked_question,
     prepare_stance as prepare_stance,
 )

@@ -27,9 +27,8 @@ from planner.programs import (
     Outcome,
     ScaledRows,
     StanceData,
+    hands_data,
     scaled_rows,
-    scaled_transports,
-    with_held,
 )
 
 __all__ = [
@@ -175,12 +174,7 @@ class HandSets:
     @cached_property
     def _fixed(self) -> tuple[HandData, ...]:
         """Data of hands with a fixed wrist; of floating ones a place to fill."""
-        return tuple(
-            HandData.carried(rows, with_held(carried, held))
-            for rows, carried, held in zip(
-                self.scaled, scaled_transports(self.transports), self.held, strict=True
-            )
-        )
+        return hands_data(self.scaled, self.transports, self.held)
 
     def with_sets(self, spaces: Sequence[WrenchSpace]) -> HandSets:
         """Return the same stance with other sets of its hands."""

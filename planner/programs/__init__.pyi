@@ -1,5 +1,9 @@
-from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED
-from .outcome import Outcome as Outcome, Reached as Reached
+from .conic import (
+    PROVEN as PROVEN,
+    UNBOUNDED as UNBOUNDED,
+    Outcome as Outcome,
+    Reached as Reached,
+)
 from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
 from .row_scaling import (
     JOINT_TORQUE as JOINT_TORQUE,
@@ -29,9 +33,8 @@ from .stance_data import (
     StanceData as StanceData,
     beyond as beyond,
     body_wrench as body_wrench,
-    scaled_transports as scaled_transports,
+    hands_data as hands_data,
     used as used,
     used_effort as used_effort,
-    with_held as with_held,
 )
 from .stance_program import SOLVER as SOLVER

@@ -37,8 +37,7 @@ from scipy.linalg import block_diag
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
-from planner.programs.conic import ConicProgram
-from planner.programs.outcome import Outcome, Reached
+from planner.programs.conic import ConicProgram, Outcome, Reached
 from planner.programs.stance_data import Columns, StanceData
 from planner.programs.stance_program import REFINED, SHARP, Definition, StanceProgram
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from hand_models.base import Array
 from planner import deadline
-from planner.programs.outcome import LATE, Outcome, Reached
+from planner.programs.conic import LATE, Outcome, Reached
 from planner.programs.program import (
     Curved,
     Effort,

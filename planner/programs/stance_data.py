@@ -36,9 +36,8 @@ __all__ = [
     "StanceData",
     "beyond",
     "body_wrench",
-    "scaled_transports",
+    "hands_data",
     "used_effort",
-    "with_held",
 ]
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
@@ -90,16 +89,8 @@ class HandData(NamedTuple):
         held : ndarray, shape (nb − 6, 6), optional
             What the further rows of the balance take of this hand's wrench in H.
         """
-        carried = scaled_transports(transport)
-        if held is not None:
-            carried = with_held(carried, held)
-        return cls.carried(scaled_rows(space), carried)
-
-    @classmethod
-    def carried(cls, rows: ScaledRows, carried: Array) -> HandData:
-        """Return a hand's rows, its wrench on the rock carried to the balance by (nb, 6)."""
-        # all but the wrench is the same wherever the hand is
-        return cls(carried @ rows.generators, carried @ rows.origin, *rows[2:])
+        given = np.zeros((0, 6)) if held is None else held
+        return hands_data([scaled_rows(space)], transport[None], [given])[0]
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -116,14 +107,26 @@ class HandData(NamedTuple):
         )
 
 
-def scaled_transports(transports: Array) -> Array:
-    """Return what carries a hand's wrench to the balance, of one or more Ad(B←H), (…, 6, 6)."""
-    return np.asarray(-transports / WRENCH_UNIT[:, None])
+def hands_data(
+    scaled: Sequence[ScaledRows], transports: Array, held: Sequence[Array]
+) -> tuple[HandData, ...]:
+    """Return the data of some hands.
 
-
-def with_held(carried: Array, held: Array) -> Array:
-    """Return what carries a hand's wrench to the balance (nb, 6), with what is held of it below."""
-    return np.vstack([carried, held / WRENCH_UNIT]) if len(held) else carried
+    Parameters
+    ----------
+    scaled : sequence of ScaledRows
+        Their sets' rows, which are the same wherever the hands are.
+    transports : ndarray, shape (hands, 6, 6)
+        Ad(B←H).
+    held : sequence of ndarray, shape (nb − 6, 6)
+        What the further rows of the balance take of each hand's wrench in H.
+    """
+    found = []
+    for rows, carried, given in zip(scaled, -transports / WRENCH_UNIT[:, None], held, strict=True):
+        if len(given):
+            carried = np.vstack([carried, given / WRENCH_UNIT])
+        found.append(HandData(carried @ rows.generators, carried @ rows.origin, *rows[2:]))
+    return tuple(found)
 
 
 class Columns(NamedTuple):

@@ -27,9 +27,9 @@ from planner.programs.conic import (
     PROVEN,
     SOLVERS,
     ConicProgram,
+    Outcome,
     Solver,
 )
-from planner.programs.outcome import Outcome
 from planner.programs.stance_data import Columns, StanceData
 
 __all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "Definition", "StanceProgram"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from hand_models.base import Array, finite_vector
+from planner import deadline
 from planner.prepare import prepare_stance
 from planner.question import Question, checked_body_wrench
 from planner.result import Plan
@@ -54,4 +55,5 @@ class KnownStance:
         """
         start = time.perf_counter()
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
-        return plan_on(self.prepared.turned(wrench), start, self._checks)
+        with deadline.within(self.prepared.question.deadline, started=start):
+            return plan_on(self.prepared.turned(wrench), start, self._checks)

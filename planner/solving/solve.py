@@ -62,24 +62,22 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
     DeadlineError
         If the deadline comes before anything is found that passes the checks.
     """
-    question = prepared.question
-    with deadline.within(question.deadline, started=start):
-        modelled = time.perf_counter()
-        deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
-        checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
-        found, proof = _solve(prepared, checks, budget), None
-        if not found.passes:
-            if found.outcome.balance_dual is None:
-                deadline.check("a plan was found")
-            found, proof = look_again(prepared, checks, found, budget)
-            if proof is None and not found.passes:
-                deadline.check("a plan was found, or proven away")
-        ready, factor = checks.result(), FoundFactor()
-        if "load_factor" in question.want:
-            factor = find_load_factor(prepared, found, ready.idle, budget)
-        solved = time.perf_counter()
-        times = Times(modelled - start, solved - modelled, 0.0)
-        return explained_plan(prepared, ready, found, proof, factor, times, start)
+    question, modelled = prepared.question, time.perf_counter()
+    deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
+    checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
+    found, proof = _solve(prepared, checks, budget), None
+    if not found.passes:
+        if found.outcome.balance_dual is None:
+            deadline.check("a plan was found")
+        found, proof = look_again(prepared, checks, found, budget)
+        if proof is None and not found.passes:
+            deadline.check("a plan was found, or proven away")
+    ready, factor = checks.result(), FoundFactor()
+    if "load_factor" in question.want:
+        factor = find_load_factor(prepared, found, ready.idle, budget)
+    solved = time.perf_counter()
+    times = Times(modelled - start, solved - modelled, 0.0)
+    return explained_plan(prepared, ready, found, proof, factor, times, start)
 
 
 def _solve(prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget) -> Solution:

@@ -9,7 +9,7 @@ import pytest
 from hand_models.base import Pose
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.rock import Cylinder
-from planner.prepare import assembly, settle_hand
+from planner.prepare import prepared_stance, settle_hand
 from planner.question import Question, Stance
 from planner.result import Plan
 from planner.solving import plan
@@ -127,12 +127,12 @@ def half(monkeypatch):
     """Makes all hands that are planned for have half the spines of two of their tiles."""
     share = np.ones(14)
     share[[BASE, DISTAL]] = 0.5
-    settle = assembly.settle_stance
+    settle = prepared_stance.settle_stance
 
     def settle_half(stance: Stance) -> list[SettledHand]:
         return [partly(hand, share) for hand in settle(stance)]
 
-    monkeypatch.setattr(assembly, "settle_stance", settle_half)
+    monkeypatch.setattr(prepared_stance, "settle_stance", settle_half)
     return settle_half
 
 
