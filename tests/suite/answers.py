@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_info
 
 __all__ = ["libraries", "read_answers", "recorded_here", "told", "write_answers"]
 
@@ -99,13 +100,19 @@ def _flat(equations: dict[str, Any]) -> dict[str, Any] | None:
     return {"projector": (back @ normals).tolist(), "nearest": (nearest / scale).tolist()}
 
 
+KERNELS = {"Zen": "Haswell"}
+"""Processors for which the linear algebra does the same as for others."""
+
+
 def libraries() -> dict[str, str]:
-    """Return the versions that are installed of what decides the last digits."""
-    return {name: version(name) for name in ("clarabel", "cvxpy", "numpy", "scipy")}
+    """Return what decides the last digits: versions installed, and kernels for the processor."""
+    versions = {name: version(name) for name in ("clarabel", "cvxpy", "numpy", "scipy")}
+    kernels = {each.get("architecture", "unknown") for each in threadpool_info()}
+    return {**versions, "kernels": ", ".join(sorted({KERNELS.get(name, name) for name in kernels}))}
 
 
 def recorded_here() -> bool:
-    """Whether the answers were recorded with the libraries that are installed."""
+    """Whether the answers were recorded with the libraries, and kernels, that are used here."""
     return bool(json.loads(LIBRARIES.read_text(encoding="utf-8")) == libraries())
 
 

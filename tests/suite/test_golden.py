@@ -13,8 +13,9 @@ from tests.suite.table import answer
 SLOW = (pytest.mark.slow, pytest.mark.timeout(1800))
 
 LEAST = 0.0 if recorded_here() else 1e-2
-"""Other versions of solver and linear algebra end in other last digits, and weigh ties otherwise:
-with them a status or a limit that changes is found, and a number that jumps."""
+"""Other versions of solver and linear algebra, and kernels for other processors, end in other last
+digits, and weigh ties otherwise: with them a status or a limit that changes is found, and a number
+that jumps."""
 
 FREE = set() if recorded_here() else {"blocking", "irreducible", "sufficient"}
 """An irreducible infeasible set is one of many, and so is what else would do."""
