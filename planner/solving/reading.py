@@ -26,7 +26,7 @@ from planner.explanation import (
     unsafe_sentence,
 )
 from planner.programs import SLACK, SOLVER
-from planner.result import HandPlan, LimitName, Plan, Price, SolverInfo, Status, Times
+from planner.result import HandPlan, LimitName, Plan, Price, Solver, Status, Time
 from planner.solving import dual_bounds
 from planner.solving.answer import Answer
 from planner.solving.load_factor import find_robust_load_factor
@@ -36,7 +36,7 @@ from planner.solving.why_not import overload
 __all__ = ["read_plan"]
 
 
-def read_plan(answer: Answer, times: Times, start: float) -> Plan:
+def read_plan(answer: Answer, times: Time, start: float) -> Plan:
     """Return the plan, verified."""
     hands: tuple[HandPlan, ...] | None = None
     utilisation: float | None = None
@@ -102,8 +102,8 @@ def read_plan(answer: Answer, times: Times, start: float) -> Plan:
         verified=verified,
         reason=reason,
         warnings=_warnings(answer),
-        solver=SolverInfo(SOLVER, answer.outcome.status, answer.outcome.iterations),
-        time=Times(times.model, times.solve, time.perf_counter() - start),
+        solver=Solver(SOLVER, answer.outcome.status, answer.outcome.iterations),
+        time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=tuple(answer.unfinished),
         robust=answer.robust,
     )
@@ -214,7 +214,7 @@ def _prices(answer: Answer) -> tuple[Price, ...]:
     if most is not None and most.utilisation > answer.utilisation + SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
-        return (Price(most.name, price, unit_of(most.name.limit)),)
+        return (Price.of(most.name, price, unit_of(most.name.limit)),)
     return answer.binding.prices(answer.outcome.value)
 
 

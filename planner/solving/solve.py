@@ -6,7 +6,7 @@ import time
 
 from planner import deadline
 from planner.question import Question
-from planner.result import Plan, Times
+from planner.result import Plan, Time
 from planner.solving.answer import Answer
 from planner.solving.effort import settle_effort
 from planner.solving.fixed import settle_fixed
@@ -62,7 +62,7 @@ def plan_on(prepared: PreparedStance, start: float) -> Plan:
         answer = Answer(*prepared)
         _solve(answer)
         solved = time.perf_counter()
-        return read_plan(answer, Times(modelled - start, solved - modelled, 0.0), start)
+        return read_plan(answer, Time(modelled - start, solved - modelled, 0.0), start)
 
 
 def _solve(answer: Answer) -> None:

@@ -5,27 +5,13 @@ from .body_space import (
     BodySpaceReply as BodySpaceReply,
 )
 from .brief_plan import BriefPlanReply as BriefPlanReply
-from .hand import (
-    Finger as Finger,
-    Hand as Hand,
-    Palm as Palm,
-    Seating as Seating,
-    Tile as Tile,
-    Wrist as Wrist,
-)
+from .hand import Hand as Hand, Palm as Palm, Seating as Seating, Wrist as Wrist
 from .health import (
     HealthReply as HealthReply,
     LastFailure as LastFailure,
     ProcessHealth as ProcessHealth,
 )
-from .limits import LimitName as LimitName, Price as Price
-from .plan import (
-    Certificate as Certificate,
-    PlanReply as PlanReply,
-    RobustLoadFactor as RobustLoadFactor,
-    Solver as Solver,
-    TensionPath as TensionPath,
-)
+from .plan import Certificate as Certificate, PlanReply as PlanReply
 from .reply import (
     AXES as AXES,
     ErrorDetail as ErrorDetail,
@@ -33,7 +19,6 @@ from .reply import (
     PlacedFrame as PlacedFrame,
     Reply as Reply,
     StanceReply as StanceReply,
-    Time as Time,
 )
 from .stream import (
     HandColumns as HandColumns,

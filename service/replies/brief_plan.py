@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec import UNSET, UnsetType
 
-from service.replies.limits import LimitName
-from service.replies.reply import StanceReply, Time, Vector
+from planner.result import LimitName, Time
+from service.replies.reply import StanceReply, Vector
 from service.replies.stream import HandSetPoints
 
 __all__ = ["BriefPlanReply"]

@@ -4,55 +4,11 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
+from planner.result import Finger
 from service.replies.reply import PlacedFrame, Vector
 from service.replies.wrench_set import WrenchSet
 
-__all__ = [
-    "Finger",
-    "Hand",
-    "Palm",
-    "Seating",
-    "Tile",
-    "Wrist",
-]
-
-
-class Tile(Struct, kw_only=True):
-    """One finger tile. The last three fields come with ``"want": ["model"]``.
-
-    The first two of them only where the wrist is fixed.
-    """
-
-    phalanx: str
-    contact: str
-    position: Vector
-    force: Vector
-    shear: float
-    normal: float
-    lateral: float
-    shear_axis: Vector
-    normal_axis: Vector
-    lateral_axis: Vector
-    utilisation: float
-    load_at_zero: Vector | UnsetType = UNSET
-    load_per_newton: Vector | UnsetType = UNSET
-    half_planes: list[Vector] | UnsetType = UNSET
-
-
-class Finger(Struct, kw_only=True):
-    """One finger: its tendon, its motor while it tightens that, its tiles from the base outward.
-
-    ``closure``: how it has ended on its hold: ``laid``, ``hooked``, ``wedged``, ``curled``,
-    ``stopped`` or ``straight``. The winch's angle is from the open finger [rad].
-    """
-
-    name: str
-    closure: str
-    tendon_tension: float
-    motor_torque: float
-    motor_current: float
-    winch_angle: float
-    tiles: list[Tile]
+__all__ = ["Hand", "Palm", "Seating", "Wrist"]
 
 
 class Palm(Struct, kw_only=True):

@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 
-class Contact(Struct, kw_only=True):
+class Contact(Struct):
     """Where a finger tile meets the rock, and the axes of its loads.
 
     ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``

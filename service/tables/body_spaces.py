@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from planner.capability import COMPONENTS
+from planner.result import LimitName
 from service import replies
 from service.replies import BodySpaceReply
 from service.tables.plans import table_of
@@ -97,7 +98,7 @@ def _unit_of(axis: str) -> str:
     return "N" if axis.startswith("f") else "N·m"
 
 
-def _words(name: replies.LimitName | None) -> str:
+def _words(name: LimitName | None) -> str:
     if name is None:
         return "-"
     parts = (name.limb, name.joint, name.finger, name.phalanx, name.limit)

@@ -12,20 +12,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from planner.explanation import constraint_words
-from planner.result import LimitName as PlannedLimit
+from planner.result import Finger, LimitName, Price, RobustLoadFactor, TensionPath, Tile
 from service.replies import (
     AXES,
     AxisCapability,
     Certificate,
     ClosingSequence,
-    Finger,
     Hand,
-    LimitName,
     PlanReply,
-    Price,
-    RobustLoadFactor,
-    TensionPath,
-    Tile,
     WrenchSpaceReply,
 )
 
@@ -196,7 +190,7 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
     if proof.irreducible:
         title = "these leave no balance, each needed for that; others may be in the way, too"
         _show(title, _barrier_table(proof.irreducible), out)
-        words = {name.limit: constraint_words(_planned(name)) for name in proof.irreducible}
+        words = {name.limit: constraint_words(name) for name in proof.irreducible}
         for limit, said in words.items():
             out.print(f"{limit}: {said}", markup=False)
         if proof.sufficient is not None:
@@ -234,10 +228,6 @@ def _barrier_table(names: Iterable[LimitName]) -> Table:
     for (limb, limit), owners in _alike(names).items():
         table.add_row(limb, limit, ", ".join(owners) or "-")
     return table
-
-
-def _planned(name: LimitName) -> PlannedLimit:
-    return PlannedLimit(name.limb, name.finger, name.phalanx, name.limit, name.joint)
 
 
 def _closing_table(reply: WrenchSpaceReply) -> Table:
