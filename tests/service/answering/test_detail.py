@@ -7,13 +7,13 @@ import random
 from dataclasses import replace
 
 import pytest
-from service.answering.answers import brief_plan_reply
 
 from planner import plan
 from planner.deadline.unfinished import UNFINISHED
 from planner.result import LimitName, Plan
 from service import Planners
 from service.answering import dispatch
+from service.answering.answers import brief_plan_reply
 from service.answering.questions import question
 from service.commands.cli import run
 from service.commands.stances import bundled, read_request
