@@ -4,14 +4,25 @@ from .body_space import (
     BodySection as BodySection,
     BodySpaceReply as BodySpaceReply,
 )
-from .brief_plan import BriefPlanReply as BriefPlanReply
-from .hand import Hand as Hand, Palm as Palm, Seating as Seating, Wrist as Wrist
+from .hand import (
+    Generator as Generator,
+    Hand as Hand,
+    Palm as Palm,
+    Row as Row,
+    Seating as Seating,
+    WrenchSet as WrenchSet,
+    Wrist as Wrist,
+)
 from .health import (
     HealthReply as HealthReply,
     LastFailure as LastFailure,
     ProcessHealth as ProcessHealth,
 )
-from .plan import Certificate as Certificate, PlanReply as PlanReply
+from .plan import (
+    BriefPlanReply as BriefPlanReply,
+    Certificate as Certificate,
+    PlanReply as PlanReply,
+)
 from .reply import (
     AXES as AXES,
     ErrorDetail as ErrorDetail,
@@ -26,7 +37,6 @@ from .stream import (
     SetPointsReply as SetPointsReply,
     StreamReply as StreamReply,
 )
-from .wrench_set import Generator as Generator, Row as Row, WrenchSet as WrenchSet
 from .wrench_space import (
     AxisCapability as AxisCapability,
     ClosingSequence as ClosingSequence,

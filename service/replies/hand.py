@@ -6,9 +6,8 @@ from msgspec import UNSET, Struct, UnsetType
 
 from planner.result import Finger
 from service.replies.reply import PlacedFrame, Vector
-from service.replies.wrench_set import WrenchSet
 
-__all__ = ["Hand", "Palm", "Seating", "Wrist"]
+__all__ = ["Generator", "Hand", "Palm", "Row", "Seating", "WrenchSet", "Wrist"]
 
 
 class Palm(Struct, kw_only=True):
@@ -48,6 +47,43 @@ class Wrist(Struct, kw_only=True):
     palm: str | None = None
     rounds: int | None = None
     error: float | None = None
+
+
+class Generator(Struct):
+    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+
+    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    """
+
+    name: str
+    wrench: Vector
+
+
+class Row(Struct, kw_only=True):
+    """An inequality of a hand's wrench space.
+
+    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
+    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
+    ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
+    """
+
+    name: str
+    kind: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+    coefficients: Vector
+    constant: float
+    capacity: float
+
+
+class WrenchSet(Struct, kw_only=True):
+    """A hand's wrenches, origin + Σ y · generator, for the loads y that the rows allow."""
+
+    origin: Vector
+    generators: list[Generator]
+    rows: list[Row]
 
 
 class Hand(Struct, kw_only=True):

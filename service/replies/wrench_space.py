@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from service.replies.hand import Seating, Wrist
+from service.replies.hand import Generator, Row, Seating, Wrist
 from service.replies.reply import StanceReply, Vector
-from service.replies.wrench_set import Generator, Row
 
 __all__ = [
     "AxisCapability",
