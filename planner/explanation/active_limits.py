@@ -144,7 +144,7 @@ class ActiveLimits:
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
         each = self._weights * utilisation / capacities
         price = np.bincount(self._named.of_row, each, len(names)).tolist()
-        return tuple(Price(names[i], price[i], unit_of(names[i].limit)) for i in dear)
+        return tuple(Price.of(names[i], price[i], unit_of(names[i].limit)) for i in dear)
 
     def limiting(
         self, used: Array, utilisation: float, idle: Sequence[LimitUse]

@@ -105,7 +105,7 @@ def tension_path(
         uses = [*limit_uses(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
         return TensionPath(False, 0.0, at_present, change, _most_used(uses))
     if change <= GIVE:
-        return TensionPath(True, 1.0, at_present, change, ())
+        return TensionPath(True, 1.0, at_present, change)
     # rounding must not leave the plan itself outside
     most = max(cap, *used)
     reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
@@ -116,7 +116,7 @@ def tension_path(
         return None
     part = min(max(part, 0.0), 1.0)
     if part >= 1.0 - SLACK:
-        return TensionPath(True, part, at_present, change, ())
+        return TensionPath(True, part, at_present, change)
     ends = _ends([limbs[i] for i in fixed], [spaces[i] for i in fixed], reached.outcome)
     return TensionPath(False, part, at_present, change, ends)
 
@@ -129,15 +129,13 @@ def unsafe_sentence(path: TensionPath) -> str:
     return f"{sentence}: {blocking_sentence(path.limiting)}" if path.limiting else sentence
 
 
-def _most_used(used: Sequence[LimitUse]) -> tuple[LimitName, ...]:
+def _most_used(used: Sequence[LimitUse]) -> list[LimitName]:
     """Return the limit of which a plan uses most, and those that tie with it."""
     close = close_to(max(each.utilisation for each in used))
-    return tuple(dict.fromkeys(each.name for each in used if each.utilisation >= close))
+    return list(dict.fromkeys(each.name for each in used if each.utilisation >= close))
 
 
-def _ends(
-    limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome
-) -> tuple[LimitName, ...]:
+def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome) -> list[LimitName]:
     """Return the limits and hard rows that end the safe part, those that weigh most first."""
     weights: dict[LimitName, float] = {}
     for limb, space, limit, hard in zip(
@@ -147,7 +145,7 @@ def _ends(
             name = limit_name(limb, row)
             weights[name] = weights.get(name, 0.0) + float(weight)
     least = ENDS * max(weights.values(), default=0.0)
-    return tuple(name for name in ranked(weights) if weights[name] > least)
+    return [name for name in ranked(weights) if weights[name] > least]
 
 
 def _columns(space: WrenchSpace) -> list[int]:

@@ -5,31 +5,14 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from hand_models.base import whole_file
 from planner.pictures.route_plots import plot_route
 from planner.result import LimitName, Plan
 from planner.route import OutOfReach, RouteResult, RouteStage
 
-__all__ = ["COLUMNS", "summary", "write_report"]
-
-COLUMNS: Final = (
-    "stage",
-    "move",
-    "phase",
-    "limb",
-    "status",
-    "utilisation",
-    "margin",
-    "load_factor",
-    "joint_utilisation",
-    "limiting_limb",
-    "limiting_finger",
-    "limiting_phalanx",
-    "limiting_limit",
-    "reason",
-)
+__all__ = ["summary", "write_report"]
 
 
 def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
@@ -50,10 +33,10 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
         whole_file(files["table"]) as part,
         part.open("w", newline="", encoding="utf-8") as stream,
     ):
-        writer = csv.DictWriter(stream, COLUMNS)
+        rows = [_row(*each) for each in zip(result.stages, result.plans, strict=True)]
+        writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
-        for stage, plan in zip(result.stages, result.plans, strict=True):
-            writer.writerow(_row(stage, plan))
+        writer.writerows(rows)
     plot_route(result, files["picture"])
     text = json.dumps(summary(result), indent=2, ensure_ascii=False)
     with whole_file(files["summary"]) as part:

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 from trimesh.intersections import slice_faces_plane
+from trimesh.util import append_faces
 
 from hand_models.base import Array, Indices, Pose
 from hand_models.hand import SettledHand
@@ -109,13 +110,18 @@ def _width(hand: Array) -> tuple[float, float]:
 
 def _drawn_out(outline: Array, low: float, high: float) -> Triangles:
     """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high."""
-    count = len(outline)
-    ends = [np.insert(outline, 1, y, axis=1) for y in (low, high)]
-    i = np.arange(count - 1)
-    faces = np.vstack(
-        [np.column_stack([i, i + 1, i + count]), np.column_stack([i + 1, i + 1 + count, i + count])]
+    return _grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)], axis=1))
+
+
+def _grid(points: Array) -> Triangles:
+    """Return the triangles between points (n, m, 3), two for each cell."""
+    rows, columns, _ = points.shape
+    place = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (
+        part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[:-1, 1:], place[1:, 1:])
     )
-    return Triangles(np.vstack(ends), faces)
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
+    return Triangles(points.reshape(-1, 3), faces)
 
 
 def _round_outline(hold: Cylinder | Edge, hand: Array) -> Array:
@@ -145,10 +151,7 @@ def _cap(semi_axes: Array, hand: Array) -> Triangles:
     turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
     round_about = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
     unit = np.cos(t)[:, None, None] * pole + np.sin(t)[:, None, None] * round_about
-    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(STEPS), np.arange(STEPS)))
-    a, b = i * (STEPS + 1) + j, (i + 1) * (STEPS + 1) + j
-    faces = np.vstack([np.column_stack([a, b, a + 1]), np.column_stack([b, b + 1, a + 1])])
-    return Triangles(centre + unit.reshape(-1, 3) * semi_axes, faces)
+    return _grid(centre + unit * semi_axes)
 
 
 def _strips(hold: Profile, settled: SettledHand, hand: Array) -> Triangles:
@@ -158,10 +161,9 @@ def _strips(hold: Profile, settled: SettledHand, hand: Array) -> Triangles:
         return _drawn_out(hold.outlines[0], low, high)
     half_way = 0.5 * float(settled.hand.inner_joint[1] + settled.hand.outer_axis[1])
     bounds = np.clip([math.inf, half_way, 0.0, -half_way, -math.inf], low, high)
-    vertices: list[Array] = []
-    faces: list[Indices] = []
-    for outline, top, bottom in zip(hold.outlines, bounds, bounds[1:], strict=False):
-        strip = _drawn_out(outline, float(bottom), float(top))
-        faces.append(strip.faces + sum(map(len, vertices)))
-        vertices.append(strip.vertices)
-    return Triangles(np.vstack(vertices), np.vstack(faces))
+    strips = [
+        _drawn_out(outline, float(bottom), float(top))
+        for outline, top, bottom in zip(hold.outlines, bounds, bounds[1:], strict=False)
+    ]
+    vertices, faces = append_faces(*zip(*strips, strict=True))
+    return Triangles(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.intp))

@@ -1,90 +1,26 @@
 """One hand of a plan: what it carries, as arrays, and finger by finger.
 
-Its numbers are stored once, in arrays over its tiles and its tendons. Fingers and tiles as objects
-are views of these, made when they are asked for.
+Its numbers are stored once, in arrays over its tiles and its tendons. Fingers and tiles as they
+travel are made of these when they are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
+
+from msgspec import UNSET
 
 from hand_models.base import Array
 from hand_models.compliance import PalmMode
-from hand_models.hand import FINGERS, Seating, Tile
+from hand_models.hand import FINGERS, Seating, Tile as NamedTile
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
+from planner.result.plain_parts import Finger, Tile
 
-__all__ = ["FingerPlan", "HandPlan", "PalmPlan", "TileLoad", "WristPlan"]
-
-
-@dataclass(frozen=True, eq=False)
-class TileLoad:
-    """One finger tile of a plan. Vectors in H, forces on the rock, SI units.
-
-    Attributes
-    ----------
-    phalanx : str
-        ``base``, ``proximal``, ``middle`` or ``distal``.
-    contact : str
-        ``face``, ``edge``, ``frame`` where its phalanx only presses beside it, or ``none`` where
-        it touches nothing and carries nothing.
-    position : ndarray, shape (3,)
-    force : ndarray, shape (3,)
-        shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
-    shear, normal, lateral : float
-    shear_axis, normal_axis, lateral_axis : ndarray, shape (3,)
-    utilisation : float
-        Largest load over capacity of its half-planes; never below zero.
-    load_at_zero : ndarray, shape (2,), or None
-        Shear and normal load at zero tension [N]; None where the wrist floats.
-    load_per_newton : ndarray, shape (2,), or None
-        The same per newton of tension.
-    half_planes : tuple of HalfPlane
-        Of the spines that are on the rock; of a tile that is not on rock, those of a whole one.
-    """
-
-    phalanx: str
-    contact: str
-    position: Array
-    force: Array
-    shear: float
-    normal: float
-    lateral: float
-    shear_axis: Array
-    normal_axis: Array
-    lateral_axis: Array
-    utilisation: float
-    load_at_zero: Array | None
-    load_per_newton: Array | None
-    half_planes: tuple[HalfPlane, ...]
-
-
-@dataclass(frozen=True)
-class FingerPlan:
-    """One finger of a plan.
-
-    Attributes
-    ----------
-    name : str
-    tendon_tension : float
-        [N]
-    motor_torque, motor_current : float
-        Of its motor while it tightens the tendon to that [N·m], [A].
-    winch_angle : float
-        From the open finger to that tension, of a floating hand to the preload at which the motor
-        stands still [rad].
-    tiles : tuple of TileLoad
-        From the base outward.
-    """
-
-    name: str
-    tendon_tension: float
-    motor_torque: float
-    motor_current: float
-    winch_angle: float
-    tiles: tuple[TileLoad, ...]
+__all__ = ["HandPlan", "PalmPlan", "WristPlan"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +109,7 @@ class HandPlan:
     axes: Array
     engagement: Array
     tile_utilisations: Array
-    tiles: tuple[Tile, ...]
+    tiles: tuple[NamedTile, ...]
     half_planes: tuple[HalfPlane, ...]
     palm: PalmPlan
     utilisation: float
@@ -185,35 +121,32 @@ class HandPlan:
     wrist: WristPlan | None = None
 
     @cached_property
-    def fingers(self) -> tuple[FingerPlan, ...]:
-        """The hand finger by finger, in the order of `FINGERS`."""
-        tiles: dict[str, list[TileLoad]] = {name: [] for name in FINGERS}
-        loads, used = self.loads.tolist(), self.tile_utilisations.tolist()
-        for t, (tile, (shear, normal, lateral)) in enumerate(zip(self.tiles, loads, strict=True)):
-            law = None if self.laws is None else self.laws[t]
-            tiles[tile.finger].append(
-                TileLoad(
-                    phalanx=tile.phalanx,
-                    contact=tile.contact,
-                    position=self.positions[t],
-                    force=self.forces[t],
-                    shear=shear,
-                    normal=normal,
-                    lateral=lateral,
-                    shear_axis=self.axes[t, 0],
-                    normal_axis=self.axes[t, 1],
-                    lateral_axis=self.axes[t, 2],
-                    utilisation=used[t],
-                    load_at_zero=None if law is None else law[:, 0],
-                    load_per_newton=None if law is None else law[:, 1],
-                    half_planes=self.limits_of(t),
-                )
-            )
-        numbers = zip(FINGERS, self.tensions.tolist(), *self.drives.tolist(), strict=True)
-        return tuple(
-            FingerPlan(name, tension, torque, current, angle, tuple(tiles[name]))
-            for name, tension, torque, current, angle in numbers
-        )
+    def fingers(self) -> list[Finger]:
+        """The hand finger by finger, in the order of `FINGERS`, with the model of its tiles."""
+        return self.finger_by_finger(model=True)
+
+    def finger_by_finger(self, *, model: bool) -> list[Finger]:
+        """Return the fingers, with load laws and half-planes of their tiles if ``model``."""
+        tiles: dict[str, list[Tile]] = {name: [] for name in FINGERS}
+        arrays = (self.loads, self.positions, self.forces, self.axes, self.tile_utilisations)
+        columns: Iterator[Any] = zip(self.tiles, *(each.tolist() for each in arrays), strict=True)
+        for t, (tile, load, position, force, axes, used) in enumerate(columns):
+            numbers = position, force, *load, *axes, used
+            known = self._model_of(t) if model else ()
+            tiles[tile.finger].append(Tile(tile.phalanx, tile.contact, *numbers, *known))
+        of_fingers = (self.closures, self.tensions.tolist(), *self.drives.tolist(), tiles.values())
+        return [Finger(*own) for own in zip(FINGERS, *of_fingers, strict=True)]
+
+    def _model_of(self, tile: int) -> tuple[Any, ...]:
+        """Return a tile's load law, unset where the wrist floats, and its half-planes."""
+        law = (UNSET, UNSET) if self.laws is None else self.laws[tile].T.tolist()
+        # a lateral load may be of either sign
+        planes = [
+            [plane.a_shear, plane.a_normal, sign * plane.a_lateral, plane.capacity]
+            for plane in self.limits_of(tile)
+            for sign in ((1.0, -1.0) if plane.a_lateral > 0.0 else (1.0,))
+        ]
+        return *law, planes
 
     def limits_of(self, tile: int) -> tuple[HalfPlane, ...]:
         """Return the half-planes of a tile's spines on the rock, or of its nail, by its index."""

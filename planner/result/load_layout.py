@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import accumulate
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from planner.prepare import (
     CONTACTS,
     KEPT_NAMES,
     TOUCHING,
-    concatenated,
     contact_pattern_of,
     tile_index_of,
 )
@@ -41,66 +39,6 @@ SIGNED: Final = ("/lateral", f"/{NAIL}")
 
 ZERO: Final = np.zeros(1)
 """A load that a hand does not have, before all others."""
-
-
-class _HandLayout(NamedTuple):
-    """Where everything is in one hand's loads and limit rows.
-
-    Attributes
-    ----------
-    places : ndarray of int, shape (14,)
-        Of each of `OWN` among its m loads, counted from one; zero where there is none.
-    has : ndarray of int, shape (14,)
-        One where there is one, zero elsewhere.
-    least : ndarray, shape (m,)
-        What each load may be at least [N].
-    rows : int
-        How many limit rows it has.
-    begins : ndarray of int
-        Where the limit rows of each tile on rock begin, and where those of the last end.
-    nails : ndarray of int
-        Limit rows of its nails, two of each.
-    efforts : ndarray of int
-        Limit rows whose utilisation counts as effort.
-    """
-
-    places: Indices
-    has: Indices
-    least: Array
-    rows: int
-    begins: Indices
-    nails: Indices
-    efforts: Indices
-
-
-@lru_cache(maxsize=KEPT_NAMES)
-def _hand_layout(
-    tiles: tuple[Tile, ...], columns: tuple[str, ...], names: tuple[Row, ...], limits: int
-) -> _HandLayout:
-    """Return the layout of a hand.
-
-    Parameters
-    ----------
-    tiles : tuple of Tile
-    columns : tuple of str
-    names : tuple of Row
-        Of the rows of its set.
-    limits : int
-        Limit rows of each tile, of which a hand has the first, tile by tile.
-    """
-    rows = [row for row in names if row.kind == "limit"]
-    touching = sum(CONTACTS[tile.contact] == TOUCHING for tile in tiles)
-    place = {name: i for i, name in enumerate(columns, start=1)}
-    places = np.array([place.get(name, 0) for name in OWN])
-    return _HandLayout(
-        places=places,
-        has=np.sign(places),
-        least=np.array([-np.inf if name.endswith(SIGNED) else 0.0 for name in columns]),
-        rows=len(rows),
-        begins=limits * np.arange(touching + 1),
-        nails=np.flatnonzero([row.phalanx == NAIL for row in rows]),
-        efforts=np.flatnonzero([is_effort(row) for row in rows]),
-    )
 
 
 class LoadLayout(NamedTuple):
@@ -160,18 +98,21 @@ def layout_of(
 
     Parameters
     ----------
-    tiles, columns, names : tuple
-        Of `_hand_layout`, for each.
+    tiles : tuple of tuple of Tile
+        By hand, and so are the others.
+    columns : tuple of tuple of str
+    names : tuple of tuple of Row
+        Of the rows of its set.
     limits : tuple of int
-        Of `_hand_layout`, for each.
+        Limit rows of each tile, of which a hand has the first, tile by tile.
     """
-    count = len(limits)
-    hands = [_hand_layout(*own) for own in zip(tiles, columns, names, limits, strict=True)]
     places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(tiles)
-    ends = list(accumulate((len(hand.least) for hand in hands), initial=1))
-    found = np.array([hand.places + at * hand.has for hand, at in zip(hands, ends, strict=False)])
-    found -= np.sign(found)
-    first_row = list(accumulate((hand.rows for hand in hands), initial=0))[:-1]
+    named = [(h, name) for h, own in enumerate(columns) for name in own]
+    place = {name: i for i, name in enumerate(named, start=1)}
+    found = np.array([[place.get((h, name), 0) for name in OWN] for h in range(len(limits))])
+    loads = np.zeros((len(limits), max(map(len, columns))), dtype=np.intp)
+    for h, own in enumerate(columns):
+        loads[h, : len(own)] = [place[h, name] for name in own]
     tensions, laterals, axials = (
         found[:, i : i + COUNT].ravel() for i in range(0, 3 * COUNT, COUNT)
     )
@@ -180,30 +121,26 @@ def layout_of(
     of_tile[:, 2] = laterals[places.finger]
     hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
     of_tile[hooked, 0] = axials[places.finger[hooked]]
-    pairs = list(zip(first_row, hands, strict=True))
-    loads = np.zeros((count, max(len(hand.least) for hand in hands)), dtype=np.intp)
-    for own, end, hand in zip(loads, ends, hands, strict=False):
-        own[: len(hand.least)] = end + np.arange(len(hand.least))
-    shape = count, WRENCH + max(hand.rows for hand in hands)
+    rows = [(h, row) for h, own in enumerate(names) for row in own if row.kind == "limit"]
+    of_row = np.array([h for h, _ in rows], dtype=np.intp)
+    counts = np.bincount(of_row, minlength=len(limits))
+    first_row, most = np.cumsum(counts) - counts, WRENCH + int(counts.max())
+    touching = [sum(CONTACTS[tile.contact] == TOUCHING for tile in own) for own in tiles]
+    of_rock = zip(first_row, limits, touching, strict=True)
     kept = np.zeros(len(places.hand), dtype=np.intp)
     kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
     return LoadLayout(
         columns=loads,
-        shape=shape,
-        limits=concatenated(
-            [
-                shape[1] * h + WRENCH + np.arange(hand.rows, dtype=np.intp)
-                for h, hand in enumerate(hands)
-            ]
-        ),
-        least=np.concatenate([ZERO, *[hand.least for hand in hands]]),
+        shape=(len(limits), most),
+        limits=most * of_row + WRENCH + np.arange(len(rows)) - first_row[of_row],
+        least=np.array([0.0, *(-np.inf if name.endswith(SIGNED) else 0.0 for _, name in named)]),
         tensions=tensions,
         palms=found[:, 3 * COUNT :],
         of_tile=of_tile,
-        first_row=np.array(first_row),
-        begins=concatenated([at + hand.begins for at, hand in pairs]),
+        first_row=first_row,
+        begins=np.concatenate([at + each * np.arange(n + 1) for at, each, n in of_rock]),
         kept=kept,
         hooked=hooked,
-        nail_limits=concatenated([at + hand.nails for at, hand in pairs]).reshape(-1, 2),
-        efforts=concatenated([at + hand.efforts for at, hand in pairs]),
+        nail_limits=np.flatnonzero([row.phalanx == NAIL for _, row in rows]).reshape(-1, 2),
+        efforts=np.flatnonzero([is_effort(row) for _, row in rows]),
     )

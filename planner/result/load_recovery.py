@@ -10,8 +10,8 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger import PHALANGES
-from hand_models.hand import HandModel
-from hand_models.tile import HalfPlane, inner_half_planes
+from hand_models.hand import NAIL, HandModel
+from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import KEPT, HandBatch, TileIndex, concatenated
 from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
@@ -151,7 +151,7 @@ class LoadRecovery:
 
     def hands(self, limbs: Sequence[str], arrays: PlanArrays) -> tuple[HandPlan, ...]:
         """Return what was read, hand by hand; its arrays are parts of those."""
-        known, nails = self._known, self._nail_planes()
+        known = self._known
         firsts = known.places.first.tolist()
         palm_used, used = arrays.palm_utilisations.tolist(), arrays.utilisations.tolist()
         found, tiles, moments = [], len(arrays.loads), arrays.palm_moments
@@ -179,20 +179,14 @@ class LoadRecovery:
                     closures=hand.closures,
                     space=space,
                     laws=hand.loads,
-                    nail_planes=nails.get(h, {}),
+                    nail_planes={
+                        t: hand.nail_limits(t)
+                        for t, tile in enumerate(hand.tiles)
+                        if tile.contact == NAIL
+                    },
                 )
             )
         return tuple(found)
-
-    def _nail_planes(self) -> dict[int, dict[int, tuple[HalfPlane, ...]]]:
-        """Return the limits of nails that hook, by hand and tile."""
-        places = self._known.places
-        found: dict[int, dict[int, tuple[HalfPlane, ...]]] = {}
-        for t in self._layout.hooked.tolist():
-            h = int(places.hand[t])
-            tile = t - int(places.first[h])
-            found.setdefault(h, {})[tile] = self._known.hands[h].nail_limits(tile)
-        return found
 
 
 def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -12,61 +12,18 @@ from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
 from planner.result.hand_plan import HandPlan
+from planner.result.plain_parts import (
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Solver,
+    TensionPath,
+    Time,
+)
 
-__all__ = [
-    "Certificate",
-    "LimitName",
-    "Plan",
-    "Price",
-    "RobustLoadFactor",
-    "SolverInfo",
-    "Status",
-    "TensionPath",
-    "Times",
-]
+__all__ = ["Certificate", "Plan", "Status"]
 
 Status = Literal["optimal", "overloaded", "infeasible", "failed"]
-
-
-class LimitName(NamedTuple):
-    """A limit of one hand, by name.
-
-    Attributes
-    ----------
-    limb : str
-    finger, phalanx : str or None
-        None where the limit is not a finger's, or not a tile's.
-    limit : str
-        What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
-        ``motor_torque``, ``motor_current``, ``finger_shear`` and, with its distal phalanx,
-        ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``, ``hand_load`` and, where
-        it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard row's name.
-    joint : str or None
-        The joint whose torque it is.
-    """
-
-    limb: str
-    finger: str | None
-    phalanx: str | None
-    limit: str
-    joint: str | None = None
-
-
-class Price(NamedTuple):
-    """A limit that binds, and what one more unit of it would take off the utilisation.
-
-    Attributes
-    ----------
-    name : LimitName
-    price : float
-        [1/unit]
-    unit : str
-        Of the limit's capacity: ``N``, ``N·m`` or ``A``.
-    """
-
-    name: LimitName
-    price: float
-    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,82 +88,6 @@ class Certificate:
     spaces: Mapping[str, WrenchSpace]
 
 
-@dataclass(frozen=True)
-class SolverInfo:
-    """Which solver ended how."""
-
-    name: str
-    status: str
-    iterations: int
-
-
-@dataclass(frozen=True)
-class Times:
-    """Where the time went [s]."""
-
-    model: float
-    solve: float
-    total: float
-
-
-@dataclass(frozen=True)
-class TensionPath:
-    """The straight way from the present tensions to the planned ones.
-
-    Attributes
-    ----------
-    safe : bool
-        Whether every point of it balances the body within the cap on the utilisation, hard rows
-        giving by 1 mN.
-    safe_part : float
-        How much of it does, from the plan backward; zero where the plan itself does not.
-    utilisation_at_present : float or None
-        The least at the present tensions; None if these balance the body at no utilisation.
-    largest_change : float
-        Of a tension [N].
-    limiting : tuple of LimitName
-        The limits and hard rows that end the safe part, the weightiest first; of a plan beyond the
-        cap those of which it uses most. Empty where the way is safe.
-    """
-
-    safe: bool
-    safe_part: float
-    utilisation_at_present: float | None
-    largest_change: float
-    limiting: tuple[LimitName, ...]
-
-
-class RobustLoadFactor(NamedTuple):
-    """The load factor where the hands are not quite where they were put.
-
-    All hands are closed anew at random places about their own, each drawn apart. H stays in W, so
-    that body and joints stay, too: it is the rock that is elsewhere.
-
-    Attributes
-    ----------
-    draws, without : int
-        Draws, and those of them in which a hand cannot be, or there is no load factor.
-    refused : mapping of str to int
-        In how many draws a hand cannot be, by limb; those that always can are left out.
-    position, angle : float
-        The scatter: to either side along each axis of H [m], and about each [rad].
-    seed : int
-        Of the draws.
-    worst, tenth : float or None
-        The least in the other draws, and what it exceeds in nine in ten of them; None if there are
-        none.
-    """
-
-    draws: int
-    without: int
-    refused: Mapping[str, int]
-    position: float
-    angle: float
-    seed: int
-    worst: float | None
-    tenth: float | None
-
-
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The answer. A value that does not exist for a status is None.
@@ -250,8 +131,8 @@ class Plan:
     warnings : tuple of str
         What is odd about the stance: hands that touch nothing, or are out of reach. What a deadline
         has left unfinished.
-    solver : SolverInfo
-    time : Times
+    solver : Solver
+    time : Time
     unfinished : tuple of str
         What a deadline has left unfinished, by name: see `planner.deadline.unfinished`. Values that
         are missing for it are None.
@@ -279,8 +160,8 @@ class Plan:
     verified: bool
     reason: str
     warnings: tuple[str, ...]
-    solver: SolverInfo
-    time: Times
+    solver: Solver
+    time: Time
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
 

@@ -11,7 +11,7 @@ from hand_models.base import Array
 from hand_models.tendon import TendonDrive
 from planner.result.plan import Status
 
-__all__ = ["SetPointSource", "SetPoints", "no_set_points"]
+__all__ = ["SetPointSource", "SetPoints"]
 
 SetPointSource = Literal["interpolated", "blended", "solved"]
 
@@ -26,6 +26,8 @@ class SetPoints:
         As of a plan. Without a plan, all numbers but the wrench are None.
     body_wrench : ndarray, shape (6,)
         The one asked for, in B [N, N·m].
+    verified : bool
+        Whether the independent check passed, or the proof that there is no plan.
     utilisation : float or None
         The largest of all limits.
     gap : float or None
@@ -36,8 +38,6 @@ class SetPoints:
         Of hands on the rock, in H [N, N·m].
     loads : ndarray, shape (hands, m), or None
         y: `WrenchStream.columns` of each hand, then zeros [N].
-    verified : bool
-        Whether the independent check passed, or the proof that there is no plan.
     source : {'interpolated', 'blended', 'solved'}
         Mixed from plans known before; solved for this wrench alone; or a mixture of both.
     drive : TendonDrive or None
@@ -50,13 +50,13 @@ class SetPoints:
 
     status: Status
     body_wrench: Array
-    utilisation: float | None
-    gap: float | None
-    tensions: Array | None
-    wrenches: Array | None
-    loads: Array | None
     verified: bool
-    source: SetPointSource
+    utilisation: float | None = None
+    gap: float | None = None
+    tensions: Array | None = None
+    wrenches: Array | None = None
+    loads: Array | None = None
+    source: SetPointSource = "solved"
     drive: TendonDrive | None = None
     winches: Array | None = None
     reason: str | None = None
@@ -82,9 +82,3 @@ class SetPoints:
         if self.tensions is None or self.drive is None:
             return None
         return self.tensions * self.drive.current_per_newton + self.drive.no_load_current
-
-
-def no_set_points(status: Status, wrench: Array, reason: str, *, verified: bool) -> SetPoints:
-    """Return the answer where there is no plan."""
-    none = (None,) * 5
-    return SetPoints(status, wrench, *none, verified=verified, source="solved", reason=reason)

@@ -36,10 +36,10 @@ from planner.result import (
     LimitName,
     Plan,
     Price,
-    SolverInfo,
+    Solver,
     Status,
     TensionPath,
-    Times,
+    Time,
 )
 from planner.solving import dual_bounds
 from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
@@ -70,7 +70,7 @@ def explained_plan(
     found: Solution,
     proof: Certificate | None,
     factor: FoundFactor,
-    times: Times,
+    times: Time,
     start: float,
 ) -> Plan:
     """Return the plan, verified and explained.
@@ -83,7 +83,7 @@ def explained_plan(
     proof : Certificate or None
         That there is no balance.
     factor : FoundFactor
-    times : Times
+    times : Time
         Of what came before.
     start : float
         When all began, on the clock of `time.perf_counter`.
@@ -128,8 +128,8 @@ def explained_plan(
             *checks.oddities,
             *_warnings(prepared, found, factor, told, unfinished),
         ),
-        solver=SolverInfo(SOLVER, found.outcome.status, found.outcome.iterations),
-        time=Times(times.model, times.solve, time.perf_counter() - start),
+        solver=Solver(SOLVER, found.outcome.status, found.outcome.iterations),
+        time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=unfinished,
         robust=robust,
     )
@@ -282,7 +282,7 @@ def _prices(
     if most is not None and most.utilisation > read.utilisation + SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
-        return (Price(most.name, price, unit_of(most.name.limit)),)
+        return (Price.of(most.name, price, unit_of(most.name.limit)),)
     return binding.prices(found.outcome.value)
 
 

@@ -10,7 +10,7 @@ from planner.deadline import Budget, Overlap
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.question import Question
-from planner.result import Plan, Times
+from planner.result import Plan, Time
 from planner.solving.effort import solve_effort
 from planner.solving.explained import explained_plan
 from planner.solving.fixed import solve_fixed
@@ -76,7 +76,7 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
     if "load_factor" in question.want:
         factor = find_load_factor(prepared, found, ready.idle, budget)
     solved = time.perf_counter()
-    times = Times(modelled - start, solved - modelled, 0.0)
+    times = Time(modelled - start, solved - modelled, 0.0)
     return explained_plan(prepared, ready, found, proof, factor, times, start)
 
 

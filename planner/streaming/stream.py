@@ -25,7 +25,7 @@ from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from planner.programs import SLACK
 from planner.question import Question, checked_body_wrench
-from planner.result import SetPoints, SetPointSource, no_set_points
+from planner.result import SetPoints, SetPointSource
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
 from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
@@ -214,7 +214,7 @@ class WrenchStream:
         """Return what a whole plan says of a wrench that the solver has no plan for."""
         for proof in self._proofs:
             if float(proof.direction @ wrench) > proof.most:
-                return no_set_points("infeasible", wrench, NO_PLAN, verified=True)
+                return SetPoints("infeasible", wrench, verified=True, reason=NO_PLAN)
         plan = self._stance.plan(wrench)
         if plan.hands is not None and plan.utilisation is not None:
             # of the nearest wrench that can be had: a hair off, by rounding
@@ -226,5 +226,5 @@ class WrenchStream:
         found = self._stance.proof(plan)
         if plan.status == "infeasible" and found is not None:
             self._proofs = [found, *self._proofs][:PROOFS]
-            return no_set_points("infeasible", wrench, plan.reason, verified=True)
-        return no_set_points("failed", wrench, plan.reason, verified=False)
+            return SetPoints("infeasible", wrench, verified=True, reason=plan.reason)
+        return SetPoints("failed", wrench, verified=False, reason=plan.reason)

@@ -6,8 +6,8 @@ from .dispatch import (
     handle as handle,
     plan as plan,
     planned as planned,
-    wrench_space as wrench_space,
 )
+from .hand_spaces import wrench_space as wrench_space
 from .mesh_files import MeshFiles as MeshFiles
 from .own_hand import read_hand as read_hand, with_hand as with_hand
 from .own_robot import (

@@ -10,10 +10,9 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from planner.capability import COMPONENTS, BodySection, BodySpace, End
-from planner.result import LimitName
+from planner.result import Time
 from service import replies
-from service.answering.answers import limit_reply
-from service.answering.hand_answers import placed_poses, vector
+from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
@@ -55,7 +54,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     """
     start = time.perf_counter()
     directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]
-    asked = question(_plan_request(request), robots)
+    asked = question(told(PlanRequest, request, deadline=None), robots)
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)
@@ -71,14 +70,13 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     turning = _accelerations(space, dict(_axes(6))) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
-    reply = BodySpaceReply(
+    reply = told(
+        BodySpaceReply,
+        space.plan,
         poses=placed_poses(asked.stance),
         id=request.id,
         robot=asked.stance.robot.name,
-        status=space.plan.status,
-        reason=space.plan.reason,
-        body_wrench=vector(space.needed),
-        utilisation=space.plan.utilisation,
+        body_wrench=plain(space.needed),
         exact=space.exact,
         linearisation_error=error,
         error=error,
@@ -87,22 +85,10 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         acceleration=linear,
         angular_acceleration=turning,
         along=None if linear is None else [one for one in along if one is not None],
-        time=replies.Time(modelled - start, ended - modelled, ended - start),
+        time=Time(modelled - start, ended - modelled, ended - start),
         warnings=[*space.plan.warnings, *_warnings(space, linear is not None, error)],
     )
     return Explored(space, section, reply)
-
-
-def _plan_request(request: BodySpaceRequest) -> PlanRequest:
-    """Return the plan request with the same stance, load and limits."""
-    return PlanRequest(
-        v=1,
-        stance=request.stance,
-        body_wrench=request.body_wrench,
-        load=request.load,
-        limits=request.limits,
-        present=request.present,
-    )
 
 
 def _unit(given: Sequence[float], field: str) -> Array:
@@ -126,20 +112,15 @@ def _capability(more: End | None, pure: End | None, extent: End | None) -> repli
         more=None if more is None else max(more.reach, 0.0),
         pure=None if pure is None else pure.reach,
         extent=None if extent is None else extent.reach,
-        limiting=None if end is None else _limit(end.limiting),
+        limiting=None if end is None else end.limiting,
     )
 
 
 def _section(section: BodySection) -> replies.BodySection:
     polygon = section.polygon
-    return replies.BodySection(
-        axes=list(section.axes),
-        others=section.others,
-        inner=[] if polygon is None else [vector(corner) for corner in polygon.inner],
-        outer=[] if polygon is None else [vector(corner) for corner in polygon.outer],
-        gap=None if polygon is None else polygon.gap,
-        limiting=[] if polygon is None else [_limit(name) for name in polygon.limiting],
-    )
+    if polygon is None:
+        return told(replies.BodySection, section, inner=[], outer=[], gap=None, limiting=[])
+    return told(replies.BodySection, polygon, axes=list(section.axes), others=section.others)
 
 
 def _accelerations(
@@ -160,9 +141,9 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
     if end is None:
         return None
     return replies.Acceleration(
-        direction=vector(way[-3:]),
+        direction=plain(way[-3:]),
         acceleration=max(end.reach, 0.0),
-        limiting=_limit(end.limiting),
+        limiting=end.limiting,
     )
 
 
@@ -171,7 +152,3 @@ def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
         yield APPROXIMATE.format(error)
     if not moves:
         yield NOT_AT_REST if space.accelerates else NO_LOAD
-
-
-def _limit(name: LimitName | None) -> replies.LimitName | None:
-    return None if name is None else limit_reply(name)

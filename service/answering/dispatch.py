@@ -4,37 +4,24 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Final, NamedTuple
-
-import msgspec
-import numpy as np
+from typing import Any, Final, NamedTuple
 
 from hand_models.base import CruxError, InvalidInputError
-from hand_models.fixed_wrist import robustness, tension_limits
-from hand_models.hand import nearby_closures
 from hand_models.parameters import ParameterTable
-from planner import deadline, prepare, solving
+from planner import deadline, solving
 from planner.deadline import DeadlineError
 from planner.question import Question
-from planner.result import Plan, WristPlan
-from service.answering.answers import BOTH_WAYS, plan_reply, wrench_space_reply
+from planner.result import Plan
+from service.answering.answers import brief_plan_reply, plan_reply
 from service.answering.body_space import explore
-from service.answering.brief_plan import brief_plan_reply
 from service.answering.hand_answers import placed_poses
+from service.answering.hand_spaces import wrench_space
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_hand import over_default
 from service.answering.own_robot import ROBOTS, Robots
-from service.answering.questions import question, stance
-from service.answering.set_views import set_views
+from service.answering.questions import question
 from service.answering.streams import STREAMS, Streams
-from service.replies import (
-    BodySpaceReply,
-    BriefPlanReply,
-    PlanReply,
-    SetPointsReply,
-    StreamReply,
-    WrenchSpaceReply,
-)
+from service.replies import BriefPlanReply, PlanReply, Reply
 from service.requests import (
     BodySpaceRequest,
     PlanRequest,
@@ -59,11 +46,9 @@ __all__ = [
     "SERVICES",
     "Answer",
     "Planned",
-    "body_space",
     "handle",
     "plan",
     "planned",
-    "wrench_space",
 ]
 
 log = logging.getLogger(__name__)
@@ -128,87 +113,8 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     return Planned(asked, answer, reply)
 
 
-def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
-    """Answer a wrench-space request; parameters as for `plan`.
-
-    Raises
-    ------
-    InvalidInputError
-        If the request is impossible, or would cost too much.
-    """
-    asked = stance(request.stance, robots)
-    _mind_time()
-    hand = prepare.resting_hand(asked, request.limb)
-    _mind_time()
-    views = set_views(hand.space, request.want)
-    robust = None
-    if "robust" in (request.want or ()):
-        if hand.palm is not None:
-            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
-        robust = robustness(asked.robot.hand, hand.settled, BOTH_WAYS)
-    wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
-    reply = wrench_space_reply(
-        asked.robot.name,
-        request.limb,
-        hand.settled,
-        hand.space,
-        views,
-        tension_limits(hand.settled),
-        nearby_closures(hand.settled),
-        wrist,
-        robust,
-    )
-    reply.id = request.id
-    reply.poses = placed_poses(asked)
-    return reply
-
-
-def _mind_time() -> None:
-    deadline.check("the hand's wrench space was known")
-
-
-def body_space(request: BodySpaceRequest, robots: Robots = ROBOTS) -> BodySpaceReply:
-    """Answer a body-space request; parameters as for `plan`.
-
-    Raises
-    ------
-    InvalidInputError
-        If the request is impossible; the field is relative to it.
-    """
-    return explore(request, robots).reply
-
-
-def stream(
-    request: StreamRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
-) -> StreamReply:
-    """Declare a stream; parameters as for `handle`.
-
-    Raises
-    ------
-    InvalidInputError
-        If the request is impossible; the field is relative to it.
-    """
-    return streams.declare(request, robots)
-
-
-def set_points(
-    request: SetPointsRequest, robots: Robots = ROBOTS, streams: Streams = STREAMS
-) -> SetPointsReply:
-    """Answer a question to a stream; parameters as for `handle`.
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no such stream.
-    """
-    return streams.set_points(request)
-
-
 class _Service(NamedTuple):
-    """What is asked at a key, and who answers.
-
-    ``streams``: whether the answer is of one of the streams.
-    """
+    """What is asked at a key, and who answers, given the request, the robots and the streams."""
 
     request: (
         type[PlanRequest]
@@ -217,16 +123,17 @@ class _Service(NamedTuple):
         | type[StreamRequest]
         | type[SetPointsRequest]
     )
-    answer: Callable[..., msgspec.Struct]
-    streams: bool = False
+    answer: Callable[[Any, Robots, Streams], Reply]
 
 
 SERVICES: Final[dict[str, _Service]] = {
-    PLAN: _Service(PlanRequest, plan),
-    WRENCH_SPACE: _Service(WrenchSpaceRequest, wrench_space),
-    BODY_SPACE: _Service(BodySpaceRequest, body_space),
-    STREAM: _Service(StreamRequest, stream, streams=True),
-    SET_POINTS: _Service(SetPointsRequest, set_points, streams=True),
+    PLAN: _Service(PlanRequest, lambda asked, robots, _: plan(asked, robots)),
+    WRENCH_SPACE: _Service(
+        WrenchSpaceRequest, lambda asked, robots, _: wrench_space(asked, robots)
+    ),
+    BODY_SPACE: _Service(BodySpaceRequest, lambda asked, robots, _: explore(asked, robots).reply),
+    STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
+    SET_POINTS: _Service(SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)),
 }
 """By the last part of the key."""
 
@@ -278,24 +185,21 @@ def handle(
             request = files.whole(request)
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
-        about = (request, robots, streams) if service.streams else (request, robots)
         with deadline.within(request.deadline, started=started):
             deadline.check("an answer was begun")
-            reply = service.answer(*about)
+            reply = service.answer(request, robots, streams)
         status: str = getattr(reply, "status", "done")
         return Answer(form.encode(reply), form.label(reply), True, status)
-    except InvalidInputError as error:
-        told = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        coded = encode_error(told, error, form, identifier(payload, form, kind))
-        return Answer(*coded, False, told)
-    except DeadlineError as error:
-        coded = encode_error(error.kind, error, form, identifier(payload, form, kind))
-        return Answer(*coded, False, error.kind)
+    except (InvalidInputError, DeadlineError) as error:
+        excuse: CruxError = error
+        known = error.kind in (*REQUEST_KINDS, DeadlineError.kind)
+        blame = error.kind if known else InvalidInputError.kind
     except MemoryError:
         # of a process, not of a question: who runs the process has to know
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        coded = encode_error("internal", excuse, form, identifier(payload, form, kind))
-        return Answer(*coded, False, "internal")
+        blame = "internal"
+    coded = encode_error(blame, excuse, form, identifier(payload, form, kind))
+    return Answer(*coded, False, blame)

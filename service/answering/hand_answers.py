@@ -1,15 +1,16 @@
-"""Hands in replies: who carries what in each finger, where the hold is, and its wrench space."""
+"""From the planner's numbers to plain ones, and the hands of replies that are made of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 import numpy as np
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Struct, UnsetType
 
-from hand_models.base import Array, Pose
-from hand_models.hand import FINGERS, Seating
-from hand_models.tile import HalfPlane
+from hand_models.base import Pose
+from hand_models.hand import Seating
 from hand_models.wrench_spaces import WrenchSpace
 from planner.question import Stance
 from planner.result import HandPlan, WristPlan
@@ -18,101 +19,56 @@ from service import replies
 __all__ = [
     "hand_reply",
     "placed_poses",
+    "plain",
     "seating_reply",
-    "vector",
-    "vectors",
+    "told",
     "wrench_set_reply",
     "wrist_reply",
 ]
 
+S = TypeVar("S", bound=Struct)
+
+
+def told(kind: type[S], source: object, **own: object) -> S:
+    """Return a message with an object's attributes, plain, as its fields, but for fields given."""
+    names = (name for name in kind.__struct_fields__ if name not in own and hasattr(source, name))
+    return kind(**{name: plain(getattr(source, name)) for name in names}, **own)
+
+
+def plain(value: Any) -> Any:
+    """Return a value as it travels: arrays and tuples as lists, without numbers of numpy's.
+
+    What is infinite does not exist.
+    """
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (tuple, list)):
+        return [plain(each) for each in value]
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    return value
+
 
 def hand_reply(part: HandPlan, model: bool) -> replies.Hand:
     """Return a hand of a plan as a reply has it, with its wrench space if ``model``."""
-    palm = part.palm
-    return replies.Hand(
-        limb=part.limb,
-        wrench=vector(part.wrench),
-        fingers=_fingers(part, model),
-        palm=replies.Palm(
-            position=vector(palm.position),
-            force=vector(palm.force),
-            moment=vector(palm.moment),
-            engaged=[int(tile) for tile in palm.engaged],
-            utilisation=float(palm.utilisation),
-        ),
-        utilisation=float(part.utilisation),
+    return told(
+        replies.Hand,
+        part,
+        fingers=part.finger_by_finger(model=model),
+        palm=told(replies.Palm, part.palm),
         seating=seating_reply(part.seating),
         wrist=wrist_reply(part.wrist),
         wrench_space=wrench_set_reply(part.space) if model else UNSET,
     )
 
 
-def _fingers(part: HandPlan, model: bool) -> list[replies.Finger]:
-    """Return a hand's fingers, from its arrays as a whole."""
-    numbers = (part.loads, part.positions, part.forces, part.axes, part.tile_utilisations)
-    columns = zip(part.tiles, *(array.tolist() for array in numbers), strict=True)
-    tiles: dict[str, list[replies.Tile]] = {name: [] for name in FINGERS}
-    for (finger, phalanx, contact), load, position, force, axes, used in columns:
-        tiles[finger].append(
-            replies.Tile(
-                phalanx=phalanx,
-                contact=contact,
-                position=position,
-                force=force,
-                shear=load[0],
-                normal=load[1],
-                lateral=load[2],
-                shear_axis=axes[0],
-                normal_axis=axes[1],
-                lateral_axis=axes[2],
-                utilisation=used,
-            )
-        )
-    if model:
-        _add_models(part, [tile for own in tiles.values() for tile in own])
-    drives = zip(FINGERS, part.closures, part.tensions.tolist(), *part.drives.tolist(), strict=True)
-    return [
-        replies.Finger(
-            name=name,
-            closure=closure,
-            tendon_tension=tension,
-            motor_torque=torque,
-            motor_current=current,
-            winch_angle=angle,
-            tiles=tiles[name],
-        )
-        for name, closure, tension, torque, current, angle in drives
-    ]
-
-
-def _add_models(part: HandPlan, tiles: Sequence[replies.Tile]) -> None:
-    """Give tiles, in their hand's order, their load laws and half-planes."""
-    laws = None if part.laws is None else part.laws.transpose(0, 2, 1).tolist()
-    for t, tile in enumerate(tiles):
-        if laws is not None:
-            tile.load_at_zero, tile.load_per_newton = laws[t]
-        tile.half_planes = [row for plane in part.limits_of(t) for row in _both_signs(plane)]
-
-
 def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
     """Return how a wrist is; none for one that is fixed."""
-    if wrist is None:
-        return replies.Wrist(mode="fixed")
-    return replies.Wrist(
-        mode="floating",
-        twist=vector(wrist.twist),
-        palm=wrist.palm,
-        rounds=wrist.rounds,
-        error=float(wrist.error),
-    )
-
-
-def _both_signs(plane: HalfPlane) -> list[list[float]]:
-    """Return ``a · (shear, normal, lateral) ≤ capacity`` for a lateral load of either sign."""
-    signs = (1.0, -1.0) if plane.a_lateral > 0.0 else (1.0,)
-    return [
-        [plane.a_shear, plane.a_normal, sign * plane.a_lateral, plane.capacity] for sign in signs
-    ]
+    return told(replies.Wrist, wrist, mode="fixed" if wrist is None else "floating")
 
 
 def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
@@ -122,12 +78,12 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
 
 
 def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(vector(pose.position), vector(pose.quaternion()))
+    return replies.PlacedFrame(plain(pose.position), plain(pose.quaternion()))
 
 
 def seating_reply(seating: Seating) -> replies.Seating:
     """Return where a hold is in H."""
-    return replies.Seating(seating.rule, _frame(seating.pose), seating.backed_off)
+    return told(replies.Seating, seating, pose=_frame(seating.pose))
 
 
 def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
@@ -138,19 +94,16 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
         np.concatenate([space.s, space.h]),
     )
     return replies.WrenchSet(
-        origin=vector(space.origin),
+        origin=plain(space.origin),
         generators=[
             replies.Generator(name, column)
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[
-            replies.Row(
+            told(
+                replies.Row,
+                row,
                 name=row.label,
-                kind=row.kind,
-                finger=row.finger,
-                phalanx=row.phalanx,
-                limit=row.limit,
-                joint=row.joint,
                 coefficients=coefficients,
                 constant=constant,
                 capacity=capacity,
@@ -160,13 +113,3 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
             )
         ],
     )
-
-
-def vector(values: Array) -> list[float]:
-    """Return an array as it travels."""
-    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]
-
-
-def vectors(values: Array) -> list[list[float]]:
-    """Return rows as plain numbers."""
-    return np.asarray(values, dtype=float).tolist()  # type: ignore[no-any-return]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from hashlib import blake2b
 from typing import Final, NamedTuple, overload
 
@@ -14,7 +15,7 @@ from hand_models.parameters import ParameterTable
 from hand_models.rock import Mesh, Profile
 from service import requests
 
-__all__ = ["Rocks", "SharedRock", "placed", "pose_of", "rocks_of"]
+__all__ = ["Rocks", "SharedRock", "placed", "pose_of", "rocks_of", "within"]
 
 KEPT: Final = 8
 """Meshes that are kept, those asked for last: on the same object hands are found settled."""
@@ -33,6 +34,15 @@ class SharedRock(NamedTuple):
 Rocks = Mapping[str, SharedRock]
 
 
+@contextmanager
+def within(path: str) -> Iterator[None]:
+    """Put a path before the field of an error."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise error.within(path) from None
+
+
 def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
     """Return the rocks of a stance by name, each built once.
 
@@ -45,18 +55,15 @@ def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
     for name, each in message.rocks.items():
         if not name:
             raise InvalidInputError("a rock needs a name, got ''", field="rocks")
-        try:
+        with within(f"rocks.{name}"):
             if each.pose_in_hand is not None:
                 raise InvalidInputError(
                     "hands share this rock; give its pose, or pose_in_hand where a hand refers to "
                     "it",
                     field="pose_in_hand",
                 )
-            found[name] = SharedRock(
-                _hold(each, numbers, anywhere=True), pose_of(each.pose, "pose")
-            )
-        except InvalidInputError as error:
-            raise error.within(f"rocks.{name}") from None
+            hold = _hold(each, numbers, anywhere=True)
+            found[name] = SharedRock(hold, pose_of(each.pose, "pose"))
     return found
 
 
@@ -72,11 +79,9 @@ def placed(
     InvalidInputError
         If it is impossible, or refers to no rock; the field begins with ``hold``.
     """
-    try:
-        pose, in_hand = (
-            pose_of(message.pose, "pose"),
-            pose_of(message.pose_in_hand, "pose_in_hand"),
-        )
+    with within("hold"):
+        pose = pose_of(message.pose, "pose")
+        in_hand = pose_of(message.pose_in_hand, "pose_in_hand")
         if not isinstance(message, requests.RockReference):
             return _hold(message, numbers, anywhere), pose, in_hand
         if message.rock not in rocks:
@@ -88,8 +93,6 @@ def placed(
             if pose is None and not anywhere:
                 _check_seat(shared.hold)
         return shared.hold, pose, in_hand
-    except InvalidInputError as error:
-        raise error.within("hold") from None
 
 
 def _check_seat(shared: rock.Hold) -> None:
@@ -110,10 +113,8 @@ def pose_of(message: requests.Pose | None, field: str) -> Pose | None:
     """Return a pose, if there is one; raises what `Pose.from_quaternion` raises."""
     if message is None:
         return None
-    try:
+    with within(field):
         return Pose.from_quaternion(message.position, message.orientation)
-    except InvalidInputError as error:
-        raise error.within(field) from None
 
 
 def _hold(message: requests.Rock, numbers: ParameterTable, anywhere: bool = False) -> rock.Hold:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, Literal, cast, get_args
+from typing import Final, Literal, cast
 
 import msgspec
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, LimitError, Pose
 from hand_models.fixed_wrist import UP, approach_frame
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
@@ -20,8 +20,7 @@ from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.route import Move, Route
 from service import requests
-from service.answering.costs import check_costs
-from service.answering.holds import Rocks, placed, pose_of, rocks_of
+from service.answering.holds import Rocks, placed, pose_of, rocks_of, within
 from service.answering.own_robot import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]
@@ -29,21 +28,17 @@ __all__ = ["question", "route", "stance"]
 VERTICAL: Final = (0.0, 0.0, 1.0)
 """Up in W."""
 
+MOST_HALF_PLANES: Final = 256
+"""Of all hands of a stance: 64 each of four, some 7500 rows in a plan's program."""
+
+FLOATING: Final = 4
+"""How many times over a floating hand's half-planes count: its plan is found in several rounds."""
+
+MOST_POINTS: Final = 40_000
+"""Of the outlines of all hands of a stance, of some 0.1 ms each."""
+
 GRASPS: Final = 64
 """Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
-
-
-class _within:  # noqa: N801 (reads as the statement it makes)
-    """Put a path before the field of an error."""
-
-    def __init__(self, path: str) -> None:
-        self.path = path
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        if isinstance(error, InvalidInputError):
-            raise error.within(self.path) from None
 
 
 def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
@@ -64,11 +59,11 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
     return Question(
         stance=stance(request.stance, robots),
-        body_wrench=None if request.body_wrench is None else np.array(request.body_wrench),
+        body_wrench=_array(request.body_wrench),
         load=_load(request.load),
         limits=_limits(request.limits),
         want=frozenset(request.want),
-        objective=_objective(request.objective),
+        objective=cast(Objective, request.objective),
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
     )
@@ -92,7 +87,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies)),
         load=_load(request.load),
         limits=_limits(request.limits),
-        objective=_objective(request.objective),
+        objective=cast(Objective, request.objective),
     )
 
 
@@ -108,10 +103,10 @@ def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
 
 
 def _stance(message: requests.Stance, robots: Robots) -> tuple[Stance, Rocks]:
-    with _within("stance"):
-        check_costs(message)
+    with within("stance"):
+        _check_costs(message)
         build = builder_of(message.robot, robots)
-        with _within("hand"):
+        with within("hand"):
             own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
             robot = build(own)
         numbers = robot.hand.table
@@ -135,32 +130,16 @@ def _joints(
     return {limb: np.array(angles) for limb, angles in message.items()}
 
 
-def _objective(name: str) -> Objective:
-    for known in get_args(Objective):
-        if name == known:
-            return cast(Objective, known)
-    raise InvalidInputError(f"{name} is not supported", field="objective")
-
-
 def _load(message: requests.Load | None) -> Load:
-    message = message or requests.Load()
-    return Load(message.mass, message.com, message.acceleration, message.angular_acceleration)
+    return Load() if message is None else Load(**msgspec.structs.asdict(message))
 
 
 def _limits(message: requests.Limits) -> Limits:
-    torque: float | dict[str, float | tuple[float, ...]] | None
-    if isinstance(message.joint_torque, dict):
-        torque = {
-            limb: tuple(most) if isinstance(most, list) else most
-            for limb, most in message.joint_torque.items()
-        }
-    else:
-        torque = message.joint_torque
-    with _within("limits"):
+    with within("limits"):
         return Limits(
             utilisation=message.utilisation,
             tendon_tension=message.tendon_tension,
-            joint_torque=torque,
+            joint_torque=message.joint_torque,
             per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
             tension_change=message.tension_change,
         )
@@ -169,7 +148,7 @@ def _limits(message: requests.Limits) -> Limits:
 def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:
     given = message.largest_force
     most = tuple(_range(axis) for axis in given) if isinstance(given, list) else given
-    with _within(f"per_hand.{limb}"):
+    with within(f"per_hand.{limb}"):
         return ForceCap(most, message.frame)
 
 
@@ -181,7 +160,7 @@ def _range(axis: requests.AxisForce) -> tuple[float, float]:
 
 
 def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: str) -> HandOnHold:
-    with _within(path):
+    with within(path):
         grasp, surface = _grasp(message.grasp), _surface(message.surface)
         hold, hold_pose, hold_in_hand = placed(
             message.hold, numbers, rocks, anywhere=message.place is not None
@@ -207,14 +186,10 @@ def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: s
             at=at,
             grasp=grasp,
             wrist=message.wrist,
-            tendon_preload=None
-            if message.tendon_preload is None
-            else np.array(message.tendon_preload),
+            tendon_preload=_array(message.tendon_preload),
             wrench=message.wrench,
             seat=message.seat,
-            seat_direction=None
-            if message.seat_direction is None
-            else np.array(message.seat_direction),
+            seat_direction=_array(message.seat_direction),
         )
 
 
@@ -226,7 +201,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
         axes, point, up = from_world.rotation, from_world.apply(place.point), up or VERTICAL
     else:
         axes, point, up = np.eye(3), np.array(place.point), up or UP
-    with _within("place"):
+    with within("place"):
         return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
 
 
@@ -243,17 +218,59 @@ def _placed(kind: SpinyHand, hands: Sequence[HandOnHold], path: str) -> list[Han
 
 @lru_cache(maxsize=GRASPS)
 def _grasp(message: requests.Grasp) -> Grasp:
-    try:
+    with within("grasp"):
         return Grasp(**msgspec.structs.asdict(message))
-    except InvalidInputError as error:
-        raise error.within("grasp") from None
 
 
 def _surface(message: str | requests.Surface) -> Surface:
-    try:
+    with within("surface"):
         if isinstance(message, str):
             return Surface.named(message)
         given = msgspec.structs.asdict(message)
         return Surface.from_values({name: v for name, v in given.items() if v is not None})
-    except InvalidInputError as error:
-        raise error.within("surface") from None
+
+
+def _array(values: Sequence[float] | None) -> Array | None:
+    return None if values is None else np.array(values)
+
+
+# Costs --------------------------------------------------------------------------------------------
+
+
+def _check_costs(stance: requests.Stance) -> None:
+    """Refuse hands that would cost too much together.
+
+    Raises
+    ------
+    LimitError
+        The field is relative to the stance.
+    """
+    planes = sum(map(_half_planes, stance.hands))
+    if planes > MOST_HALF_PLANES:
+        raise LimitError(
+            f"half_planes of all hands are {planes} together, those of a floating hand counted "
+            f"{FLOATING} times; at most {MOST_HALF_PLANES} are worked with",
+            field="hands",
+        )
+    points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
+    if points > MOST_POINTS:
+        raise LimitError(
+            f"profiles of all hands have {points} points together; at most {MOST_POINTS} are "
+            "worked with",
+            field="hands",
+        )
+
+
+def _half_planes(hand: requests.Hand) -> int:
+    given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
+    return (FLOATING if hand.wrist == "floating" else 1) * (given or 1)
+
+
+def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:
+    """Return how many points the outlines of a hold have, those of a shared rock as its own."""
+    if isinstance(hold, requests.RockReference):
+        return _points(rocks[hold.rock], {}) if hold.rock in rocks else 0
+    if not isinstance(hold, requests.Profile):
+        return 0
+    strips = () if hold.profiles is None else msgspec.structs.astuple(hold.profiles)
+    return sum(map(len, strips)) + len(hold.points or ())

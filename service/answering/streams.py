@@ -8,14 +8,12 @@ import uuid
 from collections import OrderedDict
 from typing import Final
 
-from msgspec import UNSET
-
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner import deadline
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
-from service.answering.brief_plan import cut_reason
-from service.answering.hand_answers import placed_poses
+from service.answering.answers import BRIEF, cut_reason
+from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
@@ -50,14 +48,8 @@ def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
             "not for streams, whose tensions change with the wrench; leave it out",
             field="limits.tension_change",
         )
-    asked = PlanRequest(
-        v=1,
-        stance=request.stance,
-        body_wrench=request.body_wrench,
-        load=request.load,
-        limits=request.limits,
-    )
-    return WrenchStream(question(asked, robots), radius=request.radius)
+    asked = question(told(PlanRequest, request, deadline=None), robots)
+    return WrenchStream(asked, radius=request.radius)
 
 
 class Streams:
@@ -127,16 +119,14 @@ def _declared(identifier: str, stream: WrenchStream, name: str | None, start: fl
     deadline.check(FIRST)
     first = stream.set_points(stream.first)
     deadline.check(FIRST)
-    return StreamReply(
+    return told(
+        StreamReply,
+        first,
         id=name,
         poses=placed_poses(stream.question.stance),
         stream=identifier,
         radius=stream.interpolates,
-        status=first.status,
-        reason=first.reason,
         body_wrench=stream.first.tolist(),
-        utilisation=first.utilisation,
-        gap=first.gap,
         hands=[
             HandColumns(limb=limb, columns=list(columns))
             for limb, columns in zip(stream.limbs, stream.columns, strict=True)
@@ -167,39 +157,15 @@ def set_points_reply(
     brief = detail == "set_points"
     hands = None
     if points.tensions is not None:
-        assert points.motor_torque is not None
-        assert points.motor_current is not None
-        assert points.wrenches is not None
-        assert points.winch_angle is not None
-        hands = [
-            HandSetPoints(
-                limb=limb,
-                tensions=tensions,
-                winch_angle=angle,
-                motor_torque=UNSET if brief else torque,
-                motor_current=UNSET if brief else current,
-                wrench=UNSET if brief else wrench,
-            )
-            for limb, tensions, angle, torque, current, wrench in zip(
-                stream.limbs,
-                points.tensions.tolist(),
-                points.winch_angle.tolist(),
-                points.motor_torque.tolist(),
-                points.motor_current.tolist(),
-                points.wrenches.tolist(),
-                strict=True,
-            )
-        ]
-    return SetPointsReply(
+        columns = (points.tensions, points.winch_angle, points.motor_torque, points.motor_current)
+        rows = zip(stream.limbs, *plain((*columns, points.wrenches)), strict=True)
+        hands = [HandSetPoints(*row[: BRIEF if brief else None]) for row in rows]
+    return told(
+        SetPointsReply,
+        points,
         stream=identifier,
-        status=points.status,
         reason=cut_reason(points.reason) if brief and points.reason else points.reason,
-        body_wrench=points.body_wrench.tolist(),
-        utilisation=points.utilisation,
-        gap=points.gap,
         hands=hands,
-        verified=points.verified,
-        source=points.source,
         took=time.perf_counter() - start,
     )
 

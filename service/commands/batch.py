@@ -17,6 +17,7 @@ import msgspec
 
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
+from planner.result import Time
 from service.commands.interruption import Interrupted
 from service.commands.options import hand_option, json_option, robot_option
 from service.commands.terminal import (
@@ -32,7 +33,7 @@ from service.commands.terminal import (
     writing,
 )
 from service.processes import Answered, Planners, worth
-from service.replies import ErrorDetail, Time
+from service.replies import ErrorDetail
 from service.tables import console, table_of
 from service.wire import REQUEST_KINDS, Format, identifier
 

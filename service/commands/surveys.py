@@ -78,8 +78,7 @@ def print_survey(survey: Survey, out: Console) -> None:
 
 def _print_ends(survey: Survey, out: Console) -> None:
     """Print where the hand lets go along each axis."""
-    table = table_of("axis")
-    table.add_column("reach", justify="right")
+    table = table_of("axis", ">reach")
     for name in ("finger", "phalanx", "limit"):
         table.add_column(name)
     for name, end in zip(_names(), survey.ends, strict=True):
@@ -105,9 +104,7 @@ def failures_table(limiting: Sequence[Row | None]) -> Table:
     """Return how often each tile of each finger lets go first, and what is no finger's."""
     counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
     parts = [part for part in ORDER if any(finger and name == part for finger, name in counts)]
-    table = table_of("")
-    for name in (*parts, "all"):
-        table.add_column(name, justify="right")
+    table = table_of("", *(f">{name}" for name in (*parts, "all")))
     for finger in FINGERS:
         own = [counts[finger, part] for part in parts]
         table.add_row(finger, *(str(count or "-") for count in own), str(sum(own)))

@@ -4,13 +4,13 @@ from .body_space import (
     BodySection as BodySection,
     BodySpaceReply as BodySpaceReply,
 )
-from .brief_plan import BriefPlanReply as BriefPlanReply
 from .hand import (
-    Finger as Finger,
+    Generator as Generator,
     Hand as Hand,
     Palm as Palm,
+    Row as Row,
     Seating as Seating,
-    Tile as Tile,
+    WrenchSet as WrenchSet,
     Wrist as Wrist,
 )
 from .health import (
@@ -18,13 +18,10 @@ from .health import (
     LastFailure as LastFailure,
     ProcessHealth as ProcessHealth,
 )
-from .limits import LimitName as LimitName, Price as Price
 from .plan import (
+    BriefPlanReply as BriefPlanReply,
     Certificate as Certificate,
     PlanReply as PlanReply,
-    RobustLoadFactor as RobustLoadFactor,
-    Solver as Solver,
-    TensionPath as TensionPath,
 )
 from .reply import (
     AXES as AXES,
@@ -33,7 +30,6 @@ from .reply import (
     PlacedFrame as PlacedFrame,
     Reply as Reply,
     StanceReply as StanceReply,
-    Time as Time,
 )
 from .stream import (
     HandColumns as HandColumns,
@@ -41,7 +37,6 @@ from .stream import (
     SetPointsReply as SetPointsReply,
     StreamReply as StreamReply,
 )
-from .wrench_set import Generator as Generator, Row as Row, WrenchSet as WrenchSet
 from .wrench_space import (
     AxisCapability as AxisCapability,
     ClosingSequence as ClosingSequence,

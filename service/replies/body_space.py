@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from service.replies.limits import LimitName
-from service.replies.reply import StanceReply, Time, Vector
+from planner.result import LimitName, Time
+from service.replies.reply import StanceReply, Vector
 
 __all__ = [
     "Acceleration",

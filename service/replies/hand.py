@@ -4,55 +4,10 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
+from planner.result import Finger
 from service.replies.reply import PlacedFrame, Vector
-from service.replies.wrench_set import WrenchSet
 
-__all__ = [
-    "Finger",
-    "Hand",
-    "Palm",
-    "Seating",
-    "Tile",
-    "Wrist",
-]
-
-
-class Tile(Struct, kw_only=True):
-    """One finger tile. The last three fields come with ``"want": ["model"]``.
-
-    The first two of them only where the wrist is fixed.
-    """
-
-    phalanx: str
-    contact: str
-    position: Vector
-    force: Vector
-    shear: float
-    normal: float
-    lateral: float
-    shear_axis: Vector
-    normal_axis: Vector
-    lateral_axis: Vector
-    utilisation: float
-    load_at_zero: Vector | UnsetType = UNSET
-    load_per_newton: Vector | UnsetType = UNSET
-    half_planes: list[Vector] | UnsetType = UNSET
-
-
-class Finger(Struct, kw_only=True):
-    """One finger: its tendon, its motor while it tightens that, its tiles from the base outward.
-
-    ``closure``: how it has ended on its hold: ``laid``, ``hooked``, ``wedged``, ``curled``,
-    ``stopped`` or ``straight``. The winch's angle is from the open finger [rad].
-    """
-
-    name: str
-    closure: str
-    tendon_tension: float
-    motor_torque: float
-    motor_current: float
-    winch_angle: float
-    tiles: list[Tile]
+__all__ = ["Generator", "Hand", "Palm", "Row", "Seating", "WrenchSet", "Wrist"]
 
 
 class Palm(Struct, kw_only=True):
@@ -92,6 +47,43 @@ class Wrist(Struct, kw_only=True):
     palm: str | None = None
     rounds: int | None = None
     error: float | None = None
+
+
+class Generator(Struct):
+    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+
+    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    """
+
+    name: str
+    wrench: Vector
+
+
+class Row(Struct, kw_only=True):
+    """An inequality of a hand's wrench space.
+
+    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
+    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
+    ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
+    """
+
+    name: str
+    kind: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+    coefficients: Vector
+    constant: float
+    capacity: float
+
+
+class WrenchSet(Struct, kw_only=True):
+    """A hand's wrenches, origin + Σ y · generator, for the loads y that the rows allow."""
+
+    origin: Vector
+    generators: list[Generator]
+    rows: list[Row]
 
 
 class Hand(Struct, kw_only=True):

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from service.replies.hand import Hand
-from service.replies.limits import LimitName, Price
-from service.replies.reply import StanceReply, Time, Vector
-from service.replies.wrench_set import WrenchSet
+from planner.result import LimitName, Price, RobustLoadFactor, Solver, TensionPath, Time
+from service.replies.hand import Hand, WrenchSet
+from service.replies.reply import StanceReply, Vector
+from service.replies.stream import HandSetPoints
 
-__all__ = [
-    "Certificate",
-    "PlanReply",
-    "RobustLoadFactor",
-    "Solver",
-    "TensionPath",
-]
+__all__ = ["BriefPlanReply", "Certificate", "PlanReply"]
 
 
 class Certificate(Struct, kw_only=True):
@@ -45,51 +39,6 @@ class Certificate(Struct, kw_only=True):
     irreducible: list[LimitName] | None = None
     sufficient: list[LimitName] | None = None
     wrench_spaces: dict[str, WrenchSet] | UnsetType = UNSET
-
-
-class Solver(Struct):
-    """Which solver ended how."""
-
-    name: str
-    status: str
-    iterations: int
-
-
-class TensionPath(Struct, kw_only=True):
-    """The straight way from the present tensions to the planned ones.
-
-    ``safe_part``: how much of it balances the body within the cap on the utilisation, from the plan
-    backward. ``utilisation_at_present``: the least at the present tensions, null if these balance
-    the body at no utilisation. ``largest_change``: of a tension [N]. ``limiting``: the limits and
-    hard rows that end the safe part, the weightiest first; of a plan beyond the cap those of which
-    it uses most. Hard rows give by 1 mN on the way: no present tension is known better.
-    """
-
-    safe: bool
-    safe_part: float
-    utilisation_at_present: float | None
-    largest_change: float
-    limiting: list[LimitName] = []
-
-
-class RobustLoadFactor(Struct, kw_only=True):
-    """The load factor where the hands are not quite where they were put.
-
-    All closed anew in so many ``draws`` of their places, each drawn apart, to either side by at
-    most ``position`` along each axis of H [m] and ``angle`` about each [rad]; body, joints and H
-    stay, so it is the rock that is elsewhere. ``without``: in so many of them a hand cannot be, or
-    there is no load factor; ``refused``: in how many it cannot, by limb, where any. ``worst``: the
-    least in the others; ``tenth``: what it exceeds in nine in ten of them; null if there are none.
-    """
-
-    draws: int
-    without: int
-    refused: dict[str, int]
-    position: float
-    angle: float
-    seed: int
-    worst: float | None
-    tenth: float | None
 
 
 class PlanReply(StanceReply, kw_only=True):
@@ -131,3 +80,26 @@ class PlanReply(StanceReply, kw_only=True):
     warnings: list[str] = []
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
+
+
+class BriefPlanReply(StanceReply, kw_only=True):
+    """A plan with ``"detail"`` ``set_points`` or ``hands``: fields as of a plan's whole reply.
+
+    Those from ``body_wrench`` on, and ``poses``, are left out with ``set_points``; the ``reason``
+    is cut then. Of four hands that is less than 2,000 bytes of JSON, and less than 1,000 of
+    MessagePack, whatever the status, beside the request's ``id``.
+    """
+
+    status: str
+    reason: str
+    utilisation: float | None = None
+    limiting: LimitName | None = None
+    hands: list[HandSetPoints] | None = None
+    verified: bool
+    unfinished: list[str] = []
+    body_wrench: Vector | UnsetType = UNSET
+    load_factor: float | UnsetType | None = UNSET
+    load_factor_unbounded: bool | UnsetType = UNSET
+    joints: dict[str, Vector] | UnsetType | None = UNSET
+    warnings: list[str] | UnsetType = UNSET
+    time: Time | UnsetType = UNSET

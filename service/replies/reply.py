@@ -18,7 +18,6 @@ __all__ = [
     "PlacedFrame",
     "Reply",
     "StanceReply",
-    "Time",
     "Vector",
 ]
 
@@ -46,14 +45,6 @@ class StanceReply(Reply, kw_only=True):
     """A reply about a stance; ``poses``: H in W of hands that were given by a place on a rock."""
 
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
-
-
-class Time(Struct):
-    """Where the time went [s]."""
-
-    model: float
-    solve: float
-    total: float
 
 
 class ErrorDetail(Struct):

@@ -35,7 +35,7 @@ class StreamReply(StanceReply, kw_only=True):
     took: float
 
 
-class HandSetPoints(Struct, kw_only=True):
+class HandSetPoints(Struct):
     """What one hand is to do: tensions [N], motors [N·m, A], its wrench on the rock in H.
 
     ``winch_angle``: from the open finger [rad]. The hand's ``utilisation`` is only of a plan. With

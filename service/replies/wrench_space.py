@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from service.replies.hand import Seating, Wrist
+from service.replies.hand import Generator, Row, Seating, Wrist
 from service.replies.reply import StanceReply, Vector
-from service.replies.wrench_set import Generator, Row
 
 __all__ = [
     "AxisCapability",
@@ -21,7 +20,7 @@ __all__ = [
 ]
 
 
-class Contact(Struct, kw_only=True):
+class Contact(Struct):
     """Where a finger tile meets the rock, and the axes of its loads.
 
     ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``

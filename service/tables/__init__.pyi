@@ -2,8 +2,8 @@ from .body_spaces import print_body_space as print_body_space
 from .plans import (
     console as console,
     print_plan as print_plan,
+    print_robust as print_robust,
     print_wrench_space as print_wrench_space,
     table_of as table_of,
 )
-from .robust import print_robust as print_robust
 from .routes import print_route as print_route

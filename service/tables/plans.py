@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from rich import box
@@ -12,24 +12,27 @@ from rich.markup import escape
 from rich.table import Table
 
 from planner.explanation import constraint_words
-from planner.result import LimitName as PlannedLimit
+from planner.result import LimitName, Price, RobustLoadFactor, TensionPath
 from service.replies import (
     AXES,
     AxisCapability,
     Certificate,
     ClosingSequence,
-    Finger,
     Hand,
-    LimitName,
     PlanReply,
-    Price,
-    RobustLoadFactor,
-    TensionPath,
-    Tile,
+    RobustCapability,
     WrenchSpaceReply,
 )
 
-__all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
+__all__ = [
+    "console",
+    "print_plan",
+    "print_robust",
+    "print_wrench_space",
+    "show",
+    "table_of",
+    "unit_of",
+]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
@@ -86,24 +89,24 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     if isinstance(reply.robust, RobustLoadFactor):
         out.print(_robust_sentence(reply.robust), markup=False)
     if reply.hands is not None:
-        _show(
+        show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
         )
         floating = [hand for hand in reply.hands if hand.wrist.twist is not None]
         if floating:
             title = "where floating wrists go (mm, mrad), and how their palms carry"
-            _show(title, _wrist_table(floating), out)
+            show(title, _wrist_table(floating), out)
         title = "tendons and their motors, and each finger's most loaded tile"
-        _show(title, _tendon_table(reply.hands), out)
+        show(title, _tendon_table(reply.hands), out)
     if reply.joint_torque is not None and reply.joint_torque_limit is not None:
         title = "joint torques [N·m], from the body outward; * most of its limit"
-        _show(title, _joint_table(reply.joint_torque, reply.joint_torque_limit), out)
+        show(title, _joint_table(reply.joint_torque, reply.joint_torque_limit), out)
     for prices, what in ((reply.prices, "utilisation"), (reply.effort_prices, "effort")):
         if prices:
             title = f"what one unit more of a limit would take off the {what}"
             if len(prices) > MOST_PRICES:
                 title += f" ({MOST_PRICES} of {len(prices)})"
-            _show(title, _price_table(prices[:MOST_PRICES]), out)
+            show(title, _price_table(prices[:MOST_PRICES]), out)
     if reply.certificate is not None:
         _print_certificate(reply.certificate, reply.body_wrench, out)
 
@@ -117,7 +120,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     out.print(f"hold seated by rule {reply.seating.rule}{backed}, its origin in H ({seat}) mm")
     if reply.wrist.error is not None:
         _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
-    _show(
+    show(
         "contacts, and the tendon tension [N] at which each part was at rest",
         _closing_table(reply),
         out,
@@ -125,27 +128,39 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     for closing in reply.closing:
         if closing.nearby or closing.nearby_turn > NEARLY:
             out.print(_nearby_sentence(closing))
-    tensions = table_of("finger", "phalanx")
-    tensions.add_column("f_t(max) N", justify="right")
+    tensions = table_of("finger", "phalanx", ">f_t(max) N")
     for limit in reply.tension_limits:
         tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
         tensions.add_row(limit.finger, limit.phalanx or "-", tension)
-    _show("tendon tension at which the finger's first tile lets go", tensions, out)
+    show("tendon tension at which the finger's first tile lets go", tensions, out)
     if reply.capability is None:
         out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
         return
-    counts = []
-    if reply.vertices is not None:
-        counts.append(f"{len(reply.vertices)} vertices")
-    if reply.half_spaces is not None:
-        counts.append(f"{len(reply.half_spaces.offsets)} half-spaces")
-    if reply.dimension is not None:
-        counts.append(f"dimension {reply.dimension}")
+    faces = None if reply.half_spaces is None else reply.half_spaces.offsets
+    listed = ((reply.vertices, "vertices"), (faces, "half-spaces"))
+    counts = [f"{len(each)} {name}" for each, name in listed if each is not None]
+    counts += [] if reply.dimension is None else [f"dimension {reply.dimension}"]
     if counts:
         out.print(", ".join(counts))
     for warning in reply.warnings:
         out.print(warning, markup=False)
     _print_capability(reply.capability, out)
+
+
+def print_robust(robust: RobustCapability, out: Console) -> None:
+    """Print what is left of each component where the hand is a little elsewhere."""
+    names = ("worst least", "worst most", "9 in 10 least", "9 in 10 most")
+    table = table_of("axis", *(f">{name}" for name in names))
+    for axis in AXES:
+        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
+        table.add_row(f"{axis} {unit_of(axis)}", *_ends_of(ends))
+    title = (
+        f"what is left of that at {robust.draws - robust.without} of {robust.draws} places "
+        f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
+    )
+    show(title, table, out)
+    if robust.without:
+        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing")
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
@@ -161,17 +176,13 @@ def _print_floating(palm: str, error: float, out: Console) -> None:
 def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
     """Print the least and the most of each component, and those of it alone if there are any."""
     with_pure = any(end.pure is not None for end in capability.values())
-    reaches = table_of("axis")
-    for name in ("least", "most", *(("pure least", "pure most") if with_pure else ())):
-        reaches.add_column(name, justify="right")
+    pure = (">pure least", ">pure most") if with_pure else ()
+    reaches = table_of("axis", ">least", ">most", *pure)
     for axis in AXES:
         less, more = capability[f"-{axis}"], capability[f"+{axis}"]
-        unit = "N" if axis.startswith("f") else "N·m"
-        cells = [-less.extent, more.extent]
-        pure = [None if less.pure is None else -less.pure, more.pure] if with_pure else []
-        shown = ("-" if cell is None else _fixed(cell, 2) for cell in (*cells, *pure))
-        reaches.add_row(f"{axis} {unit}", *shown)
-    _show("wrenches on the rock along the axes of H", reaches, out)
+        ways = [(less.extent, more.extent), (less.pure, more.pure)][: 1 + with_pure]
+        reaches.add_row(f"{axis} {unit_of(axis)}", *_ends_of(ways))
+    show("wrenches on the rock along the axes of H", reaches, out)
     out.print("least, most: with whatever else the hand can carry")
     if with_pure:
         out.print("pure: with every other component zero; -: none")
@@ -186,17 +197,15 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
         where = "at any utilisation"
         if proof.utilisation is not None:
             where = f"up to a utilisation of {proof.utilisation:g}"
-        table = table_of("")
-        for axis in AXES:
-            table.add_column(axis, justify="right")
+        table = table_of("", *(f">{axis}" for axis in AXES))
         parts = {"needed": needed, "nearest held": proof.nearest, "missing": proof.shortfall}
         for name, wrench in parts.items():
-            table.add_row(name, *(_fixed(value, 1) for value in wrench))
-        _show(f"body wrenches {where}, in B [N, N·m]", table, out)
+            table.add_row(name, *(f"{value:z.1f}" for value in wrench))
+        show(f"body wrenches {where}, in B [N, N·m]", table, out)
     if proof.irreducible:
         title = "these leave no balance, each needed for that; others may be in the way, too"
-        _show(title, _barrier_table(proof.irreducible), out)
-        words = {name.limit: constraint_words(_planned(name)) for name in proof.irreducible}
+        show(title, _barrier_table(proof.irreducible), out)
+        words = {name.limit: constraint_words(name) for name in proof.irreducible}
         for limit, said in words.items():
             out.print(f"{limit}: {said}", markup=False)
         if proof.sufficient is not None:
@@ -236,25 +245,18 @@ def _barrier_table(names: Iterable[LimitName]) -> Table:
     return table
 
 
-def _planned(name: LimitName) -> PlannedLimit:
-    return PlannedLimit(name.limb, name.finger, name.phalanx, name.limit, name.joint)
-
-
 def _closing_table(reply: WrenchSpaceReply) -> Table:
     """Return what of each finger touches, and when it stopped moving."""
-    table = table_of("finger", "base")
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
-    for part in (stage.part for stage in reply.closing[0].stages):
-        table.add_column(part, justify="right")
+    table = table_of("finger", "base", *(f">{stage.part}" for stage in reply.closing[0].stages))
     table.add_column("ends")
     for closing in reply.closing:
         cells = [
             f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
             for stage in closing.stages
         ]
-        table.add_row(
-            closing.finger, kinds.get((closing.finger, "base"), ""), *cells, closing.closure
-        )
+        base = kinds.get((closing.finger, "base"), "")
+        table.add_row(closing.finger, base, *cells, closing.closure)
     return table
 
 
@@ -294,57 +296,64 @@ def _robust_sentence(robust: RobustLoadFactor) -> str:
     )
 
 
-def _fixed(value: float, digits: int) -> str:
-    """Return a number without the sign of a zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
-def _show(title: str, table: Table, out: Console) -> None:
+def show(title: str, table: Table, out: Console) -> None:
+    """Print a table under its title."""
     out.print(f"\n[bold]{title}[/bold]")
     out.print(table)
 
 
 def table_of(*names: str) -> Table:
-    """Return a table with left-justified columns of names."""
+    """Return a table with columns of names; those that begin with ``>`` are of numbers."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in names:
-        table.add_column(name, no_wrap=True)
+        if name.startswith(">"):
+            table.add_column(name[1:], justify="right")
+        else:
+            table.add_column(name, no_wrap=True)
     return table
 
 
+def unit_of(axis: str) -> str:
+    """Return the unit of a component of a wrench."""
+    return "N" if axis.startswith("f") else "N·m"
+
+
+def _ends_of(ways: Iterable[tuple[float | None, float | None]]) -> Iterator[str]:
+    """Yield the least and the most that follow from how far sets reach backward and forward."""
+    for pair in ways:
+        for sign, end in zip((-1.0, 1.0), pair, strict=True):
+            yield "-" if end is None else f"{sign * end:z.2f}"
+
+
 def _hand_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand")
-    for name in (*AXES, "hand\nutil", "palm\nshear", "palm\npress"):
-        table.add_column(name, justify="right")
+    parts = ("hand\nutil", "palm\nshear", "palm\npress")
+    table = table_of("hand", *(f">{name}" for name in (*AXES, *parts)))
     for hand in hands:
-        force = hand.palm.force
-        cells = [_fixed(value, 0) for value in hand.wrench[:3]]
-        cells += [_fixed(value, 1) for value in hand.wrench[3:]]
-        cells += [_fixed(hand.utilisation, 2), _fixed(-force[0], 0), _fixed(force[2], 0)]
-        table.add_row(hand.limb, *cells)
+        shear, _, press = hand.palm.force
+        cells = [f"{value:z.0f}" for value in hand.wrench[:3]]
+        cells += [f"{value:z.1f}" for value in hand.wrench[3:]]
+        used = f"{hand.utilisation:z.2f}"
+        table.add_row(hand.limb, *cells, used, f"{-shear:z.0f}", f"{press:z.0f}")
     return table
 
 
 def _wrist_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand")
-    for name in ("vx", "vy", "vz", "wx", "wy", "wz"):
-        table.add_column(name, justify="right")
+    table = table_of("hand", ">vx", ">vy", ">vz", ">wx", ">wy", ">wz")
     table.add_column("palm")
     for hand in hands:
-        cells = [_fixed(1e3 * value, 2) for value in hand.wrist.twist or ()]
+        cells = [f"{1e3 * value:z.2f}" for value in hand.wrist.twist or ()]
         table.add_row(hand.limb, *cells, (hand.wrist.palm or "-").replace("_", " "))
     return table
 
 
 def _tendon_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand", "finger")
-    for name in ("tension N", "current A"):
-        table.add_column(name, justify="right")
+    table = table_of("hand", "finger", ">tension N", ">current A")
     table.add_column("tile")
     table.add_column("util", justify="right")
     for hand in hands:
         for finger in hand.fingers:
-            worst = _worst(finger)
+            touching = [tile for tile in finger.tiles if tile.contact != "none"]
+            worst = max(touching, key=lambda tile: tile.utilisation, default=None)
             cells = ("-", "-") if worst is None else (worst.phalanx, f"{worst.utilisation:.2f}")
             drive = (f"{finger.tendon_tension:.1f}", f"{finger.motor_current:.3f}")
             table.add_row(hand.limb, finger.name, *drive, *cells)
@@ -361,17 +370,14 @@ def _joint_table(
     """
     most = max((len(row) for row in torques.values()), default=0)
     columns = min(most, JOINTS_A_LINE)
-    table = table_of("limb")
+    more = "+" if most > columns else ""
+    table = table_of("limb", *(f">{more}{i + 1}" for i in range(columns)), ">of", ">util")
     table.padding = 0  # otherwise seven torques do not fit
-    for i in range(columns):
-        table.add_column(str(i + 1) if most <= columns else f"+{i + 1}", justify="right")
-    for name in ("of", "util"):
-        table.add_column(name, justify="right")
     for limb, row in torques.items():
         used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
         worst = used.index(max(used))
         cells = [
-            _fixed(torque, 0 if abs(torque) >= 1e3 else 1) + ("*" if i == worst else " ")
+            f"{torque:z.{0 if abs(torque) >= 1e3 else 1}f}" + ("*" if i == worst else " ")
             for i, torque in enumerate(row)
         ]
         ends = (f"{limits[limb][worst]:.4g}", f"{used[worst]:.2f}")
@@ -383,15 +389,8 @@ def _joint_table(
     return table
 
 
-def _worst(finger: Finger) -> Tile | None:
-    """Return the most loaded tile of those that touch rock."""
-    touching = [tile for tile in finger.tiles if tile.contact != "none"]
-    return max(touching, key=lambda tile: tile.utilisation, default=None)
-
-
 def _price_table(prices: Iterable[Price]) -> Table:
-    table = table_of("hand", "finger, joint", "tile", "limit")
-    table.add_column("price", justify="right")
+    table = table_of("hand", "finger, joint", "tile", "limit", ">price")
     for price in prices:
         part = price.finger or price.joint or "-"
         names = (price.limb, part, price.phalanx or "-", price.limit)

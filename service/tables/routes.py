@@ -18,17 +18,12 @@ __all__ = ["print_route"]
 def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) -> None:
     """Print a climb, stage by stage, its crux, and where its files are."""
     out.print(f"[bold]{escape(result.route.name)}[/bold]: {len(result.route.moves)} moves")
-    table = table_of("", "move", "phase", "limb", "status")
-    table.add_column("util", justify="right")
-    table.add_column("load factor", justify="right")
     joints = any(plan.joint_utilisation is not None for plan in result.plans)
-    if joints:
-        table.add_column("joints", justify="right")
+    numbers = (">util", ">load factor", ">joints")[: 2 + joints]
+    table = table_of("", "move", "phase", "limb", "status", *numbers)
     for stage, plan in zip(result.stages, result.plans, strict=True):
-        numbers = [plan.utilisation, plan.load_factor]
-        if joints:
-            numbers.append(plan.joint_utilisation)
-        shown = ("-" if number is None else f"{number:.2f}" for number in numbers)
+        of_plan = (plan.utilisation, plan.load_factor, plan.joint_utilisation)[: 2 + joints]
+        shown = ("-" if number is None else f"{number:.2f}" for number in of_plan)
         cells = (str(stage.move), stage.phase, stage.limb or "-", plan.status, *shown)
         hard = stage.index == result.crux
         table.add_row("crux" if hard else "", *cells, style="bold" if hard else "")

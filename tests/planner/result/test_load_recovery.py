@@ -116,7 +116,7 @@ def test_every_number_is_that_of_its_definition(stance):
                 ]
                 share = max(0.0, *shares) if hand.holding[t] else 0.0
                 assert tile.utilisation == pytest.approx(share, rel=1e-9, abs=1e-12)
-                assert tile.half_planes == planes
+                assert plan.limits_of(t) == planes
                 assert (tile.phalanx, tile.contact) == hand.tiles[t][1:]
                 np.testing.assert_array_equal(tile.position, hand.positions[t])
                 np.testing.assert_array_equal(tile.load_per_newton, hand.loads[t, :, 1])

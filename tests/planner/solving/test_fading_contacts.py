@@ -169,7 +169,7 @@ def test_a_plan_with_half_a_tiles_spines_is_that_of_its_loads(half):
                     for p in hand.half_planes
                 )
                 assert tile.utilisation == pytest.approx(max(used, 0.0), rel=1e-9)
-                assert [p.capacity for p in tile.half_planes] == pytest.approx(
+                assert [p.capacity for p in hand.limits_of(int(t))] == pytest.approx(
                     [share * p.capacity for p in hand.half_planes]
                 )
 

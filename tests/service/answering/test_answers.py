@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from hand_models.base import InvalidInputError, SolverError, UnsupportedError, wrench_transport
 from planner import solving
 from service import answering
-from service.answering import dispatch
+from service.answering import dispatch, hand_spaces
 from service.replies import WrenchSpaceReply
 from service.requests import WrenchSpaceRequest
 from tests.suite.helpers.replies import PLAN, departures, refusal, reply_to
@@ -278,7 +278,7 @@ def test_numbers_that_do_not_exist_are_null(monkeypatch: pytest.MonkeyPatch) -> 
     from hand_models.fixed_wrist import TensionLimit
 
     endless = (TensionLimit("inner_left", math.inf, None),)
-    monkeypatch.setattr(dispatch, "tension_limits", lambda _: endless)
+    monkeypatch.setattr(hand_spaces, "tension_limits", lambda _: endless)
     request = msgspec.msgpack.encode(wrench_space_request())
     answer = dispatch.handle(WRENCH_SPACE, request, MSGPACK)
     reply = msgspec.msgpack.decode(answer.payload, type=WrenchSpaceReply)

@@ -13,7 +13,7 @@ from planner.deadline.unfinished import UNFINISHED
 from planner.result import LimitName, Plan
 from service import Planners
 from service.answering import dispatch
-from service.answering.brief_plan import brief_plan_reply
+from service.answering.answers import brief_plan_reply
 from service.answering.questions import question
 from service.commands.cli import run
 from service.commands.stances import bundled, read_request

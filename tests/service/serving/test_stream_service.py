@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import zenoh
 
-from planner.result import no_set_points
+from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
 from service.answering import Streams, dispatch, streams
@@ -140,8 +140,8 @@ def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
             limbs=(),
             columns=(),
             interpolates=None,
-            set_points=lambda wrench: no_set_points(
-                "failed", np.array(wrench), "none", verified=False
+            set_points=lambda wrench: SetPoints(
+                "failed", np.array(wrench), verified=False, reason="none"
             ),
             close=lambda: closed.append(number),
         )
@@ -305,7 +305,7 @@ def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) ->
 
     def failing(self: WrenchStream, wrench: object) -> object:
         if list(wrench) == WRENCH:
-            return no_set_points("failed", np.array(wrench), "a reason", verified=False)
+            return SetPoints("failed", np.array(wrench), verified=False, reason="a reason")
         return answers(self, wrench)
 
     monkeypatch.setattr(WrenchStream, "set_points", failing)

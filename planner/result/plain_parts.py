@@ -1,0 +1,218 @@
+"""Parts of a plan that are words and plain numbers: they travel as they are.
+
+A name that does not exist is None, and null on its way; what was not asked for is left out.
+"""
+
+from __future__ import annotations
+
+from msgspec import UNSET, Struct, UnsetType
+from msgspec.structs import astuple
+
+__all__ = [
+    "Finger",
+    "LimitName",
+    "Price",
+    "RobustLoadFactor",
+    "Solver",
+    "TensionPath",
+    "Tile",
+    "Time",
+]
+
+Vector = list[float]
+
+
+class LimitName(Struct, frozen=True):
+    """A limit of one hand or its limb, by name.
+
+    Attributes
+    ----------
+    limb : str
+    finger, phalanx : str or None
+        None where the limit is not a finger's, or not a tile's.
+    limit : str
+        What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
+        ``motor_torque``, ``motor_current``, ``finger_shear`` and, with its distal phalanx,
+        ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``, ``hand_load`` and, where
+        it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard row's name.
+    joint : str or None
+        The joint whose torque it is.
+    """
+
+    limb: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+
+
+class Price(LimitName, frozen=True, kw_only=True):
+    """A limit that binds, and what one more unit of it would take off the utilisation.
+
+    Attributes
+    ----------
+    price : float
+        [1/unit]
+    unit : str
+        Of the limit's capacity: ``N``, ``N·m`` or ``A``.
+    """
+
+    price: float
+    unit: str
+
+    @classmethod
+    def of(cls, name: LimitName, price: float, unit: str) -> Price:
+        """Return the price of a limit."""
+        return cls(*astuple(name), price=price, unit=unit)
+
+    @property
+    def name(self) -> LimitName:
+        """The limit alone."""
+        return LimitName(self.limb, self.finger, self.phalanx, self.limit, self.joint)
+
+
+class Solver(Struct, frozen=True):
+    """Which solver ended how."""
+
+    name: str
+    status: str
+    iterations: int
+
+
+class Time(Struct, frozen=True):
+    """Where the time went [s]."""
+
+    model: float
+    solve: float
+    total: float
+
+
+class TensionPath(Struct, frozen=True):
+    """The straight way from the present tensions to the planned ones.
+
+    Attributes
+    ----------
+    safe : bool
+        Whether every point of it balances the body within the cap on the utilisation, hard rows
+        giving by 1 mN: no present tension is known better.
+    safe_part : float
+        How much of it does, from the plan backward; zero where the plan itself does not.
+    utilisation_at_present : float or None
+        The least at the present tensions; None if these balance the body at no utilisation.
+    largest_change : float
+        Of a tension [N].
+    limiting : list of LimitName
+        The limits and hard rows that end the safe part, the weightiest first; of a plan beyond the
+        cap those of which it uses most. Empty where the way is safe.
+    """
+
+    safe: bool
+    safe_part: float
+    utilisation_at_present: float | None
+    largest_change: float
+    limiting: list[LimitName] = []
+
+
+class RobustLoadFactor(Struct, frozen=True):
+    """The load factor where the hands are not quite where they were put.
+
+    All hands are closed anew at random places about their own, each drawn apart. H stays in W, so
+    that body and joints stay, too: it is the rock that is elsewhere.
+
+    Attributes
+    ----------
+    draws, without : int
+        Draws, and those of them in which a hand cannot be, or there is no load factor.
+    refused : dict of str to int
+        In how many draws a hand cannot be, by limb; those that always can are left out.
+    position, angle : float
+        The scatter: to either side along each axis of H [m], and about each [rad].
+    seed : int
+        Of the draws.
+    worst, tenth : float or None
+        The least in the other draws, and what it exceeds in nine in ten of them; None if there are
+        none.
+    """
+
+    draws: int
+    without: int
+    refused: dict[str, int]
+    position: float
+    angle: float
+    seed: int
+    worst: float | None
+    tenth: float | None
+
+
+class Tile(Struct, frozen=True):
+    """One finger tile of a plan. Vectors in H, forces on the rock, SI units.
+
+    A reply has the last three fields with ``"want": ["model"]``; the first two of them there are
+    only where the wrist is fixed.
+
+    Attributes
+    ----------
+    phalanx : str
+        ``base``, ``proximal``, ``middle`` or ``distal``, or ``nail``.
+    contact : str
+        ``face``, ``edge``, ``frame`` where its phalanx only presses beside it, ``nail``, or
+        ``none`` where it touches nothing and carries nothing.
+    position : list of float, length 3
+    force : list of float, length 3
+        shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
+    shear, normal, lateral : float
+    shear_axis, normal_axis, lateral_axis : list of float, length 3
+    utilisation : float
+        Largest load over capacity of its half-planes; never below zero.
+    load_at_zero : list of float, length 2
+        Shear and normal load at zero tension [N].
+    load_per_newton : list of float, length 2
+        The same per newton of tension.
+    half_planes : list of list of float, length 4
+        [a_shear, a_normal, a_lateral, capacity] of each limit of the spines that are on the rock;
+        of a tile that is not on rock, of a whole one.
+    """
+
+    phalanx: str
+    contact: str
+    position: Vector
+    force: Vector
+    shear: float
+    normal: float
+    lateral: float
+    shear_axis: Vector
+    normal_axis: Vector
+    lateral_axis: Vector
+    utilisation: float
+    load_at_zero: Vector | UnsetType = UNSET
+    load_per_newton: Vector | UnsetType = UNSET
+    half_planes: list[Vector] | UnsetType = UNSET
+
+
+class Finger(Struct, frozen=True):
+    """One finger of a plan: its tendon, its motor while it tightens that, and its tiles.
+
+    Attributes
+    ----------
+    name : str
+    closure : str
+        How it has ended on its hold: ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or
+        ``straight``.
+    tendon_tension : float
+        [N]
+    motor_torque, motor_current : float
+        [N·m], [A]
+    winch_angle : float
+        From the open finger to that tension, of a floating hand to the preload at which the motor
+        stands still [rad].
+    tiles : list of Tile
+        From the base outward.
+    """
+
+    name: str
+    closure: str
+    tendon_tension: float
+    motor_torque: float
+    motor_current: float
+    winch_angle: float
+    tiles: list[Tile]
