@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from contextlib import nullcontext
 from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
@@ -86,11 +85,9 @@ def try_everywhere(
     # each all over the rock, so that what is broken off has been everywhere
     step = math.ceil(len(places) / size)
     chunks = [[i for place in places[k::step] for i in place] for k in range(step)]
-    here, processes = how.trying(), min(count, len(chunks)) - 1
-    with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
-        parts = [[trials[i] for i in chunk] for chunk in chunks]
-        pairs = enumerate(map(here, parts)) if others is None else others.each(parts, here)
-        for k, results in pairs:
+    parts = [[trials[i] for i in chunk] for chunk in chunks]
+    with Workers(how.trying, min(count, len(chunks)) - 1) as others:
+        for k, results in others.each(parts, how.trying()):
             if isinstance(results, Lost):
                 results = [InvalidInputError(results.reason) for _ in chunks[k]]
             yield from zip(chunks[k], results, strict=True)

@@ -70,25 +70,20 @@ class Planners:
         count = cores() if workers is None else _whole(workers)
         self._make = partial(_answering, robot, hand, folder)
         self._closed = False
-        self._workers: Workers[tuple[bytes, Format], Answered] | None = None
-        if count > 1:
-            self._workers = Workers(self._make, count - 1)
+        self._workers = Workers(self._make, count - 1)
 
     def __enter__(self) -> Self:
         self._closed = False
-        if self._workers is not None:
-            self._workers.__enter__()
+        self._workers.__enter__()
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         self._closed = True
-        if self._workers is not None:
-            self._workers.__exit__(kind, error, traceback)
+        self._workers.__exit__(kind, error, traceback)
 
     def wait(self) -> None:
         """Wait until all processes have started, if that is better than to begin without them."""
-        if self._workers is not None and not self._closed:
-            self._workers.wait()
+        self._workers.wait()
 
     def plan_many(
         self,
@@ -120,11 +115,8 @@ class Planners:
         """Yield each encoded request's index and encoded answer, as they are done."""
         if self._closed:
             raise InvalidInputError("is closed; enter another, or this one again", field="planners")
-        answer = self._make()
-        if self._workers is None:
-            yield from ((i, answer((payload, form))) for i, payload in enumerate(payloads))
-            return
-        for i, found in self._workers.each([(payload, form) for payload in payloads], answer):
+        asked = [(payload, form) for payload in payloads]
+        for i, found in self._workers.each(asked, self._make()):
             if isinstance(found, Lost):
                 name = identifier(payloads[i], form)
                 yield i, _refused(LostError(found.reason), form, name)

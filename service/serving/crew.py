@@ -6,7 +6,8 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final
 
-from service.processes import Done, Job, Lane, Make, Station, resident
+from planner.processes import OUT_OF_MEMORY, Lane, Make, Station, resident
+from service.processes import Done, Job
 from service.replies import ProcessHealth
 from service.serving.question import Question
 
@@ -88,10 +89,14 @@ class Crew:
         if time.perf_counter() < self.rests_until:
             return
         if self._streams is None:
-            self._streams = Station(self._make, STREAMS_LANES, self._memory)
+            self._streams = self._station(STREAMS_LANES)
             self.work |= dict.fromkeys(self._streams.lanes)
         for _ in range(1 + self.workers - len(self.stations)):
-            self.work |= dict.fromkeys(Station(self._make, 1, self._memory).lanes)
+            self.work |= dict.fromkeys(self._station(1).lanes)
+
+    def _station(self, lanes: int) -> Station[Job, Done]:
+        # what ends the service is for it to answer
+        return Station(self._make, lanes, self._memory, stays=True)
 
     def has_streams(self, lane: Lane[Job, Done]) -> bool:
         """Whether a lane is of the process that has the streams."""
@@ -154,7 +159,7 @@ class Crew:
             self.rests_until = time.perf_counter() + rest
             self.stillborn += 1
         left = [each for each in asked if each is not None and not each.replied]
-        return station.kill(dead=dead), left
+        return _ending(station.kill(dead=dead)), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
@@ -178,3 +183,12 @@ class Crew:
             state="starting" if not station.ready else "working" if busy else "idle",
             resident=resident(station.process.pid),
         )
+
+
+def _ending(status: int | None) -> str:
+    """Return in words how a process ended."""
+    if status is None:
+        return "was stopped"
+    if status == OUT_OF_MEMORY:
+        return "had not enough memory"
+    return f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"

@@ -23,8 +23,9 @@ import zenoh
 
 from hand_models.base import CruxError
 from planner.deadline import DeadlineError
+from planner.processes import Lane, Station
 from service.answering import Answer
-from service.processes import Done, Job, Lane, Station
+from service.processes import Done, Job
 from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.mail import Mail, reply_to

@@ -14,10 +14,10 @@ from zenoh.handlers import Callback
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.processes import cores
+from planner.processes import Make, cores
 from planner.robots import RobotFile
 from service.answering import SERVICES, robots_of
-from service.processes import Done, Job, Make, answering
+from service.processes import Done, Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
