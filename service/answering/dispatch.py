@@ -49,6 +49,7 @@ from service.wire import (
     SET_POINTS,
     STREAM,
     WRENCH_SPACE,
+    Answer,
     Format,
     decode_request,
     encode_error,
@@ -57,7 +58,6 @@ from service.wire import (
 
 __all__ = [
     "SERVICES",
-    "Answer",
     "Planned",
     "body_space",
     "handle",
@@ -67,26 +67,6 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
-
-
-class Answer(NamedTuple):
-    """What goes back to the caller.
-
-    Attributes
-    ----------
-    payload : bytes
-    encoding : str
-        Of the payload, with its schema.
-    good : bool
-        Whether it is a reply, and not an error.
-    status : str
-        Of a reply that has one; the kind of an error.
-    """
-
-    payload: bytes
-    encoding: str
-    good: bool
-    status: str = "done"
 
 
 def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
@@ -286,16 +266,13 @@ def handle(
         return Answer(form.encode(reply), form.label(reply), True, status)
     except InvalidInputError as error:
         told = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        coded = encode_error(told, error, form, identifier(payload, form, kind))
-        return Answer(*coded, False, told)
+        return encode_error(error, form, identifier(payload, form, kind), told)
     except DeadlineError as error:
-        coded = encode_error(error.kind, error, form, identifier(payload, form, kind))
-        return Answer(*coded, False, error.kind)
+        return encode_error(error, form, identifier(payload, form, kind))
     except MemoryError:
         # of a process, not of a question: who runs the process has to know
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        coded = encode_error("internal", excuse, form, identifier(payload, form, kind))
-        return Answer(*coded, False, "internal")
+        return encode_error(excuse, form, identifier(payload, form, kind), "internal")

@@ -31,10 +31,10 @@ from service.commands.terminal import (
     unwritten,
     writing,
 )
-from service.processes import Answered, Planners, worth
+from service.processes import Planners, worth
 from service.replies import ErrorDetail, Time
 from service.tables import console, table_of
-from service.wire import REQUEST_KINDS, Format, identifier
+from service.wire import REQUEST_KINDS, Answer, Format, identifier
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -255,9 +255,9 @@ def _kept(told: Sequence[_Told], lines: Sequence[bytes], file: Path | None) -> s
     return done if file is None else f"{done} in {file}; --resume goes on"
 
 
-def _in_order(answers: Iterator[tuple[int, Answered]]) -> Iterator[Answered]:
+def _in_order(answers: Iterator[tuple[int, Answer]]) -> Iterator[Answer]:
     """Yield answers in the order of their requests, each as soon as those before it are there."""
-    early: dict[int, Answered] = {}
+    early: dict[int, Answer] = {}
     following = 0
     for i, answer in answers:
         early[i] = answer

@@ -15,7 +15,7 @@ from typing import Final
 
 import zenoh
 
-from service.answering import Answer
+from service.wire import Answer
 
 __all__ = ["Mail", "reply_to"]
 

@@ -65,8 +65,6 @@ class Question:
     fault : LimitError or None
         If it has too many bytes, which are not taken then.
     replied : bool
-    waits : bool
-        In a queue.
     begun : float
         When a process was given it, on the same clock; negative before.
     """
@@ -85,7 +83,6 @@ class Question:
     rehearsed: bool = False
     fault: LimitError | None = None
     replied: bool = False
-    waits: bool = False
     begun: float = -1.0
     deadline: float = field(init=False)
 

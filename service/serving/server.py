@@ -17,12 +17,11 @@ from hand_models.parameters import ParameterTable
 from planner.processes import Make, cores
 from planner.robots import RobotFile
 from service.answering import SERVICES, robots_of
-from service.processes import Done, Job, answering
+from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.watch import Told
-from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, service_key
+from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, Answer, service_key
 
 __all__ = ["MEMORY", "PlanService"]
 
@@ -83,7 +82,7 @@ class PlanService:
         workers: int | None = None,
         seconds: float = DEFAULT_DEADLINE,
         memory: int = MEMORY,
-        make: Make[Job, Done] | None = None,
+        make: Make[Job, Answer] | None = None,
     ) -> None:
         count = max(FEWEST, cores()) if workers is None else workers
         if count < 1:
@@ -126,11 +125,11 @@ class PlanService:
 
     def __enter__(self) -> Self:
         self._dispatcher.start()
-        for key in self.keys:
-            self._declare(key, partial(self._ask, key))
         health, metrics = self.operators
+        for key in self.keys:
+            self._declare(key, self._dispatcher.ask)
         for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
-            self._declare(key, partial(self._look, key, told))
+            self._declare(key, partial(self._dispatcher.look, told))
         info = self._session.info
         self._declared.append(
             info.declare_transport_events_listener(Callback(self._transport, indirect=False))
@@ -152,22 +151,17 @@ class PlanService:
             declared.undeclare()  # type: ignore[no-untyped-call]
         self._dispatcher.close()
 
-    def _declare(self, key: str, callback: Callable[[zenoh.Query], None]) -> None:
+    def _declare(self, key: str, take: Callable[[zenoh.Query, str], None]) -> None:
+        def callback(query: zenoh.Query) -> None:
+            # for the key itself, and not for every one that it happens to match
+            if str(query.key_expr).rpartition("/")[2] == key.rpartition("/")[2]:
+                take(query, key)
+            else:
+                query.drop()
+
         self._declared.append(
             self._session.declare_queryable(key, Callback(callback, indirect=False), complete=True)
         )
-
-    def _ask(self, key: str, query: zenoh.Query) -> None:
-        if _means(query, key):
-            self._dispatcher.ask(query, key)
-        else:
-            query.drop()
-
-    def _look(self, key: str, told: Callable[[], Told], query: zenoh.Query) -> None:
-        if _means(query, key):
-            self._dispatcher.look(query, key, told)
-        else:
-            query.drop()
 
     def _transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE:
@@ -176,8 +170,3 @@ class PlanService:
     def _client(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
             self._dispatcher.gone(str(sample.key_expr).rpartition("/")[2])
-
-
-def _means(query: zenoh.Query, key: str) -> bool:
-    """Whether a query is for a key, and not for every one that it happens to match."""
-    return str(query.key_expr).rpartition("/")[2] == key.rpartition("/")[2]
