@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from enum import Enum
+from functools import partial
 from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
@@ -14,7 +15,7 @@ from service.requests import Identifier, SetPointsRequest, StreamRequest
 from service.wire.checks import check
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
-from service.wire.validation_errors import leaves_open, validation_error
+from service.wire.validation_errors import validation_error
 
 __all__ = [
     "LARGEST_ERROR",
@@ -156,9 +157,11 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             # no bound is kept by what is not a number
             with suppress(RecursionError):
                 check(_plain(payload, form))
-        document = _plain(payload, form) if leaves_open(error) else None
         field, message = validation_error(
-            error, kind, document, lambda part: form.decode(form.encode(part), kind)
+            error,
+            kind,
+            partial(_plain, payload, form),
+            lambda part: form.decode(form.encode(part), kind),
         )
         raise InvalidInputError(message, field=field) from None
     try:
