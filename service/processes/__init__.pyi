@@ -1,3 +1,3 @@
-from .hold_trials import RockTrials as RockTrials, try_everywhere as try_everywhere
+from .hold_trials import try_everywhere as try_everywhere
 from .many import Planners as Planners, plan_many as plan_many, worth as worth
 from .questions import Job as Job, answering as answering

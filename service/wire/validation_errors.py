@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, reduce
+from functools import cache
 from itertools import islice
-from operator import getitem
 from typing import Any, Final, NamedTuple
 
 import msgspec
@@ -129,7 +128,10 @@ def _key_to_blame(document: Any, place: list[Step], path: str, decode: Decoder) 
     LookupError
         If none can be told.
     """
-    keys = list(reduce(getitem, place, document))
+    whole = document
+    for step in place:
+        whole = whole[step]
+    keys = list(whole)
 
     def refused(count: int) -> bool:
         try:
