@@ -5,6 +5,7 @@ A process can be killed at any time, which costs the questions in its lanes and 
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import sys
@@ -16,7 +17,7 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
-from planner.processes.child_processes import begin_child, spawned
+from planner.processes.child_processes import begin_child, starting_children
 
 __all__ = ["Lane", "Make", "Station", "resident"]
 
@@ -148,8 +149,21 @@ class Station(Generic[T, R]):
         ahead: bool = False,
         stays: bool = False,
     ) -> None:
-        self.process, pipes = spawned(_answer_each, make, memory, ahead, stays, pipes=lanes)
-        self.lanes = tuple(Lane(self, i, pipe) for i, pipe in enumerate(pipes))
+        context = multiprocessing.get_context("spawn")
+        ends = [context.Pipe() for _ in range(lanes)]
+        others = [other for _, other in ends]
+        self.process = context.Process(
+            target=_answer_each, args=(others, memory, ahead, stays), daemon=True
+        )
+        with starting_children():
+            self.process.start()
+        for other in others:
+            # the process has the other ends alone, so that its death ends the pipes
+            other.close()
+        self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(ends))
+        # by a pipe, of which a death is told: it may be large
+        with suppress(OSError):
+            ends[0][0].send(make)
 
     @property
     def ready(self) -> bool:

@@ -27,12 +27,12 @@ R = TypeVar("R")
 Numbered = Lane[tuple[int, T], tuple[int, R]]
 """Of a process whose items and results have their indices with them."""
 
-AHEAD: Final = 16
-"""Most items that a process has in hand: the next ones are there before these are done."""
+AHEAD: Final = 15
+"""Most items that a process has in hand beside one: they are there before that is done."""
 
 SHARE: Final = 4
-"""A process has no more in hand than what is left by this and by the processes: less and less, so
-that none waits long for the last one."""
+"""These are no more than what is left by this and by the processes: less and less, so that none
+waits long for the last one."""
 
 PATIENCE: Final = 1.0
 """Longest time between the end of a process's pipe and its own [s]."""
@@ -139,7 +139,8 @@ class Workers(Generic[T, R]):
                         continue
                     if again and not todo and not hand:
                         self._give(lane, again.popleft(), items)
-                    while len(hand) < min(AHEAD, math.ceil(len(todo) / (SHARE * self._count))):
+                    share = math.ceil(len(todo) / (SHARE * self._count))
+                    while todo and len(hand) <= min(AHEAD, share):
                         self._give(lane, todo.popleft(), items)
                 if here is not None and todo:
                     i = todo.popleft()

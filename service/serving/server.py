@@ -6,8 +6,9 @@ Nothing is worked out on zenoh's threads, and none of them ever waits.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import zenoh
 from zenoh.handlers import Callback
@@ -100,10 +101,7 @@ class PlanService:
         made = make or partial(answering, robot, hand)
         self._dispatcher = Dispatcher(Crew(made, count, memory), seconds, self.robot)
         self._watch = self._dispatcher.watch
-        self._declared: list[
-            zenoh.Queryable[None] | zenoh.Subscriber[None] | zenoh.TransportEventsListener[None]
-        ] = []
-        self._token: zenoh.LivelinessToken | None = None
+        self._open = ExitStack()
 
     def has_rival(self) -> bool:
         """Say whether another service answers for the robot; to be asked before entering."""
@@ -125,31 +123,26 @@ class PlanService:
 
     def __enter__(self) -> Self:
         self._dispatcher.start()
-        health, metrics = self.operators
+        self._open.callback(self._dispatcher.close)
         for key in self.keys:
             self._declare(key, self._dispatcher.ask)
+        health, metrics = self.operators
         for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
             self._declare(key, partial(self._dispatcher.look, told))
-        info = self._session.info
-        self._declared.append(
-            info.declare_transport_events_listener(Callback(self._transport, indirect=False))
-        )
-        clients = service_key(self.robot, f"{CLIENTS}/*")
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(
-                clients, Callback(self._client, indirect=False)
-            )
-        )
-        self._token = self._session.liveliness().declare_token(self._alive)
+        links = Callback(self._transport, indirect=False)
+        self._until_the_end(self._session.info.declare_transport_events_listener(links))
+        liveliness, clients = self._session.liveliness(), service_key(self.robot, f"{CLIENTS}/*")
+        seen = Callback(self._client, indirect=False)
+        self._until_the_end(liveliness.declare_subscriber(clients, seen))
+        self._open.callback(self._dispatcher.stop)
+        self._until_the_end(liveliness.declare_token(self._alive))
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._token is not None:
-            self._token.undeclare()
-        self._dispatcher.stop()
-        for declared in self._declared:
-            declared.undeclare()  # type: ignore[no-untyped-call]
-        self._dispatcher.close()
+        self._open.close()
+
+    def _until_the_end(self, declared: Any) -> None:
+        self._open.callback(declared.undeclare)
 
     def _declare(self, key: str, take: Callable[[zenoh.Query, str], None]) -> None:
         def callback(query: zenoh.Query) -> None:
@@ -159,9 +152,8 @@ class PlanService:
             else:
                 query.drop()
 
-        self._declared.append(
-            self._session.declare_queryable(key, Callback(callback, indirect=False), complete=True)
-        )
+        taker = Callback(callback, indirect=False)
+        self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
 
     def _transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE:
