@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Self
+import copyreg
+from typing import Any, Self
 
 __all__ = [
     "CruxError",
@@ -36,6 +37,10 @@ class CruxError(Exception):
         super().__init__(message)
         self.message = message
         self.field = field
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a class may be made of other things than its message
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
     def within(self, parent: str) -> Self:
         """Return the error with ``parent`` put before its field's path."""

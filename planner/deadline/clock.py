@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hand_models.base import CruxError, InvalidInputError, broken_off_by
 
@@ -51,9 +51,6 @@ class DeadlineError(CruxError):
         )
         self.seconds = seconds
         self.missing = missing
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return DeadlineError, (self.seconds, self.missing)
 
 
 def possible(seconds: float | None) -> float | None:

@@ -1,7 +1,8 @@
-from .child_processes import begin_child as begin_child, spawned as spawned
-from .workers import (
-    Lost as Lost,
-    Worker as Worker,
-    Workers as Workers,
-    cores as cores,
+from .stations import (
+    OUT_OF_MEMORY as OUT_OF_MEMORY,
+    Lane as Lane,
+    Make as Make,
+    Station as Station,
+    resident as resident,
 )
+from .workers import Lost as Lost, Workers as Workers, cores as cores

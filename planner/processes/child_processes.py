@@ -7,15 +7,14 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from multiprocessing.connection import wait
 from types import FrameType
 from typing import Any, Final
 
-__all__ = ["begin_child", "spawned"]
+__all__ = ["begin_child", "starting_children"]
 
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
@@ -24,41 +23,6 @@ ORPHANED: Final = 1.0
 
 THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What keeps a library of linear algebra to one thread, before it is loaded."""
-
-
-def spawned(
-    run: Callable[..., None], first: object, *more: object, pipes: int = 1
-) -> tuple[BaseProcess, list[Connection]]:
-    """Start a process; return it, and its pipes.
-
-    It does its linear algebra on one thread.
-
-    Parameters
-    ----------
-    run : callable
-        Called in the process with a list of the pipes' other ends, and ``more``; it is to call
-        `begin_child` first.
-    first : object
-        Is sent through the first pipe; it may be large.
-    more : object
-        Small.
-    pipes : int, optional
-        How many.
-    """
-    context = multiprocessing.get_context("spawn")
-    ends = [context.Pipe() for _ in range(pipes)]
-    others = [other for _, other in ends]
-    process = context.Process(target=run, args=(others, *more), daemon=True)
-    with _one_thread(), _starting_children():
-        process.start()
-    for other in others:
-        # the process has the other ends alone, so that its death ends the pipes
-        other.close()
-    own = [pipe for pipe, _ in ends]
-    # by a pipe, of which a death is told
-    with suppress(OSError):
-        own[0].send(first)
-    return process, own
 
 
 def begin_child(*, stays: bool = False) -> None:
@@ -84,10 +48,11 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _starting_children() -> Iterator[None]:
+def starting_children() -> Iterator[None]:
     """Start processes that call `begin_child`: no signal interrupts that on either side.
 
-    One that arrives here meanwhile is answered at the end; there it waits for `begin_child`.
+    One that arrives here meanwhile is answered at the end; there it waits for `begin_child`. They
+    do their linear algebra on one thread.
     """
     # or else it is started with the first process, and lets signals in again
     resource_tracker.ensure_running()
@@ -103,7 +68,8 @@ def _starting_children() -> Iterator[None]:
                 handlers[each] = signal.signal(each, later)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
-        yield
+        with _one_thread():
+            yield
     finally:
         # what has waited here arrives now
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,7 +1,7 @@
 """Processes that do one kind of work, kept open; one that dies costs what it had in hand at most.
 
-Work goes out in chunks and comes back as it is done. What a process had in hand when it died is
-tried once more, alone: whatever kills its process then is lost, and nothing else is.
+Work goes out ahead and comes back as it is done. What a process had in hand when it died is tried
+once more, alone: whatever kills its process then is lost, and nothing else is.
 """
 
 from __future__ import annotations
@@ -9,38 +9,33 @@ from __future__ import annotations
 import logging
 import math
 import os
-import sys
-import threading
-import time
-import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection, wait
-from queue import SimpleQueue
-from typing import Any, Final, Generic, Self, TypeVar
+from typing import Final, Generic, Self, TypeVar, cast
 
-from planner.processes.child_processes import begin_child, spawned
+from planner.processes.stations import Lane, Make, Station
 
-__all__ = ["Lost", "Worker", "Workers", "cores"]
+__all__ = ["Lost", "Workers", "cores"]
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-CHUNK: Final = 8
-"""Most items that go out together."""
+Numbered = Lane[tuple[int, T], tuple[int, R]]
+"""Of a process whose items and results have their indices with them."""
+
+AHEAD: Final = 15
+"""Most items that a process has in hand beside one: they are there before that is done."""
 
 SHARE: Final = 4
-"""What goes out together is what is left by this and by the processes: less and less, so that none
+"""These are no more than what is left by this and by the processes: less and less, so that none
 waits long for the last one."""
 
-FLUSH: Final = 0.05
-"""How long results wait for the rest of their chunk [s]."""
-
 PATIENCE: Final = 1.0
-"""How long processes that are to end may take [s]."""
+"""Longest time between the end of a process's pipe and its own [s]."""
 
 STARTS: Final = 2
 """Processes in a row that may die before they are ready; after that no more are started."""
@@ -51,9 +46,6 @@ NO_GUARD: Final = (
 
 UNCAUGHT: Final = 1
 """Status of a process whose program ends with an error."""
-
-UNREADY: Final = 70
-"""Status of a process that cannot be made ready for its work."""
 
 
 class Lost:
@@ -84,20 +76,21 @@ class Workers(Generic[T, R]):
         Called once in each process; returns what turns an item into its result. It, items and
         results can be pickled. What it raises ends its process.
     count : int
-        How many processes.
+        How many processes, if any.
 
     Attributes
     ----------
-    running : list of Worker
-        Those that have been started and are not known to have died.
+    hands : dict of Lane to set of int
+        Indices of the items that each process has in hand; of those processes that have been
+        started and are not known to have died.
     stillborn : int
         Processes in a row that have died before they were ready.
     """
 
-    def __init__(self, make: Callable[[], Callable[[T], R]], count: int) -> None:
-        self._make = make
-        self._count = max(1, count)
-        self.running: list[Worker[T, R]] = []
+    def __init__(self, make: Make[T, R], count: int) -> None:
+        self._make = partial(_numbered, make)
+        self._count = count
+        self.hands: dict[Numbered[T, R], set[int]] = {}
         self.stillborn = 0
         self._unborn = ""
         """Why."""
@@ -106,21 +99,18 @@ class Workers(Generic[T, R]):
         self._hire()
         return self
 
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        for worker in self.running:
-            worker.pipe.close()
-        until = time.monotonic() + (PATIENCE if error is None else 0.0)
-        for worker in self.running:
-            worker.end(until)
-        self.running.clear()
+    def __exit__(self, *_: object) -> None:
+        for lane in list(self.hands):
+            self._dismiss(lane)
 
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
-        for worker in [worker for worker in self.running if not worker.ready]:
-            if worker.take() is None:
-                self._bury(worker)
-            else:
+        for lane in [lane for lane in self.hands if not lane.ready]:
+            try:
+                lane.take()
                 self.stillborn = 0
+            except EOFError:
+                self._bury(lane)
 
     def each(
         self, items: Sequence[T], here: Callable[[T], R] | None = None
@@ -138,70 +128,82 @@ class Workers(Generic[T, R]):
         tried: set[int] = set()
         again: deque[int] = deque()
         try:
-            while todo or again or any(worker.hand for worker in self.running):
+            while todo or again or any(self.hands.values()):
                 self._hire()
-                if not self.running and (here is None or not todo):
+                if not self.hands and (here is None or not todo):
                     for i in (*todo, *again):
                         yield i, Lost(self._unborn)
                     return
-                for worker in self.running:
-                    if worker.idle and again and not todo:
-                        worker.give([(i := again.popleft(), items[i])])
-                    # the next ones are there before these are done
-                    while worker.wants and todo:
-                        size = min(CHUNK, math.ceil(len(todo) / (SHARE * self._count)))
-                        chunk = [todo.popleft() for _ in range(size)]
-                        worker.give([(i, items[i]) for i in chunk])
+                for lane, hand in self.hands.items():
+                    if not lane.ready:
+                        continue
+                    if again and not todo and not hand:
+                        self._give(lane, again.popleft(), items)
+                    share = math.ceil(len(todo) / (SHARE * self._count))
+                    while todo and len(hand) <= min(AHEAD, share):
+                        self._give(lane, todo.popleft(), items)
                 if here is not None and todo:
                     i = todo.popleft()
                     yield i, here(items[i])
-                if not self.running:
+                if not self.hands:
                     continue
-                owed = bool(again) or any(worker.hand for worker in self.running)
-                block = owed and not todo if here is not None else True
-                for pipe in wait([worker.pipe for worker in self.running], None if block else 0.0):
-                    worker = next(each for each in self.running if each.pipe is pipe)
-                    done = worker.take()
-                    if done is not None:
+                owed = bool(again) or any(self.hands.values())
+                block = here is None or (owed and not todo)
+                lanes = {lane.pipe: lane for lane in self.hands}
+                for pipe in wait(list(lanes), None if block else 0.0):
+                    lane = lanes[cast(Connection, pipe)]
+                    try:
+                        done = lane.take()
                         self.stillborn = 0
-                        yield from done
+                    except EOFError:
+                        hand = self.hands[lane]
+                        how = self._bury(lane)
+                        for i in sorted(hand):
+                            if i in tried:
+                                yield i, Lost(f"its process died, twice; {how}")
+                            else:
+                                tried.add(i)
+                                again.append(i)
                         continue
-                    how = self._bury(worker)
-                    for i in sorted(worker.hand):
-                        if i in tried:
-                            yield i, Lost(f"its process died, twice; {how}")
-                        else:
-                            tried.add(i)
-                            again.append(i)
+                    if done is not None:
+                        self.hands[lane].remove(done[0])
+                        yield done
         finally:
             # what nobody waits for any more
-            for worker in [worker for worker in self.running if worker.hand]:
-                self._dismiss(worker)
+            for lane in [lane for lane, hand in self.hands.items() if hand]:
+                self._dismiss(lane)
 
     def _hire(self) -> None:
-        while len(self.running) < self._count and self.stillborn < STARTS:
-            self.running.append(Worker(self._make))
+        while len(self.hands) < self._count and self.stillborn < STARTS:
+            self.hands[Station(self._make, ahead=True).lanes[0]] = set()
 
-    def _bury(self, worker: Worker[T, R]) -> str:
+    def _give(self, lane: Numbered[T, R], i: int, items: Sequence[T]) -> None:
+        self.hands[lane].add(i)
+        lane.give((i, items[i]))
+
+    def _bury(self, lane: Numbered[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
-        worker.process.join(PATIENCE)
-        status = worker.process.exitcode
+        lane.station.process.join(PATIENCE)
+        status = self._dismiss(lane)
         how = _ending(status)
-        if not worker.ready:
+        if not lane.ready:
             self.stillborn += 1
             # nothing of this house is at work before a process is, but the program's own beginning
             hint = NO_GUARD if status == UNCAUGHT else ""
             self._unborn = f"processes do not start: {how}{hint}"
             if self.stillborn == STARTS:
                 log.warning(self._unborn)
-        self._dismiss(worker)
         return how
 
-    def _dismiss(self, worker: Worker[T, R]) -> None:
-        self.running.remove(worker)
-        worker.pipe.close()
-        worker.process.kill()
-        worker.process.join()
+    def _dismiss(self, lane: Numbered[T, R]) -> int | None:
+        del self.hands[lane]
+        return lane.station.kill()
+
+
+def _numbered(make: Make[T, R]) -> Callable[[tuple[int, T]], tuple[int, R]]:
+    """Return what turns an item into its result, both with the item's index."""
+    turn = make()
+    return lambda asked: (asked[0], turn(asked[1]))
 
 
 def _ending(status: int | None) -> str:
@@ -211,105 +213,3 @@ def _ending(status: int | None) -> str:
     if status < 0:
         return f"a worker was killed by signal {-status}"
     return f"a worker ended with status {status}"
-
-
-class Worker(Generic[T, R]):
-    """One process, and what it has in hand.
-
-    Parameters
-    ----------
-    make : callable
-        As in `Workers`.
-
-    Attributes
-    ----------
-    process : Process
-    pipe : Connection
-        To it.
-    ready : bool
-        Whether it has said that it can work.
-    hand : set of int
-        Indices of the items that it has not returned.
-    """
-
-    def __init__(self, make: Callable[[], Callable[[T], R]]) -> None:
-        self.process, (self.pipe,) = spawned(_work, make)
-        self.ready = False
-        self.hand: set[int] = set()
-        self._last: set[int] = set()
-
-    @property
-    def idle(self) -> bool:
-        """Whether it waits for work."""
-        return self.ready and not self.hand
-
-    @property
-    def wants(self) -> bool:
-        """Whether it has no more in hand than the chunk that it was given last."""
-        return self.ready and self.hand <= self._last
-
-    def give(self, chunk: list[tuple[int, T]]) -> None:
-        """Send a chunk of work."""
-        self._last = {i for i, _ in chunk}
-        self.hand |= self._last
-        # of a process that has died, its pipe tells next
-        with suppress(OSError):
-            self.pipe.send(chunk)
-
-    def take(self) -> list[tuple[int, R]] | None:
-        """Return the results that have come; None if the process has died."""
-        try:
-            done: list[tuple[int, R]] = self.pipe.recv()
-        except (EOFError, OSError):
-            return None
-        self.ready = True
-        self.hand -= {i for i, _ in done}
-        return done
-
-    def end(self, until: float) -> None:
-        """Let the process come to its end, and kill it if it is not there in time or not ready."""
-        if self.ready:
-            self.process.join(max(0.0, until - time.monotonic()))
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-
-
-def _work(pipes: list[Connection]) -> None:
-    """Do chunks of work until nobody sends any more; what a process of `Workers` runs."""
-    begin_child()
-    (pipe,) = pipes
-    try:
-        make: Callable[[], Callable[[Any], Any]] = pipe.recv()
-    except (EOFError, OSError):
-        return
-    try:
-        turn = make()
-    except BaseException:
-        traceback.print_exc()
-        sys.exit(UNREADY)
-    chunks: SimpleQueue[list[tuple[int, Any]] | None] = SimpleQueue()
-    # who sends must not wait for the chunk before to be done, nor for its results to be taken
-    threading.Thread(target=_receive, args=(pipe, chunks), daemon=True).start()
-    with suppress(OSError):
-        pipe.send([])
-        while (chunk := chunks.get()) is not None:
-            done: list[tuple[int, Any]] = []
-            flushed = time.monotonic()
-            for i, item in chunk:
-                done.append((i, turn(item)))
-                if time.monotonic() > flushed + FLUSH:
-                    pipe.send(done)
-                    done, flushed = [], time.monotonic()
-            if done:
-                pipe.send(done)
-
-
-def _receive(pipe: Connection, chunks: SimpleQueue[Any]) -> None:
-    """Take chunks in as they come, and nothing at their end."""
-    try:
-        with suppress(EOFError, OSError):
-            while True:
-                chunks.put(pipe.recv())
-    finally:
-        chunks.put(None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -84,15 +84,6 @@ class UnreachableError(InvalidInputError):
         super().__init__("; ".join(said), field=field)
         self.missing = dict(missing)
         self.turned = dict(turned)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _unreachable, (self.missing, self.turned, self.field)
-
-
-def _unreachable(
-    missing: Mapping[str, float], turned: Mapping[str, float], field: str | None
-) -> UnreachableError:
-    return UnreachableError(missing, turned, field=field)
 
 
 def unreachable(solutions: Mapping[str, IkSolution]) -> UnreachableError | None:

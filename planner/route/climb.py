@@ -228,23 +228,14 @@ def evaluate(
     if workers is None:
         workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
-
-    def done(stage: RouteStage, answer: Plan | OutOfReach) -> None:
-        plans[stage.index] = answer
-        if progress is not None:
-            progress(len(plans), len(todo))
-
-    others = min(workers, len(todo)) - 1
-    if others > 0:
-        with Workers(partial(_planning, todo), others) as processes:
-            for i, answer in processes.each(range(len(todo)), _planning(todo)):
-                if isinstance(answer, InvalidInputError):
-                    raise answer
-                # a stage that has cost a process is planned here
-                done(todo[i], _plan_stage(todo[i]) if isinstance(answer, Lost) else answer)
-    for stage in todo:
-        if stage.index not in plans:
-            done(stage, _plan_stage(stage))
+    with Workers(partial(_planning, todo), min(workers, len(todo)) - 1) as processes:
+        for i, answer in processes.each(range(len(todo)), _planning(todo)):
+            if isinstance(answer, InvalidInputError):
+                raise answer
+            # a stage that has cost a process is planned here
+            plans[i] = _plan_stage(todo[i]) if isinstance(answer, Lost) else answer
+            if progress is not None:
+                progress(len(plans), len(todo))
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 

@@ -1,7 +1,6 @@
 from .body_space import explore as explore
 from .dispatch import (
     SERVICES as SERVICES,
-    Answer as Answer,
     Planned as Planned,
     handle as handle,
     plan as plan,

@@ -36,6 +36,7 @@ from service.wire import (
     SET_POINTS,
     STREAM,
     WRENCH_SPACE,
+    Answer,
     Format,
     decode_request,
     encode_error,
@@ -44,7 +45,6 @@ from service.wire import (
 
 __all__ = [
     "SERVICES",
-    "Answer",
     "Planned",
     "handle",
     "plan",
@@ -52,26 +52,6 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
-
-
-class Answer(NamedTuple):
-    """What goes back to the caller.
-
-    Attributes
-    ----------
-    payload : bytes
-    encoding : str
-        Of the payload, with its schema.
-    good : bool
-        Whether it is a reply, and not an error.
-    status : str
-        Of a reply that has one; the kind of an error.
-    """
-
-    payload: bytes
-    encoding: str
-    good: bool
-    status: str = "done"
 
 
 def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
@@ -190,16 +170,15 @@ def handle(
             reply = service.answer(request, robots, streams)
         status: str = getattr(reply, "status", "done")
         return Answer(form.encode(reply), form.label(reply), True, status)
-    except (InvalidInputError, DeadlineError) as error:
-        excuse: CruxError = error
-        known = error.kind in (*REQUEST_KINDS, DeadlineError.kind)
-        blame = error.kind if known else InvalidInputError.kind
+    except InvalidInputError as error:
+        told = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
+        return encode_error(error, form, identifier(payload, form, kind), told)
+    except DeadlineError as error:
+        return encode_error(error, form, identifier(payload, form, kind))
     except MemoryError:
         # of a process, not of a question: who runs the process has to know
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        blame = "internal"
-    coded = encode_error(blame, excuse, form, identifier(payload, form, kind))
-    return Answer(*coded, False, blame)
+        return encode_error(excuse, form, identifier(payload, form, kind), "internal")

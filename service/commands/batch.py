@@ -6,11 +6,11 @@ import os
 import statistics
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
-from typing import IO, TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final
 
 import click
 import msgspec
@@ -29,13 +29,12 @@ from service.commands.terminal import (
     note,
     progress,
     say,
-    unwritten,
     writing,
 )
-from service.processes import Answered, Planners, worth
+from service.processes import Planners, worth
 from service.replies import ErrorDetail
 from service.tables import console, table_of
-from service.wire import REQUEST_KINDS, Format, identifier
+from service.wire import REQUEST_KINDS, Answer, Format, identifier
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -66,50 +65,40 @@ class _Told(msgspec.Struct):
         return EXIT_STATUS.get(str(self.status), FAILED)
 
 
-class _Replies:
-    """Where replies are written, one a line: a file, standard output, or nowhere.
+@contextmanager
+def _writing_replies(
+    file: Path | None, as_json: bool, resume: bool
+) -> Iterator[Callable[[bytes], None]]:
+    """Yield what writes a reply, one a line: to a file, standard output, or nowhere.
 
     A file has whole lines at any time but while one of them is being written.
     """
 
-    def __init__(self, file: Path | None, as_json: bool, resume: bool) -> None:
-        self._file, self._mode = file, "ab" if resume else "wb"
-        self._out: IO[bytes] | None = None
-        if file is None and as_json:
-            self._out = sys.stdout.buffer
+    def say_line(payload: bytes) -> None:
+        if as_json:
+            sys.stdout.buffer.write(payload + b"\n")
+            sys.stdout.buffer.flush()
 
-    def __enter__(self) -> Self:
-        if self._file is not None:
-            try:
-                self._out = self._file.open(self._mode, buffering=0)
-            except OSError as error:
-                raise unwritten(error, self._file, "-o") from None
-        return self
+    if file is None:
+        yield say_line
+        return
+    with writing(file, "-o"):
+        out = file.open("ab" if resume else "wb", buffering=0)
 
-    def __exit__(self, *_: object) -> None:
-        if self._file is not None and self._out is not None:
-            self._out.close()
-
-    def write(self, payload: bytes) -> None:
-        """Write a reply."""
-        if self._out is None:
-            return
-        line = payload + b"\n"
-        if self._file is None:
-            self._out.write(line)
-            self._out.flush()
-            return
-        written = 0
+    def write(payload: bytes) -> None:
+        line, written = payload + b"\n", 0
         try:
-            while written < len(line):
-                written += self._out.write(line[written:])
-        except BaseException as error:
+            with writing(file, "-o"):
+                while written < len(line):
+                    written += out.write(line[written:])
+        except BaseException:
             # a line that is cut off would be read by nobody
             with suppress(OSError):
-                self._out.truncate(self._file.stat().st_size - written)
-            if isinstance(error, OSError):
-                raise unwritten(error, self._file, "-o") from None
+                out.truncate(file.stat().st_size - written)
             raise
+
+    with out:
+        yield write
 
 
 @click.command()
@@ -163,7 +152,7 @@ def batch(
     before, begun = len(told), perf_counter()
     try:
         with (
-            _Replies(file, as_json, resume) as out,
+            _writing_replies(file, as_json, resume) as write,
             Planners(
                 worth(len(lines) - before, workers), robot=robot, hand=hand, folder=folder
             ) as many,
@@ -171,7 +160,7 @@ def batch(
         ):
             tell(before, len(lines))
             for answer in _in_order(many.answers(lines[before:])):
-                out.write(answer.payload)
+                write(answer.payload)
                 told.append(msgspec.json.decode(answer.payload, type=_Told))
                 tell(len(told), len(lines))
     except Interrupted:
@@ -214,10 +203,8 @@ def _check_output(file: Path, requests: str, resume: bool) -> None:
 
 def _answered(file: Path, lines: Sequence[bytes]) -> list[_Told]:
     """Return what the whole lines of a file tell, and drop a last one that is cut off."""
-    try:
+    with writing(file, "-o"):
         data = file.read_bytes() if file.exists() else b""
-    except OSError as error:
-        raise unwritten(error, file, "-o") from None
     whole = data.rfind(b"\n") + 1
     replies = data[:whole].split(b"\n")[:-1]
     if len(replies) > len(lines):
@@ -256,9 +243,9 @@ def _kept(told: Sequence[_Told], lines: Sequence[bytes], file: Path | None) -> s
     return done if file is None else f"{done} in {file}; --resume goes on"
 
 
-def _in_order(answers: Iterator[tuple[int, Answered]]) -> Iterator[Answered]:
+def _in_order(answers: Iterator[tuple[int, Answer]]) -> Iterator[Answer]:
     """Yield answers in the order of their requests, each as soon as those before it are there."""
-    early: dict[int, Answered] = {}
+    early: dict[int, Answer] = {}
     following = 0
     for i, answer in answers:
         early[i] = answer

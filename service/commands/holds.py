@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -18,13 +18,12 @@ from rich.console import Console
 from hand_models.base import InvalidInputError, whole_file
 from hand_models.parameters import ParameterTable
 from service.commands.interruption import Interrupted
-from service.commands.options import FiniteRange, hand_option, json_option, plot_option
+from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
 from service.commands.terminal import progress, say, writing
 from service.tables import console, table_of
 
 if TYPE_CHECKING:
     from hand_models.fixed_wrist import FoundHold, Trial
-    from service.processes import RockTrials
 
     Outcome = FoundHold | InvalidInputError
     Pair = tuple[Trial, FoundHold]
@@ -46,14 +45,6 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 """Of the file."""
 
 
-def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
-    if path.suffix.lower() != OUTPUT:
-        raise click.BadParameter(f"{path}: must end in {OUTPUT}")
-    if not path.parent.is_dir():
-        raise click.BadParameter(f"{path}: no such folder")
-    return path
-
-
 @click.command()
 @click.argument("rock", type=click.Path(path_type=Path))
 @click.option(
@@ -61,7 +52,7 @@ def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     "--output",
     type=click.Path(path_type=Path, dir_okay=False),
     required=True,
-    callback=_check_output,
+    callback=output_in(OUTPUT),
     metavar="JSON",
     help="Where the holds go, the best first, in metres and radians.",
 )
@@ -133,7 +124,7 @@ def holds(
     from hand_models.parameters import hand_table, own_hand
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
-    from service.processes import RockTrials
+    from service.processes import try_everywhere
 
     Surface.named(surface)
     numbers = hand_table() if hand is None else own_hand(hand)
@@ -152,21 +143,21 @@ def holds(
     # before the work is done
     with writing(output, "--output"):
         TemporaryFile(dir=output.parent).close()
-    how = RockTrials(mesh, surface, seat, hand=numbers)
+
+    def tried(places: list[Trial], robust: bool) -> Generator[tuple[int, Outcome], None, None]:
+        return try_everywhere(
+            mesh, surface, places, numbers, seat=seat, robust=robust, workers=workers
+        )
+
     outcomes: dict[int, Outcome] = {}
     scattered: dict[int, Outcome] = {}
     best: list[Pair] = []
     broken = False
     try:
-        _try(f"trying {len(trials):,} places", how, trials, workers, outcomes)
+        _keep(f"trying {len(trials):,} places", trials, tried(trials, False), outcomes)
         best = _sorted(trials, outcomes)[:robust]
-        _try(
-            f"scattering the best {len(best)}",
-            how._replace(robust=True),
-            [trial for trial, _ in best],
-            workers,
-            scattered,
-        )
+        again = [trial for trial, _ in best]
+        _keep(f"scattering the best {len(best)}", again, tried(again, True), scattered)
     except Interrupted:
         if not outcomes:
             raise
@@ -203,19 +194,16 @@ def holds(
         _print(trials, found, refused, mesh.oddities, output, console())
 
 
-def _try(
+def _keep(
     title: str,
-    how: RockTrials,
-    trials: list[Trial],
-    workers: int | None,
+    trials: Sequence[Trial],
+    tried: Generator[tuple[int, Outcome], None, None],
     outcomes: dict[int, Outcome],
 ) -> None:
-    """Try places; what comes of each is kept at once, in case that the rest is broken off."""
-    from service.processes import try_everywhere
-
+    """Keep what comes of each place at once, in case that the rest is broken off."""
     if not trials:
         return
-    with progress(title) as tell, closing(try_everywhere(how, trials, workers)) as found:
+    with progress(title) as tell, closing(tried) as found:
         tell(0, len(trials))
         for i, each in found:
             outcomes[i] = each

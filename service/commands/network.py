@@ -15,10 +15,11 @@ import zenoh
 from hand_models.parameters import ParameterTable
 from service.commands.interruption import kill_children
 from service.commands.options import (
+    PICTURES,
     asked,
-    check_picture,
     hand_option,
     json_option,
+    output_in,
     robot_option,
     timeout_option,
     with_extras,
@@ -200,7 +201,7 @@ def query(
     "--output",
     "picture",
     type=click.Path(path_type=Path),
-    callback=check_picture,
+    callback=output_in(*PICTURES),
     default=Path("crux-demo.png"),
     show_default=True,
     metavar="FILE",

@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
 
 __all__ = [
+    "PICTURES",
     "FiniteRange",
     "asked",
-    "check_picture",
     "folder_option",
     "hand_option",
     "json_option",
     "limb_option",
+    "output_in",
     "plot_option",
     "robot_option",
     "timeout_option",
@@ -58,12 +59,9 @@ class FiniteRange(click.FloatRange):
 
 def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
     """Return a request for a hand and a robot of the caller's own."""
-    request = with_hand(request, hand)
-    if robot is None:
-        return request
     from service.answering import with_robot
 
-    return with_robot(request, robot)
+    return with_robot(with_hand(request, hand), robot)
 
 
 def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> PlanRequest:
@@ -76,13 +74,22 @@ def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> Pla
     return msgspec.structs.replace(request, want=list(want), detail=detail)
 
 
-def check_picture(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
-    """Refuse a picture that cannot be written, before any work is done."""
-    if path is not None and path.suffix not in PICTURES:
-        raise click.BadParameter(f"{path}: valid endings are {', '.join(PICTURES)}")
-    if path is not None and not path.parent.is_dir():
-        raise click.BadParameter(f"{path}: no such folder")
-    return path
+def output_in(
+    *endings: str,
+) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
+    """Return what refuses a file that cannot be written, before any work is done."""
+    valid = f"valid endings are {', '.join(endings)}"
+    if len(endings) == 1:
+        valid = f"must end in {endings[0]}"
+
+    def check(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in endings:
+            raise click.BadParameter(f"{path}: {valid}")
+        if path is not None and not path.parent.is_dir():
+            raise click.BadParameter(f"{path}: no such folder")
+        return path
+
+    return check
 
 
 def _read_hand(
@@ -159,7 +166,7 @@ def plot_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
         "--plot",
         "picture",
         type=click.Path(path_type=Path),
-        callback=check_picture,
+        callback=output_in(*PICTURES),
         metavar="FILE",
         help=text,
     )

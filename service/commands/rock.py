@@ -12,7 +12,7 @@ from rich.console import Console
 from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import scan_table
 from hand_models.scans import ENDINGS, UNITS, UPS
-from service.commands.options import json_option, plot_option
+from service.commands.options import json_option, output_in, plot_option
 from service.commands.terminal import progress, say, writing
 from service.tables import console, table_of
 
@@ -43,14 +43,6 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     return numbers
 
 
-def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
-    if path.suffix.lower() != OUTPUT:
-        raise click.BadParameter(f"{path}: must end in {OUTPUT}")
-    if not path.parent.is_dir():
-        raise click.BadParameter(f"{path}: no such folder")
-    return path
-
-
 @click.command(epilog=f"FILE ends in {', '.join(ENDINGS)}.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
@@ -59,7 +51,7 @@ def _check_output(_: click.Context, __: click.Parameter, path: Path) -> Path:
     "output",
     type=click.Path(path_type=Path, dir_okay=False),
     required=True,
-    callback=_check_output,
+    callback=output_in(OUTPUT),
     metavar="PLY",
     help="Where the triangles go.",
 )

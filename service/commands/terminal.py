@@ -31,7 +31,6 @@ __all__ = [
     "progress",
     "say",
     "show",
-    "unwritten",
     "waiting",
     "writing",
 ]
@@ -81,7 +80,7 @@ def writing(path: Path, field: str = "--plot") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise unwritten(error, path, field) from None
+        raise _unwritten(error, path, field) from None
     except ValueError as error:
         raise InvalidInputError(f"cannot write {path}: {error}", field=field) from None
 
@@ -92,10 +91,10 @@ def filling_folder() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise unwritten(error, error.filename, "DIR") from None
+        raise _unwritten(error, error.filename, "DIR") from None
 
 
-def unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError:
+def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError:
     """Return the error of a file that cannot be written: bad input, but where the disk is full."""
     message = f"cannot write {path}: {error.strerror or error}"
     if error.errno in NO_ROOM:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from contextlib import nullcontext
 from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from hand_models.fixed_wrist import FoundHold, Trial
     from hand_models.rock import Mesh
 
-__all__ = ["RockTrials", "try_everywhere"]
+__all__ = ["try_everywhere"]
 
 TOGETHER: Final = 128
 """Trials that are closed in one batch, at most: some fingers take ten times as long as most, and so
@@ -26,46 +25,29 @@ do the batches that they are in, whatever else is in these."""
 Found = list["FoundHold | InvalidInputError"]
 
 
-class RockTrials(NamedTuple):
-    """How hands are tried on a rock.
-
-    Attributes
-    ----------
-    rock : Mesh
-    surface : str
-        A preset's name.
-    seat : {'rest', 'best'}
-    robust : bool
-        As of `hand_models.fixed_wrist.try_holds`.
-    hand : ParameterTable or None
-        The hand; the bundled one if None.
-    """
-
-    rock: Mesh
-    surface: str
-    seat: Literal["rest", "best"] = "rest"
-    robust: bool = False
-    hand: ParameterTable | None = None
-
-    def trying(self) -> Callable[[Sequence[Trial]], Found]:
-        """Return what tries a few places; called once in each process."""
-        from hand_models.fixed_wrist import try_holds
-        from hand_models.hand import spiny_hand
-        from hand_models.tile import Surface
-
-        hand, surface = spiny_hand(self.hand), Surface.named(self.surface)
-        return partial(try_holds, hand, self.rock, surface, seat=self.seat, robust=self.robust)
-
-
 def try_everywhere(
-    how: RockTrials, trials: Sequence[Trial], workers: int | None = None
+    rock: Mesh,
+    surface: str,
+    trials: Sequence[Trial],
+    hand: ParameterTable,
+    *,
+    seat: Literal["rest", "best"] = "rest",
+    robust: bool = False,
+    workers: int | None = None,
 ) -> Generator[tuple[int, FoundHold | InvalidInputError], None, None]:
     """Yield each place's index, and what a hand holds there, as they are done.
 
     Parameters
     ----------
-    how : RockTrials
+    rock : Mesh
+    surface : str
+        A preset's name.
     trials : sequence of Trial
+    hand : ParameterTable
+        Its numbers.
+    seat : {'rest', 'best'}, optional
+    robust : bool, optional
+        As of `hand_models.fixed_wrist.try_holds`.
     workers : int, optional
         Processes, this one among them; by default one a core.
 
@@ -77,7 +59,7 @@ def try_everywhere(
     """
     count = cores() if workers is None else workers
     # one that is searched for, or scattered, is many already
-    most = TOGETHER if how.seat == "rest" and not how.robust else 1
+    most = TOGETHER if seat == "rest" and not robust else 1
     # what hands at one place have alike is found once
     places = [list(of) for _, of in groupby(range(len(trials)), lambda i: trials[i][:3])]
     # as many for each process
@@ -86,11 +68,22 @@ def try_everywhere(
     # each all over the rock, so that what is broken off has been everywhere
     step = math.ceil(len(places) / size)
     chunks = [[i for place in places[k::step] for i in place] for k in range(step)]
-    here, processes = how.trying(), min(count, len(chunks)) - 1
-    with Workers(how.trying, processes) if processes > 0 else nullcontext() as others:
-        parts = [[trials[i] for i in chunk] for chunk in chunks]
-        pairs = enumerate(map(here, parts)) if others is None else others.each(parts, here)
-        for k, results in pairs:
+    parts = [[trials[i] for i in chunk] for chunk in chunks]
+    make = partial(_trying, rock, surface, hand, seat, robust)
+    with Workers(make, min(count, len(chunks)) - 1) as others:
+        for k, results in others.each(parts, make()):
             if isinstance(results, Lost):
                 results = [InvalidInputError(results.reason) for _ in chunks[k]]
             yield from zip(chunks[k], results, strict=True)
+
+
+def _trying(
+    rock: Mesh, surface: str, numbers: ParameterTable, seat: Literal["rest", "best"], robust: bool
+) -> Callable[[Sequence[Trial]], Found]:
+    """Return what tries a few places; called once in each process."""
+    from hand_models.fixed_wrist import try_holds
+    from hand_models.hand import spiny_hand
+    from hand_models.tile import Surface
+
+    hand = spiny_hand(numbers)
+    return partial(try_holds, hand, rock, Surface.named(surface), seat=seat, robust=robust)

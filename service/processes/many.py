@@ -12,29 +12,23 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, Final, Self
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner.processes import Lost, Workers, cores
+from service.processes.questions import Job, answering
 from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
-from service.wire import PLAN, Format, LostError, MalformedError, encode_error, identifier
+from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
 
-__all__ = ["Answered", "Planners", "plan_many", "worth"]
+__all__ = ["Planners", "plan_many", "worth"]
 
 WORTH_A_PROCESS: Final = 500
 """Requests below this many are planned faster here than in processes that must first start."""
-
-
-class Answered(NamedTuple):
-    """An encoded reply, or an encoded error if it is not good."""
-
-    payload: bytes
-    good: bool
 
 
 class Planners:
@@ -68,27 +62,22 @@ class Planners:
         folder: Path | None = None,
     ) -> None:
         count = cores() if workers is None else _whole(workers)
-        self._make = partial(_answering, robot, hand, folder)
+        self._make = partial(answering, robot, hand, folder)
         self._closed = False
-        self._workers: Workers[tuple[bytes, Format], Answered] | None = None
-        if count > 1:
-            self._workers = Workers(self._make, count - 1)
+        self._workers = Workers(self._make, count - 1)
 
     def __enter__(self) -> Self:
         self._closed = False
-        if self._workers is not None:
-            self._workers.__enter__()
+        self._workers.__enter__()
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         self._closed = True
-        if self._workers is not None:
-            self._workers.__exit__(kind, error, traceback)
+        self._workers.__exit__(kind, error, traceback)
 
     def wait(self) -> None:
         """Wait until all processes have started, if that is better than to begin without them."""
-        if self._workers is not None and not self._closed:
-            self._workers.wait()
+        self._workers.wait()
 
     def plan_many(
         self,
@@ -97,7 +86,7 @@ class Planners:
     ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
         """Return the reply to each request, or the error in its place; as `plan_many`."""
         form = Format.MSGPACK
-        found: dict[int, Answered] = {}
+        found: dict[int, Answer] = {}
         good, payloads = [], []
         for i, request in enumerate(requests):
             try:
@@ -106,7 +95,7 @@ class Planners:
             except (TypeError, ValueError, OverflowError, RecursionError) as error:
                 name = getattr(request, "id", None)
                 known = name if isinstance(name, str) else None
-                found[i] = _refused(MalformedError(f"no request: {error}"), form, known)
+                found[i] = encode_error(MalformedError(f"no request: {error}"), form, known)
         for k, answer in self.answers(payloads, form):
             found[good[k]] = answer
             if progress is not None:
@@ -116,18 +105,14 @@ class Planners:
 
     def answers(
         self, payloads: Sequence[bytes], form: Format = Format.JSON
-    ) -> Iterator[tuple[int, Answered]]:
+    ) -> Iterator[tuple[int, Answer]]:
         """Yield each encoded request's index and encoded answer, as they are done."""
         if self._closed:
             raise InvalidInputError("is closed; enter another, or this one again", field="planners")
-        answer = self._make()
-        if self._workers is None:
-            yield from ((i, answer((payload, form))) for i, payload in enumerate(payloads))
-            return
-        for i, found in self._workers.each([(payload, form) for payload in payloads], answer):
+        asked = [Job(PLAN, payload, form.value) for payload in payloads]
+        for i, found in self._workers.each(asked, self._make()):
             if isinstance(found, Lost):
-                name = identifier(payloads[i], form)
-                yield i, _refused(LostError(found.reason), form, name)
+                yield i, encode_error(LostError(found.reason), form, identifier(payloads[i], form))
             else:
                 yield i, found
 
@@ -190,23 +175,6 @@ def _whole(workers: object) -> int:
     return count
 
 
-def _answering(
-    robot: RobotFile | None, hand: ParameterTable | None, folder: Path | None
-) -> Callable[[tuple[bytes, Format]], Answered]:
-    """Return what answers an encoded request. Here the planner is imported, in each process."""
-    from service.answering import MeshFiles, handle, robots_of
-
-    robots = robots_of(robot)
-    files = None if folder is None else MeshFiles(folder)
-
-    def answer(asked: tuple[bytes, Format]) -> Answered:
-        payload, form = asked
-        found = handle(PLAN, payload, form.value, hand, robots, files=files)
-        return Answered(found.payload, found.good)
-
-    return answer
-
-
 @contextmanager
 def _no_collection() -> Iterator[None]:
     """Let the garbage collector rest: it would go through all replies again and again."""
@@ -219,13 +187,8 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _refused(error: CruxError, form: Format, name: str | None) -> Answered:
-    payload, _ = encode_error(error.kind, error, form, name)
-    return Answered(payload, False)
-
-
 def _decoded(
-    answer: Answered, form: Format, request: PlanRequest
+    answer: Answer, form: Format, request: PlanRequest
 ) -> PlanReply | BriefPlanReply | ErrorReply:
     if not answer.good:
         return form.decode(answer.payload, ErrorReply)

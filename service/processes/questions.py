@@ -1,18 +1,19 @@
-"""What a service's processes do: a query's bytes in, the bytes of its answer out."""
+"""What processes that answer do: a query's bytes in, the bytes of its answer out."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from hand_models.parameters import ParameterTable
+from service.wire import Answer
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
-    from service.answering import Answer
 
-__all__ = ["Done", "Job", "answering"]
+__all__ = ["Job", "answering"]
 
 
 class Job(NamedTuple):
@@ -27,7 +28,7 @@ class Job(NamedTuple):
         Zenoh's name of it.
     waited : float
         How long ago it came [s].
-    seconds : float
+    seconds : float or None
         The service's own deadline, from where it came [s].
     rehearsal : bool
         Whether what is declared is let go again.
@@ -36,35 +37,33 @@ class Job(NamedTuple):
     name: str
     payload: bytes
     encoding: str
-    waited: float
-    seconds: float
+    waited: float = 0.0
+    seconds: float | None = None
     rehearsal: bool = False
 
 
-class Done(NamedTuple):
-    """An answer, and how long the work took [s]."""
-
-    answer: Answer
-    seconds: float
-
-
-def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Done]:
+def answering(
+    robot: RobotFile | None, hand: ParameterTable | None, folder: Path | None = None
+) -> Callable[[Job], Answer]:
     """Return what answers; here the planner is imported, in each process.
 
     Parameters
     ----------
     robot : RobotFile or None
-        The only robot that is planned for; RoboSimian by default.
+        The only robot that is planned for; those that are bundled by default.
     hand : ParameterTable or None
         Entries in which its hands are not the bundled one; a request's own go on top.
+    folder : Path, optional
+        That names of mesh files in requests are relative to; by default requests name none.
     """
     from planner import deadline
-    from service.answering import Streams, handle, robots_of
+    from service.answering import MeshFiles, Streams, handle, robots_of
 
     robots = robots_of(robot)
+    files = None if folder is None else MeshFiles(folder)
     streams = Streams()
 
-    def answer(job: Job) -> Done:
+    def answer(job: Job) -> Answer:
         start = time.perf_counter()
         arrived = start - job.waited
         own = Streams() if job.rehearsal else streams
@@ -78,10 +77,11 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
                     robots,
                     started=arrived,
                     streams=own,
+                    files=files,
                 )
         finally:
             if job.rehearsal:
                 own.close()
-        return Done(found, time.perf_counter() - start)
+        return found._replace(seconds=time.perf_counter() - start)
 
     return answer

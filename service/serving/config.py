@@ -306,23 +306,10 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
     @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
     @wraps(command)
-    def with_config(
-        mode: str | None,
-        connect: tuple[str, ...],
-        listen: tuple[str, ...],
-        file: Path | None,
-        settings: tuple[str, ...],
-        no_multicast_scouting: bool,
-        **rest: Any,
-    ) -> Any:
-        config = zenoh_config(
-            mode=mode,
-            connect=connect,
-            listen=listen,
-            file=file,
-            settings=settings,
-            multicast=not no_multicast_scouting,
-        )
-        return command(config=config, **rest)
+    def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
+        names = ("mode", "connect", "listen", "file", "settings")
+        flags = {name: given.pop(name) for name in names}
+        config = zenoh_config(**flags, multicast=not no_multicast_scouting)
+        return command(config=config, **given)
 
     return with_config

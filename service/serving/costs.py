@@ -6,7 +6,7 @@ Only an expectation: it decides in which queue a question waits, never whether i
 from __future__ import annotations
 
 from collections import OrderedDict
-from typing import Final
+from typing import Any, Final
 
 __all__ = ["DEAR", "Costs"]
 
@@ -39,7 +39,7 @@ class Costs:
     """What has been seen of stances and clients."""
 
     def __init__(self) -> None:
-        self._stances: OrderedDict[int, _Stance] = OrderedDict()
+        self._stances: OrderedDict[int | None, _Stance] = OrderedDict()
         self._clients: OrderedDict[str, float] = OrderedDict()
 
     def took(self, client: str, stance: int | None, process: int | None, seconds: float) -> None:
@@ -73,29 +73,26 @@ class Costs:
 
     def is_short(self, stance: int | None) -> bool:
         """Whether a question about a stance is sure to be answered soon."""
-        seen = self._seen(stance)
+        seen = self._stances.get(stance)
         if seen is None or seen.again is None:
             return False
         return seen.again <= SHORT and seen.first <= SOON
 
     def is_cheap(self, stance: int | None) -> bool:
         """Whether questions about a stance have taken little so far."""
-        seen = self._seen(stance)
+        seen = self._stances.get(stance)
         return seen is not None and (seen.first if seen.again is None else seen.again) <= DEAR
 
     def knows(self, process: int, stance: int | None) -> bool:
         """Whether a process knows a stance."""
-        seen = self._seen(stance)
+        seen = self._stances.get(stance)
         return seen is not None and process in seen.known_to
-
-    def _seen(self, stance: int | None) -> _Stance | None:
-        return None if stance is None else self._stances.get(stance)
 
     def is_dear(self, client: str) -> bool:
         """Whether a client's questions take long."""
         return self._clients.get(client, 0.0) > DEAR
 
 
-def _forget(kept: OrderedDict[int, _Stance] | OrderedDict[str, float]) -> None:
+def _forget(kept: OrderedDict[Any, Any]) -> None:
     if len(kept) > KEPT:
         kept.popitem(last=False)

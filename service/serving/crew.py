@@ -6,9 +6,11 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final
 
-from service.processes import Done, Job, Lane, Make, Station, resident
+from planner.processes import OUT_OF_MEMORY, Lane, Make, Station, resident
+from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import Question
+from service.wire import Answer
 
 __all__ = ["Crew"]
 
@@ -59,21 +61,21 @@ class Crew:
         Processes in a row that died before they were ready.
     """
 
-    def __init__(self, make: Make[Job, Done], workers: int, memory: int) -> None:
+    def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
         self._make, self.workers, self._memory = make, workers, memory
-        self.work: dict[Lane[Job, Done], Question | None] = {}
+        self.work: dict[Lane[Job, Answer], Question | None] = {}
         self.rests_until = 0.0
         self.stillborn = 0
-        self._streams: Station[Job, Done] | None = None
-        self._looked_at: dict[Station[Job, Done], float] = {}
+        self._streams: Station[Job, Answer] | None = None
+        self._looked_at: dict[Station[Job, Answer], float] = {}
 
     @property
-    def stations(self) -> list[Station[Job, Done]]:
+    def stations(self) -> list[Station[Job, Answer]]:
         """The processes."""
         return list(dict.fromkeys(lane.station for lane in self.work))
 
     @property
-    def pipes(self) -> dict[Connection, Lane[Job, Done]]:
+    def pipes(self) -> dict[Connection, Lane[Job, Answer]]:
         """The lanes, by their pipes."""
         return {lane.pipe: lane for lane in self.work}
 
@@ -88,20 +90,24 @@ class Crew:
         if time.perf_counter() < self.rests_until:
             return
         if self._streams is None:
-            self._streams = Station(self._make, STREAMS_LANES, self._memory)
+            self._streams = self._station(STREAMS_LANES)
             self.work |= dict.fromkeys(self._streams.lanes)
         for _ in range(1 + self.workers - len(self.stations)):
-            self.work |= dict.fromkeys(Station(self._make, 1, self._memory).lanes)
+            self.work |= dict.fromkeys(self._station(1).lanes)
 
-    def has_streams(self, lane: Lane[Job, Done]) -> bool:
+    def _station(self, lanes: int) -> Station[Job, Answer]:
+        # what ends the service is for it to answer
+        return Station(self._make, lanes, self._memory, stays=True)
+
+    def has_streams(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane is of the process that has the streams."""
         return lane.station is self._streams
 
-    def is_for_set_points(self, lane: Lane[Job, Done]) -> bool:
+    def is_for_set_points(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane is kept for set-points."""
         return self.has_streams(lane) and lane.number == SET_POINTS_LANE
 
-    def idle(self) -> list[Lane[Job, Done]]:
+    def idle(self) -> list[Lane[Job, Answer]]:
         """Return the lanes that have nothing to do."""
         return [
             lane
@@ -115,14 +121,14 @@ class Crew:
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
         return sum(each is not None and each.dear for each in asked)
 
-    def ends(self, lane: Lane[Job, Done]) -> tuple[float, float]:
+    def ends(self, lane: Lane[Job, Answer]) -> tuple[float, float]:
         """Return when the question that a lane works on, and then its process, are given up."""
         question = self.work[lane]
         assert question is not None
         late = question.deadline + GRACE
         return late, question.deadline + HANGS if self.has_streams(lane) else late
 
-    def has_grown(self, lane: Lane[Job, Done]) -> bool:
+    def has_grown(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane's process is seen to have so much memory that a new one is better."""
         station, now = lane.station, time.perf_counter()
         if station is self._streams or now < self._looked_at.get(station, 0.0) + LOOKED_AT:
@@ -132,7 +138,7 @@ class Crew:
         return size is not None and size > GROWN
 
     def dismiss(
-        self, station: Station[Job, Done], *, dead: bool = False
+        self, station: Station[Job, Answer], *, dead: bool = False
     ) -> tuple[str, list[Question]]:
         """End a process; parameters as for `Station.kill`.
 
@@ -154,7 +160,7 @@ class Crew:
             self.rests_until = time.perf_counter() + rest
             self.stillborn += 1
         left = [each for each in asked if each is not None and not each.replied]
-        return station.kill(dead=dead), left
+        return _ending(station.kill(dead=dead)), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
@@ -170,7 +176,7 @@ class Crew:
         """Return what each process does."""
         return [self._state(station) for station in self.stations]
 
-    def _state(self, station: Station[Job, Done]) -> ProcessHealth:
+    def _state(self, station: Station[Job, Answer]) -> ProcessHealth:
         busy = any(self.work[lane] is not None for lane in station.lanes)
         return ProcessHealth(
             pid=station.process.pid,
@@ -178,3 +184,12 @@ class Crew:
             state="starting" if not station.ready else "working" if busy else "idle",
             resident=resident(station.process.pid),
         )
+
+
+def _ending(status: int | None) -> str:
+    """Return in words how a process ended."""
+    if status is None:
+        return "was stopped"
+    if status == OUT_OF_MEMORY:
+        return "had not enough memory"
+    return f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"

@@ -23,15 +23,24 @@ import zenoh
 
 from hand_models.base import CruxError
 from planner.deadline import DeadlineError
-from service.answering import Answer
-from service.processes import Done, Job, Lane, Station
+from planner.processes import Lane, Station
+from service.processes import Job
 from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.mail import Mail, reply_to
 from service.serving.question import Question, client_of, take
 from service.serving.waiting import Kind, Waiting
-from service.serving.watch import State, Told, Watch
-from service.wire import PLAN, SET_POINTS, STREAM, BusyError, Format, LostError, encode_error
+from service.serving.watch import State, Watch
+from service.wire import (
+    PLAN,
+    SET_POINTS,
+    STREAM,
+    Answer,
+    BusyError,
+    Format,
+    LostError,
+    encode_error,
+)
 
 __all__ = ["Dispatcher"]
 
@@ -130,12 +139,9 @@ class Dispatcher:
         """Take a query at a key; returns at once, whatever the thread."""
         self._post(partial(self._admit, query, key, time.perf_counter()))
 
-    def look(self, query: zenoh.Query, key: str, told: Callable[[], Told]) -> None:
+    def look(self, told: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
         """Take an operator's query; returns at once."""
-        self._mail.send(
-            client_of(query) or OPERATORS,
-            partial(reply_to, query, key, lambda: Answer(*told(), True)),
-        )
+        self._mail.send(client_of(query) or OPERATORS, partial(reply_to, query, key, told))
 
     def gone(self, client: str) -> None:
         """Say that a client has gone: what it asked is not answered unless it is in work."""
@@ -232,8 +238,7 @@ class Dispatcher:
         except Exception:
             log.exception("a query at %s cannot be read", key)
             unread = CruxError("the service could not read the query; its log says why")
-            coded = encode_error("internal", unread, Format.JSON)
-            self._send(query, key, "", Answer(*coded, False, "internal"))
+            self._send(query, key, "", encode_error(unread, Format.JSON, kind="internal"))
             return
         if self._stops_at is not None:
             self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
@@ -281,10 +286,10 @@ class Dispatcher:
             if question := self._waiting.take(*kinds):
                 self._give(lane, question)
 
-    def _knows(self, lane: Lane[Job, Done], question: Question) -> bool:
+    def _knows(self, lane: Lane[Job, Answer], question: Question) -> bool:
         return self._costs.knows(_number(lane.station), question.stance)
 
-    def _give(self, lane: Lane[Job, Done], question: Question) -> None:
+    def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
@@ -297,7 +302,7 @@ class Dispatcher:
 
     # answers -------------------------------------------------------------------------------------
 
-    def _take_back(self, lane: Lane[Job, Done]) -> None:
+    def _take_back(self, lane: Lane[Job, Answer]) -> None:
         try:
             done = lane.take()
         except EOFError:
@@ -316,11 +321,11 @@ class Dispatcher:
         self._mean += (done.seconds - self._mean) / AVERAGED
         stance = asked.stance if asked.name == PLAN else None
         self._costs.took(asked.client, stance, _number(lane.station), done.seconds)
-        if asked.name == STREAM and not asked.rehearsed and done.answer.good:
+        if asked.name == STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._waiting.put(Kind.DECLARED, asked)
         elif not asked.replied:
-            self._reply(asked, done.answer, done.seconds)
+            self._reply(asked, done)
         if self._crew.has_grown(lane):
             self._dismiss(lane.station, "had grown too large")
 
@@ -343,7 +348,7 @@ class Dispatcher:
                 self._dismiss(lane.station, "did not stop at a deadline")
 
     def _dismiss(
-        self, station: Station[Job, Done], why: str | None = None
+        self, station: Station[Job, Answer], why: str | None = None
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
         how, left = self._crew.dismiss(station, dead=why is None)
@@ -352,12 +357,11 @@ class Dispatcher:
         return how, left
 
     def _refuse(self, question: Question, error: CruxError) -> None:
-        coded = encode_error(error.kind, error, question.form, question.id)
-        self._reply(question, Answer(*coded, False, error.kind), 0.0)
+        self._reply(question, encode_error(error, question.form, question.id))
 
-    def _reply(self, question: Question, answer: Answer, seconds: float) -> None:
+    def _reply(self, question: Question, answer: Answer) -> None:
         question.replied, question.payload = True, b""
-        self.watch.told(question, answer.status, seconds)
+        self.watch.told(question, answer.status, answer.seconds)
         self._send(question.query, question.key, question.client, answer)
 
     def _send(self, query: zenoh.Query, key: str, client: str, answer: Answer) -> None:
@@ -396,5 +400,5 @@ class Dispatcher:
         return True
 
 
-def _number(station: Station[Job, Done]) -> int:
+def _number(station: Station[Job, Answer]) -> int:
     return station.process.pid or 0

@@ -15,7 +15,7 @@ from typing import Final
 
 import zenoh
 
-from service.answering import Answer
+from service.wire import Answer
 
 __all__ = ["Mail", "reply_to"]
 
@@ -29,8 +29,7 @@ class Mail:
     """Sends replies in the background. Safe to use from several threads."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._sent = threading.Condition(self._lock)
+        self._sent = threading.Condition()
         self._to: dict[str, deque[Callable[[], None]]] = {}
         self._clients: SimpleQueue[str | None] = SimpleQueue()
         for _ in range(SENDERS):
@@ -38,7 +37,7 @@ class Mail:
 
     def send(self, client: str, reply: Callable[[], None]) -> None:
         """Let a reply be sent after those to the same client that have been handed in before."""
-        with self._lock:
+        with self._sent:
             waiting = self._to.get(client)
             if waiting is not None:
                 waiting.append(reply)

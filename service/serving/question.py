@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import msgspec
@@ -51,10 +51,8 @@ class Question:
         On the clock of `time.perf_counter`.
     payload : bytes
     encoding : str
-    deadline : float
-        When its time is over, on the same clock.
     seconds : float
-        How long that is [s].
+        Its deadline [s].
     id : str or None
     stance : int or None
         A hash of its stance, where it could be read.
@@ -65,8 +63,6 @@ class Question:
     fault : LimitError or None
         If it has too many bytes, which are not taken then.
     replied : bool
-    waits : bool
-        In a queue.
     begun : float
         When a process was given it, on the same clock; negative before.
     """
@@ -85,12 +81,12 @@ class Question:
     rehearsed: bool = False
     fault: LimitError | None = None
     replied: bool = False
-    waits: bool = False
     begun: float = -1.0
-    deadline: float = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.deadline = self.arrived + self.seconds
+    @property
+    def deadline(self) -> float:
+        """When its time is over, on the same clock."""
+        return self.arrived + self.seconds
 
     @property
     def form(self) -> Format:
@@ -163,7 +159,6 @@ def _read(question: Question) -> None:
     # what no request may have is refused by its process, in the service's own time
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
-        question.deadline = question.arrived + question.seconds
     question.dear = question.dear or (isinstance(want, list) and "robust" in want)
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 

@@ -6,23 +6,23 @@ Nothing is worked out on zenoh's threads, and none of them ever waits.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import zenoh
 from zenoh.handlers import Callback
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.processes import cores
+from planner.processes import Make, cores
 from planner.robots import RobotFile
 from service.answering import SERVICES, robots_of
-from service.processes import Done, Job, Make, answering
+from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.watch import Told
-from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, service_key
+from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, Answer, service_key
 
 __all__ = ["MEMORY", "PlanService"]
 
@@ -83,7 +83,7 @@ class PlanService:
         workers: int | None = None,
         seconds: float = DEFAULT_DEADLINE,
         memory: int = MEMORY,
-        make: Make[Job, Done] | None = None,
+        make: Make[Job, Answer] | None = None,
     ) -> None:
         count = max(FEWEST, cores()) if workers is None else workers
         if count < 1:
@@ -101,10 +101,7 @@ class PlanService:
         made = make or partial(answering, robot, hand)
         self._dispatcher = Dispatcher(Crew(made, count, memory), seconds, self.robot)
         self._watch = self._dispatcher.watch
-        self._declared: list[
-            zenoh.Queryable[None] | zenoh.Subscriber[None] | zenoh.TransportEventsListener[None]
-        ] = []
-        self._token: zenoh.LivelinessToken | None = None
+        self._open = ExitStack()
 
     def has_rival(self) -> bool:
         """Say whether another service answers for the robot; to be asked before entering."""
@@ -126,48 +123,37 @@ class PlanService:
 
     def __enter__(self) -> Self:
         self._dispatcher.start()
+        self._open.callback(self._dispatcher.close)
         for key in self.keys:
-            self._declare(key, partial(self._ask, key))
+            self._declare(key, self._dispatcher.ask)
         health, metrics = self.operators
         for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
-            self._declare(key, partial(self._look, key, told))
-        info = self._session.info
-        self._declared.append(
-            info.declare_transport_events_listener(Callback(self._transport, indirect=False))
-        )
-        clients = service_key(self.robot, f"{CLIENTS}/*")
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(
-                clients, Callback(self._client, indirect=False)
-            )
-        )
-        self._token = self._session.liveliness().declare_token(self._alive)
+            self._declare(key, partial(self._dispatcher.look, told))
+        links = Callback(self._transport, indirect=False)
+        self._until_the_end(self._session.info.declare_transport_events_listener(links))
+        liveliness, clients = self._session.liveliness(), service_key(self.robot, f"{CLIENTS}/*")
+        seen = Callback(self._client, indirect=False)
+        self._until_the_end(liveliness.declare_subscriber(clients, seen))
+        self._open.callback(self._dispatcher.stop)
+        self._until_the_end(liveliness.declare_token(self._alive))
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._token is not None:
-            self._token.undeclare()
-        self._dispatcher.stop()
-        for declared in self._declared:
-            declared.undeclare()  # type: ignore[no-untyped-call]
-        self._dispatcher.close()
+        self._open.close()
 
-    def _declare(self, key: str, callback: Callable[[zenoh.Query], None]) -> None:
-        self._declared.append(
-            self._session.declare_queryable(key, Callback(callback, indirect=False), complete=True)
-        )
+    def _until_the_end(self, declared: Any) -> None:
+        self._open.callback(declared.undeclare)
 
-    def _ask(self, key: str, query: zenoh.Query) -> None:
-        if _means(query, key):
-            self._dispatcher.ask(query, key)
-        else:
-            query.drop()
+    def _declare(self, key: str, take: Callable[[zenoh.Query, str], None]) -> None:
+        def callback(query: zenoh.Query) -> None:
+            # for the key itself, and not for every one that it happens to match
+            if str(query.key_expr).rpartition("/")[2] == key.rpartition("/")[2]:
+                take(query, key)
+            else:
+                query.drop()
 
-    def _look(self, key: str, told: Callable[[], Told], query: zenoh.Query) -> None:
-        if _means(query, key):
-            self._dispatcher.look(query, key, told)
-        else:
-            query.drop()
+        taker = Callback(callback, indirect=False)
+        self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
 
     def _transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE:
@@ -176,8 +162,3 @@ class PlanService:
     def _client(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
             self._dispatcher.gone(str(sample.key_expr).rpartition("/")[2])
-
-
-def _means(query: zenoh.Query, key: str) -> bool:
-    """Whether a query is for a key, and not for every one that it happens to match."""
-    return str(query.key_expr).rpartition("/")[2] == key.rpartition("/")[2]

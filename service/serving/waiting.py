@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
-from collections import Counter, OrderedDict, deque
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from enum import Enum
+from itertools import chain
 from typing import Final
 
 from service.serving.question import LARGE, Question
@@ -25,9 +24,6 @@ HELD: Final = 2**28
 
 SHARE: Final = 2**26
 """Bytes of those of one client, unless it is one question."""
-
-STALE: Final = 16
-"""Deadlines that are kept for each question that waits, of those that waited before."""
 
 
 class Kind(Enum):
@@ -48,46 +44,37 @@ class FairQueue:
     """Questions by client: first in, first out among a client's, and clients in turn."""
 
     def __init__(self) -> None:
-        self._of: OrderedDict[str, deque[Question]] = OrderedDict()
-        self._size = 0
+        self._of: dict[str, deque[Question]] = {}
+
+    def __iter__(self) -> Iterator[Question]:
+        return chain.from_iterable(self._of.values())
 
     def __len__(self) -> int:
-        return self._size
+        return sum(map(len, self._of.values()))
 
     def has_room(self, client: str) -> bool:
         """Whether one more question of a client may wait."""
-        return self._size < ALL and len(self._of.get(client, ())) < EACH
+        return len(self) < ALL and len(self._of.get(client, ())) < EACH
 
     def put(self, question: Question) -> None:
         """Let a question wait."""
         self._of.setdefault(question.client, deque()).append(question)
-        self._size += 1
 
     def take(self) -> Question:
         """Return the next question; the client whose it is comes last from then on."""
-        client, questions = next(iter(self._of.items()))
+        client = next(iter(self._of))
+        questions = self._of.pop(client)
         question = questions.popleft()
         if questions:
-            self._of.move_to_end(client)
-        else:
-            del self._of[client]
-        self._size -= 1
+            self._of[client] = questions
         return question
 
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
-        gone = []
-        for client, questions in list(self._of.items()):
-            out = [question for question in questions if unwanted(question)]
-            if not out:
-                continue
-            gone += out
-            kept = deque(question for question in questions if not unwanted(question))
-            if kept:
-                self._of[client] = kept
-            else:
-                del self._of[client]
-        self._size -= len(gone)
+        gone = [question for question in self if unwanted(question)]
+        for question in gone:
+            self._of[question.client].remove(question)
+        self._of = {client: questions for client, questions in self._of.items() if questions}
         return gone
 
 
@@ -97,11 +84,9 @@ class Waiting:
     def __init__(self) -> None:
         self._queues = {kind: FairQueue() for kind in Kind}
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
-        self._bytes: Counter[str] = Counter()
-        """Of large questions, by client."""
-        self._ends: list[tuple[float, int, Question]] = []
-        """A heap; also of questions that wait no longer."""
-        self._order = itertools.count()
+
+    def __iter__(self) -> Iterator[Question]:
+        return chain.from_iterable(self._queues.values())
 
     def __len__(self) -> int:
         return sum(map(len, self._queues.values()))
@@ -116,29 +101,25 @@ class Waiting:
 
     def _fits(self, question: Question) -> bool:
         """Whether there is room for a large question: what is small is no matter of bytes."""
-        size, own = len(question.payload), self._bytes[question.client]
-        if size <= LARGE or not self._bytes:
+        size = len(question.payload)
+        if size <= LARGE:
             return True
-        return (not own or own + size <= SHARE) and self._bytes.total() + size <= HELD
+        held: Counter[str] = Counter()
+        for each in self:
+            if len(each.payload) > LARGE:
+                held[each.client] += len(each.payload)
+        own = held[question.client]
+        return not held or ((not own or own + size <= SHARE) and held.total() + size <= HELD)
 
     def put(self, kind: Kind, question: Question) -> None:
         """Let a question wait."""
-        if len(question.payload) > LARGE:
-            self._bytes[question.client] += len(question.payload)
         self._queues[kind].put(question)
-        question.waits = True
-        heapq.heappush(self._ends, (question.deadline, next(self._order), question))
-        if len(self._ends) > STALE * (len(self) + 1):
-            self._ends = [end for end in self._ends if end[-1].waits]
-            heapq.heapify(self._ends)
 
     def take(self, *kinds: Kind) -> Question | None:
         """Return the next question of the first of some kinds that has one."""
         for kind in kinds:
             if self._queues[kind]:
-                question = self._queues[kind].take()
-                self._let_go(question)
-                return question
+                return self._queues[kind].take()
         return None
 
     def next(self, *, dear: bool) -> Question | None:
@@ -162,27 +143,14 @@ class Waiting:
 
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
-        gone = [each for queue in self._queues.values() for each in queue.remove(unwanted)]
-        for question in gone:
-            self._let_go(question)
-        return gone
+        return [each for queue in self._queues.values() for each in queue.remove(unwanted)]
 
     def first_deadline(self) -> float:
         """Return when the first question's time is over; infinity where none waits."""
-        while self._ends and not self._ends[0][-1].waits:
-            heapq.heappop(self._ends)
-        return self._ends[0][0] if self._ends else math.inf
+        return min((each.deadline for each in self), default=math.inf)
 
     def overdue(self, now: float) -> list[Question]:
         """Take out the questions whose time is over; return them."""
         if self.first_deadline() > now:
             return []
         return self.remove(lambda each: each.deadline <= now)
-
-    def _let_go(self, question: Question) -> None:
-        question.waits = False
-        size, client = len(question.payload), question.client
-        if size > LARGE:
-            self._bytes[client] -= size
-            if not self._bytes[client]:
-                del self._bytes[client]

@@ -22,9 +22,9 @@ from prometheus_client.registry import Collector
 
 from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.serving.question import Question
-from service.wire import Format
+from service.wire import Answer, Format
 
-__all__ = ["State", "Told", "Watch"]
+__all__ = ["State", "Watch"]
 
 log = logging.getLogger(__name__)
 
@@ -35,9 +35,6 @@ LOOPBACK: Final = "127.0.0.1"
 
 FAILURES: Final = frozenset({"failed", "internal", "lost", "deadline"})
 """Statuses and kinds of error that are the service's, and not the question's."""
-
-Told = tuple[bytes, str]
-"""What an operator is told, and its encoding."""
 
 
 class State(NamedTuple):
@@ -150,7 +147,7 @@ class Watch:
         self._failure = LastFailure(kind="lost", about=f"process {pid} {how}", at=time.time())
         log.warning("process %s %s; another takes its place", pid, how)
 
-    def health(self) -> Told:
+    def health(self) -> Answer:
         """Return the service's health as a reply."""
         state = self._state()
         reply = HealthReply(
@@ -162,11 +159,11 @@ class Watch:
             processes=state.processes,
             last_failure=self._failure,
         )
-        return Format.JSON.encode(reply), Format.JSON.label(reply)
+        return Answer(Format.JSON.encode(reply), Format.JSON.label(reply))
 
-    def metrics(self) -> Told:
+    def metrics(self) -> Answer:
         """Return what has been counted, as Prometheus reads it."""
-        return generate_latest(self.registry), CONTENT_TYPE_LATEST
+        return Answer(generate_latest(self.registry), CONTENT_TYPE_LATEST)
 
 
 class _Now(Collector):

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
 from hand_models.base import InvalidInputError, UnsupportedError
-from service import requests
 
 __all__ = ["check"]
 
@@ -24,21 +23,14 @@ class _Later(NamedTuple):
     advice: str
 
 
-_OMIT = "leave it out"
-
-_OBJECTIVE = _Later(("max_margin", "min_effort"), "valid are max_margin and min_effort")
-
-LATER: Final[dict[type, dict[str, _Later]]] = {
-    requests.PlanRequest: {
-        "objective": _OBJECTIVE,
-        "confidence": _Later((None,), f"{_OMIT}: tile limits are nominal"),
-    },
-    requests.RouteRequest: {"objective": _OBJECTIVE},
+LATER: Final = {
+    "objective": _Later(("max_margin", "min_effort"), "valid are max_margin and min_effort"),
+    "confidence": _Later((None,), "leave it out: tile limits are nominal"),
 }
-"""By message and field, what this version supports of the fields that later versions will."""
+"""What this version supports of the fields that later versions will."""
 
-BULK: Final[dict[type, tuple[str, ...]]] = {requests.Mesh: ("vertices", "faces")}
-"""By message, long lists of numbers that their model checks as arrays."""
+BULK: Final = ("vertices", "faces")
+"""Long lists of numbers of a mesh, which its model checks as arrays."""
 
 
 def check(value: object, path: str = "") -> None:
@@ -55,15 +47,14 @@ def check(value: object, path: str = "") -> None:
         if not math.isfinite(value):
             raise InvalidInputError(f"must be a finite number, got {value}", field=path)
     elif isinstance(value, msgspec.Struct):
-        later = {k: v for kind in type(value).__mro__ for k, v in LATER.get(kind, {}).items()}
         for name in value.__struct_fields__:
             part, field = getattr(value, name), f"{path}.{name}" if path else name
-            if name in later and part not in later[name].supported:
+            if name in LATER and part not in LATER[name].supported:
+                given = f"{part} is " if isinstance(part, str) else ""
                 raise UnsupportedError(
-                    f"{_given(part)}not supported in this version; {later[name].advice}",
-                    field=field,
+                    f"{given}not supported in this version; {LATER[name].advice}", field=field
                 )
-            if name not in BULK.get(type(value), ()):
+            if name not in BULK:
                 check(part, field)
     elif isinstance(value, Mapping):
         for name, part in value.items():
@@ -71,7 +62,3 @@ def check(value: object, path: str = "") -> None:
     elif isinstance(value, (list, tuple)):
         for i, part in enumerate(value):
             check(part, f"{path}[{i}]")
-
-
-def _given(value: Any) -> str:
-    return f"{value} is " if isinstance(value, str) else ""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from enum import Enum
-from typing import Any, Final, TypeVar
+from functools import partial
+from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
@@ -14,11 +15,12 @@ from service.requests import Identifier, SetPointsRequest, StreamRequest
 from service.wire.checks import check
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
-from service.wire.validation_errors import leaves_open, validation_error
+from service.wire.validation_errors import validation_error
 
 __all__ = [
     "LARGEST_ERROR",
     "LARGEST_REQUEST",
+    "Answer",
     "Format",
     "check_size",
     "decode_request",
@@ -116,6 +118,29 @@ class Format(Enum):
             raise MalformedError("nested too deeply") from None
 
 
+class Answer(NamedTuple):
+    """What goes back to the caller.
+
+    Attributes
+    ----------
+    payload : bytes
+    encoding : str
+        Of the payload, with its schema.
+    good : bool
+        Whether it is a reply, and not an error.
+    status : str
+        Of a reply that has one; the kind of an error.
+    seconds : float
+        How long the work took [s].
+    """
+
+    payload: bytes
+    encoding: str
+    good: bool = True
+    status: str = "done"
+    seconds: float = 0.0
+
+
 def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) -> T:
     """Return bytes as a request that has passed every check which needs no model.
 
@@ -132,9 +157,11 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             # no bound is kept by what is not a number
             with suppress(RecursionError):
                 check(_plain(payload, form))
-        document = _plain(payload, form) if leaves_open(error) else None
         field, message = validation_error(
-            error, kind, document, lambda part: form.decode(form.encode(part), kind)
+            error,
+            kind,
+            partial(_plain, payload, form),
+            lambda part: form.decode(form.encode(part), kind),
         )
         raise InvalidInputError(message, field=field) from None
     try:
@@ -195,21 +222,31 @@ def identifier(payload: bytes, form: Format, kind: type | None = None) -> str | 
 
 
 def encode_error(
-    kind: str, error: CruxError, form: Format, name: str | None = None
-) -> tuple[bytes, str]:
-    """Return an error reply's bytes and encoding; ``name`` is the request's ``id``.
+    error: CruxError, form: Format, name: str | None = None, kind: str | None = None
+) -> Answer:
+    """Return an error reply as an answer.
 
     Texts are cut where there would be more than `LARGEST_ERROR` bytes of it.
+
+    Parameters
+    ----------
+    error : CruxError
+    form : Format
+    name : str, optional
+        The request's ``id``.
+    kind : str, optional
+        What the caller is told; by default the error's own.
     """
+    told = error.kind if kind is None else kind
     detail = ErrorDetail(
-        kind,
+        told,
         None if error.field is None else _cut(error.field, PARTS["field"], form),
         _cut(error.message, PARTS["message"], form),
     )
     if isinstance(error, BusyError):
         detail.retry_after = error.retry_after
     reply = ErrorReply(id=None if name is None else _cut(name, PARTS["id"], form), error=detail)
-    return form.encode(reply), form.label(reply)
+    return Answer(form.encode(reply), form.label(reply), False, told)
 
 
 def _cut(text: str, most: int, form: Format) -> str:

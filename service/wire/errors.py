@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from hand_models.base import CruxError, InvalidInputError
 
@@ -45,9 +44,6 @@ class BusyError(CruxError):
         super().__init__(message)
         self.retry_after = retry_after
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return BusyError, (self.message, self.retry_after)
-
 
 class MalformedError(InvalidInputError):
     """Bytes that are not the encoding they claim to be, or too many of them."""
@@ -83,12 +79,6 @@ class ServiceError(CruxError):
         super().__init__(message, field=field)
         self.kind = kind
         self.retry_after = retry_after
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        again = partial(
-            ServiceError, self.kind, self.message, field=self.field, retry_after=self.retry_after
-        )
-        return again, ()
 
 
 class LostError(CruxError):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -11,13 +12,15 @@ from typing import Any, Final, NamedTuple
 import msgspec
 from msgspec import inspect
 
-__all__ = ["leaves_open", "validation_error"]
+__all__ = ["validation_error"]
 
 WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
-ANY_KEY: Final = "[...]"
-"""What stands in msgspec's paths for a key that the caller chose."""
+STEP: Final = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[\.\.\.\]")
+"""A field, an index, or what stands in msgspec's paths for a key that the caller chose."""
 
-STEP: Final = re.compile(r"\.([^.\[\]]+)|\[([^\]]*)\]")
+OF_FIELD: Final = re.compile(
+    r"Object (?:missing required|contains (unknown)) field `(.*)`", re.DOTALL
+)
 WORDS: Final = {
     "float": "a number",
     "int": "a whole number",
@@ -33,6 +36,9 @@ SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
 UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
 """Where a description says its units: one, or two of a wrench, forces first."""
 
+Step = str | int | None
+"""Of a path; None for a key that the caller chose."""
+
 Decoder = Callable[[Any], object]
 
 LONGEST: Final = 400
@@ -40,7 +46,7 @@ LONGEST: Final = 400
 
 
 def validation_error(
-    error: msgspec.ValidationError, kind: type, document: Any, decode: Decoder
+    error: msgspec.ValidationError, kind: type, document: Callable[[], Any], decode: Decoder
 ) -> tuple[str | None, str]:
     """Return the field's dotted path, or None for the whole message, and one line about it.
 
@@ -50,27 +56,22 @@ def validation_error(
         From decoding a ``kind``.
     kind : type
         Message that was expected.
-    document : object
-        What was decoded, as plain lists and dicts, to look up keys that the caller chose; None
-        where those are not known.
+    document : callable
+        Returns what was decoded, as plain lists and dicts, to look up keys that the caller chose;
+        None where those are not known.
     decode : callable
         Decodes such a document, or a part of it, as the first one was; raises what that raised.
     """
-    text = str(error)
-    found = WHERE.search(text)
-    path = found.group(1) if found else ""
-    complaint = text[: found.start()] if found else text
-    places = list(_places_at(_known(kind), path))
+    complaint, path = _parts(error)
+    steps = _steps(path)
+    places = list(_places_at(_known(kind), steps))
     types = [place.kind for place in places]
-    field = _with_keys(path, document, decode).removeprefix(".")
-
-    name = re.search(r"`(.*)`$", complaint, re.DOTALL)
-    if complaint.startswith("Object missing required field") and name:
-        field = f"{field}.{name[1]}" if field else name[1]
-        message = "missing"
-    elif complaint.startswith("Object contains unknown field") and name:
-        field = f"{field}.{name[1]}" if field else name[1]
-        message = f"unknown field; known are {', '.join(_field_names(types))}"
+    field = _with_keys(path, steps, document, decode)
+    if of_field := OF_FIELD.fullmatch(complaint):
+        unknown, name = of_field.groups()
+        field = f"{field}.{name}"
+        known = ", ".join(_field_names(types))
+        message = f"unknown field; known are {known}" if unknown else "missing"
     elif complaint.startswith(("Invalid value ", "Invalid enum value ")):
         value = complaint.partition("value ")[2]
         message = f"{_clip(value)} is not known; valid: {', '.join(_values(types))}"
@@ -79,7 +80,18 @@ def validation_error(
         message = message[:1].lower() + message[1:]
         if OUT_OF_RANGE.search(complaint):
             message += _in_units(places)
-    return _clip(field) or None, _clip(message)
+    return _clip(field.removeprefix(".")) or None, _clip(message)
+
+
+def _parts(error: msgspec.ValidationError) -> tuple[str, str]:
+    """Return what msgspec complains of, and the path where."""
+    text = str(error)
+    found = WHERE.search(text)
+    return (text, "") if found is None else (text[: found.start()], found[1])
+
+
+def _steps(path: str) -> list[Step]:
+    return [name or (int(index) if index else None) for name, index in STEP.findall(path)]
 
 
 @cache
@@ -88,77 +100,56 @@ def _known(kind: type) -> inspect.Type:
     return inspect.type_info(kind)
 
 
-def leaves_open(error: msgspec.ValidationError) -> bool:
-    """Say whether an error names its field but for a key that the caller chose."""
-    return ANY_KEY in str(error)
-
-
 def _clip(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
-def _with_keys(path: str, document: Any, decode: Decoder) -> str:
-    """Return a path with the keys that msgspec leaves open."""
-    first, *others = path.split(ANY_KEY)
-    text, steps = first, _steps(first)
-    for part in others:
-        key = _key_to_blame(steps, path, document, decode)
-        if key is None:
+def _with_keys(
+    path: str, steps: Sequence[Step], document: Callable[[], Any], decode: Decoder
+) -> str:
+    """Return a path with the keys that msgspec leaves open, if all of them can be told."""
+    known: list[Step] = []
+    for step in steps:
+        try:
+            known.append(_key_to_blame(document(), known, path, decode) if step is None else step)
+        except (LookupError, TypeError, AttributeError, RecursionError):
             return path
-        text += f".{key}{part}"
-        steps += [key, *_steps(part)]
-    return text
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in known)
 
 
-def _steps(path: str) -> list[str | int]:
-    return [name or int(index) for name, index in STEP.findall(path)]
-
-
-def _key_to_blame(place: list[str | int], path: str, document: Any, decode: Decoder) -> str | None:
-    """Return the key whose value is wrong in an object of a document; None if none can be told.
+def _key_to_blame(document: Any, place: list[Step], path: str, decode: Decoder) -> str:
+    """Return the key whose value is wrong in an object of a document.
 
     Values are read in order up to the first that is wrong, so it is the last of the shortest
     beginning of the object that is refused for the same field.
+
+    Raises
+    ------
+    LookupError
+        If none can be told.
     """
-    try:
-        keys = list(_at(document, place))
-        few, many = 0, len(keys)
-        if not _refused(document, path, decode):
-            return None
-        while many - few > 1:
-            middle = (few + many) // 2
-            if _refused(_beginning(document, place, middle), path, decode):
-                many = middle
-            else:
-                few = middle
-        return str(keys[few])
-    except (LookupError, TypeError, AttributeError, RecursionError):
-        return None
+    whole = document
+    for step in place:
+        whole = whole[step]
+    keys = list(whole)
+
+    def refused(count: int) -> bool:
+        try:
+            decode(_beginning(document, place, count))
+        except msgspec.ValidationError as error:
+            return _parts(error)[1] == path
+        return False
+
+    return str(keys[bisect_left(range(1, len(keys) + 1), True, key=refused)])
 
 
-def _at(document: Any, steps: list[str | int]) -> Any:
-    for step in steps:
-        document = document[step]
-    return document
-
-
-def _beginning(document: Any, steps: list[str | int], count: int) -> Any:
+def _beginning(document: Any, steps: Sequence[Step], count: int) -> Any:
     """Return a document with only the first few entries of the object at a place."""
     if not steps:
         return dict(islice(document.items(), count))
     copy = document.copy()
     copy[steps[0]] = _beginning(document[steps[0]], steps[1:], count)
     return copy
-
-
-def _refused(document: Any, path: str, decode: Decoder) -> bool:
-    """Say whether a document is refused for the field of that path."""
-    try:
-        decode(document)
-    except msgspec.ValidationError as error:
-        found = WHERE.search(str(error))
-        return found is not None and found.group(1) == path
-    return False
 
 
 def _plain(match: re.Match[str]) -> str:
@@ -184,26 +175,26 @@ def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[_Place]:
         yield _Place(kind, units)
 
 
-def _places_at(kind: inspect.Type, path: str) -> Iterable[_Place]:
+def _places_at(kind: inspect.Type, steps: Iterable[Step]) -> Iterable[_Place]:
     """Return what may stand at the end of a path."""
     places = list(_bare(kind))
-    for name, index in STEP.findall(path):
+    for step in steps:
         found: list[_Place] = []
         for place in places:
             parent = place.kind
-            if isinstance(parent, inspect.StructType) and name:
-                fields = [f.type for f in parent.fields if f.encode_name == name]
-                if not fields and parent.tag_field == name:
+            if isinstance(parent, inspect.StructType) and isinstance(step, str):
+                fields = [f.type for f in parent.fields if f.encode_name == step]
+                if not fields and parent.tag_field == step:
                     fields = [inspect.LiteralType((parent.tag,))]
                 found += [bare for field in fields for bare in _bare(field)]
             elif isinstance(parent, inspect.ListType):
                 found += _bare(parent.item_type, place.units)
-            elif isinstance(parent, inspect.DictType) and f"[{index}]" == ANY_KEY:
+            elif isinstance(parent, inspect.DictType) and step is None:
                 found += _bare(parent.value_type, place.units)
-            elif isinstance(parent, inspect.TupleType) and index.isdigit():
-                entry, items = int(index), parent.item_types
-                for item in items[entry : entry + 1]:
-                    found += _bare(item, _units_of(place.units, entry, len(items)))
+            elif isinstance(parent, inspect.TupleType) and isinstance(step, int):
+                items = parent.item_types
+                for item in items[step : step + 1]:
+                    found += _bare(item, _units_of(place.units, step, len(items)))
         places = found
     return places
 

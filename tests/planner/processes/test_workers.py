@@ -29,9 +29,13 @@ def done(workers: Workers, items: list) -> dict:
     return found
 
 
+def processes(workers: Workers) -> list:
+    return [lane.station.process for lane in workers.hands]
+
+
 def kill(workers: Workers, pid: int) -> None:
     """Kill a process from outside, and see that it is dead."""
-    (process,) = (worker.process for worker in workers.running if worker.process.pid == pid)
+    (process,) = (each for each in processes(workers) if each.pid == pid)
     os.kill(pid, 9)
     process.join(PATIENCE)
     assert process.exitcode == -9
@@ -83,17 +87,17 @@ def test_processes_that_are_killed_from_outside_cost_nothing(nappers):
 def test_all_processes_are_ready_once_they_are_waited_for():
     with Workers(workshop.naps, 2) as workers:
         workers.wait()
-        assert [worker.ready for worker in workers.running] == [True, True]
+        assert [lane.ready for lane in workers.hands] == [True, True]
         workers.wait()
         assert len(set(done(workers, [0.2] * 4).values())) == 2
     with Workers(workshop.nothing, 2) as workers:
         workers.wait()
-        assert workers.running == []
+        assert workers.hands == {}
 
 
 def test_who_stops_listening_leaves_no_work_behind(nappers):
     for _ in nappers.each([0.0, *[2.0 * PATIENCE] * 5]):
-        busy = [worker.process for worker in nappers.running if worker.hand]
+        busy = [lane.station.process for lane, hand in nappers.hands.items() if hand]
         break
     assert busy
     assert {process.exitcode for process in busy} == {-9}
@@ -114,7 +118,7 @@ def test_the_guard_of_a_program_is_named_only_where_that_may_be_it(monkeypatch, 
     assert {result.reason for result in found.values()} == {reason}
     assert caplog.messages == [reason]
     caplog.clear()
-    monkeypatch.setattr("planner.processes.workers._work", workshop.exits)
+    monkeypatch.setattr("planner.processes.stations._answer_each", workshop.exits)
     with Workers(workshop.naps, 2) as workers:
         found = done(workers, [1, 2])
     reason = f"processes do not start: a worker ended with status 1{NO_GUARD}"
@@ -136,24 +140,23 @@ def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monk
     assert {result.reason for result in found.values()} == {KILLED}
 
 
-def test_this_process_works_while_others_start_and_where_none_does(monkeypatch):
-    monkeypatch.setattr("planner.processes.workers.PATIENCE", 1e5)
+def test_this_process_works_while_others_start_and_where_none_does():
     with Workers(workshop.sleepers, 2) as workers:
         # well before any is ready
         found = dict(workers.each(list(range(5)), lambda item: -item))
-        assert not any(worker.ready for worker in workers.running)
-        processes = [worker.process for worker in workers.running]
+        assert not any(lane.ready for lane in workers.hands)
+        started = processes(workers)
     assert found == {i: -i for i in range(5)}
     # what is not ready is not waited for
-    assert [process.exitcode for process in processes] == [-9, -9]
+    assert [process.exitcode for process in started] == [-9, -9]
     with Workers(workshop.nothing, 2) as workers:
         found = {}
         for i, result in workers.each([0.0] * 20, workshop.nap_here):
             found[i] = result
-            for worker in workers.running:
-                worker.process.join(PATIENCE)
+            for process in processes(workers):
+                process.join(PATIENCE)
         assert workers.stillborn == 2
-        assert workers.running == []
+        assert workers.hands == {}
     assert set(found.values()) == {os.getpid()}
     assert sorted(found) == list(range(20))
 
@@ -187,7 +190,7 @@ def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
 
 
 def test_neither_side_waits_for_the_other_to_take_what_is_large():
-    """More than a pipe takes: chunks go out while results come back."""
+    """More than a pipe takes: items go out while results come back."""
     items = [bytes([i, 0]) * 400_000 for i in range(24)]
     with Workers(workshop.reversers, 1) as workers:
         found = done(workers, items)

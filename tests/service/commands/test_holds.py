@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -85,8 +85,8 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
     output = tmp_path / "holds.json"
     real = processes.try_everywhere
 
-    def broken(how: object, trials: Sequence, workers: int | None) -> Iterator:
-        for done, each in enumerate(real(how, trials, 1)):
+    def broken(*given: object, workers: int | None, **more: object) -> Iterator:
+        for done, each in enumerate(real(*given, workers=1, **more)):
             if done == 8:
                 raise Interrupted
             yield each

@@ -22,10 +22,10 @@ from hand_models.base import InvalidInputError
 from planner.robots import RobotFile
 from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
 from service.answering import dispatch
-from service.answering.dispatch import Answer
 from service.replies import ErrorReply, PlanReply
 from service.serving import PlanService, closed, exposed, listening, open_session, zenoh_config
 from service.wire import (
+    Answer,
     Format,
     NoServiceError,
     ServiceError,

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from service.processes import Lane, Station
-from service.processes.stations import PART, _send_parts
+from planner.processes import Lane, Station
+from planner.processes.stations import PART, _send_parts
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.serving.question import LARGE, Question, take

@@ -180,7 +180,7 @@ def check_mutated(count: int, seed: int) -> None:
         if isinstance(request, InvalidInputError):
             seen[request.kind] += 1
             name = identifier(payload, form, kind)
-            said, _ = encode_error(request.kind, request, form, name)
+            said, *_ = encode_error(request, form, name)
             assert len(said) <= LARGEST_ERROR, (form, payload)
             assert request.message, (form, payload)
             assert "\n" not in request.message, (form, payload)

@@ -49,7 +49,7 @@ def test_errors_are_small_and_say_whose_they_are(
 ) -> None:
     error = CruxError(message, field=field) if again is None else BusyError(message, again)
     error.field = field
-    payload, encoding = encode_error("unsupported", error, form, name)
+    payload, encoding, *_ = encode_error(error, form, name, "unsupported")
     assert len(payload) <= LARGEST_ERROR
     reply = Format.named(encoding).decode(payload, ErrorReply)
     assert reply.id == name

@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from service.answering import Answer
-from service.processes import Done, Job
+from service.processes import Job
+from service.wire import Answer
 
 
-def obedient() -> Callable[[Job], Done]:
+def obedient() -> Callable[[Job], Answer]:
     """Called in each process."""
 
-    def answer(job: Job) -> Done:
+    def answer(job: Job) -> Answer:
         asked = json.loads(job.payload)
         start = time.perf_counter()
         if "sleep" in asked:
@@ -31,12 +31,12 @@ def obedient() -> Callable[[Job], Done]:
         reply = {"pid": os.getpid(), "echo": asked.get("echo"), "size": len(job.payload)}
         reply["rehearsal"] = job.rehearsal
         payload = json.dumps(reply).encode() + b" " * asked.get("pad", 0)
-        return Done(Answer(payload, "application/json", True), time.perf_counter() - start)
+        return Answer(payload, "application/json", seconds=time.perf_counter() - start)
 
     return answer
 
 
-def stillborn() -> Callable[[Job], Done]:
+def stillborn() -> Callable[[Job], Answer]:
     """Called in each process, which does not live to be ready."""
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError

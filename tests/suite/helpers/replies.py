@@ -7,7 +7,7 @@ from jsonschema import Draft202012Validator
 
 from service.answering import dispatch
 from service.replies import ErrorReply, PlanReply
-from service.wire import Format, schema
+from service.wire import Answer, Format, schema
 from tests.suite.helpers.requests import JSON
 
 PLAN = "crux/robosimian/plan"
@@ -41,7 +41,7 @@ def departures(name: str, document: object) -> list[tuple]:
     return [tuple(error.absolute_path) for error in errors]
 
 
-def check_answer(answer: dispatch.Answer, what: object) -> str:
+def check_answer(answer: Answer, what: object) -> str:
     """An answer is a plan that says what it is, or an error that is the request's."""
     form = Format.named(answer.encoding)
     if answer.good:

@@ -35,7 +35,7 @@ def fails() -> Callable[[int], int]:
     raise ValueError("spoilt")
 
 
-def exits(_: object) -> None:
+def exits(*_: object) -> None:
     """Ends as a program does that starts processes while it is imported by one."""
     raise SystemExit(1)
 

@@ -1,20 +1,23 @@
-"""Processes of a service that answers: each takes one question at a time in each of its lanes.
+"""Processes that answer questions, in order in each of their lanes.
 
 A process can be killed at any time, which costs the questions in its lanes and nothing else.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from queue import SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
-from planner.processes import begin_child, spawned
+from planner.processes.child_processes import begin_child, starting_children
 
 __all__ = ["Lane", "Make", "Station", "resident"]
 
@@ -34,6 +37,9 @@ PART: Final = 2**13
 LAST_MOMENT: Final = 0.2
 """Longest time between the end of a process's pipes and its own [s]."""
 
+UNREADY: Final = 70
+"""Exit status of a process that cannot be made ready to answer."""
+
 OUT_OF_MEMORY: Final = 77
 """Exit status of a process that may not have the memory that a question needs."""
 
@@ -42,7 +48,7 @@ Make = Callable[[], Callable[[T], R]]
 
 
 class Lane(Generic[T, R]):
-    """One of a process's lanes: it has at most one question.
+    """One of a process's lanes, which answers one question after another.
 
     Attributes
     ----------
@@ -120,8 +126,13 @@ class Station(Generic[T, R]):
         be pickled. What it raises ends the process.
     lanes : int
         How many questions it has at a time, each in a thread of its own.
-    memory : int or None
+    memory : int, optional
         Bytes that it may have, where the system can keep it to them.
+    ahead : bool, optional
+        Whether its lanes are given questions before they have answered: it takes them in as they
+        come, so that who gives them does not wait.
+    stays : bool, optional
+        Whether SIGTERM is left to the process that started it.
 
     Attributes
     ----------
@@ -129,17 +140,38 @@ class Station(Generic[T, R]):
     lanes : tuple of Lane
     """
 
-    def __init__(self, make: Make[T, R], lanes: int, memory: int | None) -> None:
-        self.process, pipes = spawned(_answer_each, make, memory, pipes=lanes)
-        self.lanes = tuple(Lane(self, i, pipe) for i, pipe in enumerate(pipes))
+    def __init__(
+        self,
+        make: Make[T, R],
+        lanes: int = 1,
+        memory: int | None = None,
+        *,
+        ahead: bool = False,
+        stays: bool = False,
+    ) -> None:
+        context = multiprocessing.get_context("spawn")
+        ends = [context.Pipe() for _ in range(lanes)]
+        others = [other for _, other in ends]
+        self.process = context.Process(
+            target=_answer_each, args=(others, memory, ahead, stays), daemon=True
+        )
+        with starting_children():
+            self.process.start()
+        for other in others:
+            # the process has the other ends alone, so that its death ends the pipes
+            other.close()
+        self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(ends))
+        # by a pipe, of which a death is told: it may be large
+        with suppress(OSError):
+            ends[0][0].send(make)
 
     @property
     def ready(self) -> bool:
         """Whether it has said that it can work."""
         return all(lane.ready for lane in self.lanes)
 
-    def kill(self, *, dead: bool = False) -> str:
-        """End it, whatever it does; return how it ended.
+    def kill(self, *, dead: bool = False) -> int | None:
+        """End it, whatever it does; return its exit status, or None if it was alive.
 
         Parameters
         ----------
@@ -152,11 +184,7 @@ class Station(Generic[T, R]):
         self.process.join()
         for lane in self.lanes:
             lane.close()
-        if died is None:
-            return "was stopped"
-        if died == OUT_OF_MEMORY:
-            return "had not enough memory"
-        return f"was ended by signal {-died}" if died < 0 else f"ended with status {died}"
+        return died
 
 
 def resident(pid: int | None) -> int | None:
@@ -168,26 +196,33 @@ def resident(pid: int | None) -> int | None:
         return None
 
 
-def _answer_each(pipes: list[Connection], memory: int | None) -> None:
+def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
-    # what ends the service is for it to answer
-    begin_child(stays=True)
+    begin_child(stays=stays)
     sys.setswitchinterval(SWITCH)
-    make = pipes[0].recv()
-    answer = make()
+    try:
+        make = pipes[0].recv()
+    except (EOFError, OSError):
+        return
+    try:
+        answer = make()
+    except BaseException:
+        traceback.print_exc()
+        sys.exit(UNREADY)
     _keep_to(memory)
     for pipe in pipes[1:]:
-        threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()
-    _lane(answer, pipes[0])
+        threading.Thread(target=_lane, args=(answer, pipe, ahead), daemon=True).start()
+    _lane(answer, pipes[0], ahead)
     os._exit(0)
 
 
-def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
+def _lane(answer: Callable[[Any], Any], pipe: Connection, ahead: bool) -> None:
     """Answer what comes through one pipe."""
+    following = _taken_ahead(pipe) if ahead else pipe.recv
     with suppress(EOFError, OSError):
         _send_parts(pipe, None)
         while True:
-            question = pipe.recv()
+            question = following()
             try:
                 result = answer(question)
                 _send_parts(pipe, result)
@@ -195,6 +230,21 @@ def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
                 # nothing here can be trusted to go on
                 os._exit(OUT_OF_MEMORY)
             del question, result
+
+
+def _taken_ahead(pipe: Connection) -> Callable[[], Any]:
+    """Take in what comes in a thread of its own; return what returns it, as a pipe's ``recv``."""
+    taken: SimpleQueue[bytes] = SimpleQueue()
+
+    def take() -> None:
+        try:
+            while True:
+                taken.put(pipe.recv_bytes())
+        except (EOFError, OSError):
+            taken.put(b"")  # which is read as an EOFError, too
+
+    threading.Thread(target=take, daemon=True).start()
+    return lambda: pickle.loads(taken.get())
 
 
 def _send_parts(pipe: Connection, result: object) -> None:
