@@ -31,7 +31,7 @@ from hand_models.base import (
     go_on,
 )
 from hand_models.fixed_wrist.space import wrench_spaces
-from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand
+from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand, seated
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["BEST", "PULL_OFF", "best_seats"]
@@ -153,7 +153,7 @@ class _Search:
 
     def __init__(self, hand: SpinyHand, placements: Sequence[Placement], direction: Array) -> None:
         self._hand, self._placements, self._direction = hand, placements, direction
-        self._seats = [hand.seat(each.hold, each.grasp, each.at) for each in placements]
+        self._seats = seated(hand, placements)
         self._refused: list[InvalidInputError | None] = [None] * len(placements)
         self.best: list[_Found | None] = [None] * len(placements)
 

@@ -111,7 +111,7 @@ def _of_layout(
     for array in (at_zero, V, L, l0, s, H, h):
         array.setflags(write=False)
     return [
-        WrenchSpace.assembled(
+        WrenchSpace(
             origin=at_zero[i, :6],
             generators=V[i, :6],
             columns=layout.columns,

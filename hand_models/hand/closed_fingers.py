@@ -80,6 +80,8 @@ class ClosedFingers:
     tiles : ndarray, shape (n, 4, 3, 6)
         Shear and normal load of each phalanx, each at zero tension [N] and per newton, the share of
         its tile's spines that are on the rock, and the code of its contact.
+    postures : HandPostures
+        How the fingers of all hands stand, arrays of shape (n, 4, 3).
     """
 
     def __init__(
@@ -92,21 +94,17 @@ class ClosedFingers:
         self.alone, self.lifts = alone, lifts
         count = len(FINGERS)
         shape = len(row_of) // count, count, len(PHALANGES), NUMBERS
-        self._table = np.array(rows).take(row_of, axis=0).reshape(shape)
-        self._table.setflags(write=False)
-        self.places = self._table[..., PLACES:].reshape(-1, count, 3 * len(PHALANGES), 3)
-        self.tiles = self._table[..., TILE]
-
-    def of_hands(self) -> list[HandPostures]:
-        """Return how the fingers of each hand stand; arrays are read-only."""
-        table = self._table
+        table = np.array(rows).take(row_of, axis=0).reshape(shape)
         codes = table[..., CODES].astype(np.int8)
-        codes.setflags(write=False)
-        joints = table[..., JOINT].view(complex)
+        for array in (table, codes):
+            array.setflags(write=False)
+        self.places = table[..., PLACES:].reshape(-1, count, 3 * len(PHALANGES), 3)
+        self.tiles = table[..., TILE]
         angle, along, rise, tilt = (table[..., i] for i in (ANGLE, ALONG, RISE, TILT))
-        numbers = angle, joints[..., 0], along, rise, tilt, table[..., ENGAGEMENT]
-        kinds, stops = codes[..., 0], codes[..., 1]
-        return [HandPostures(*hand) for hand in zip(*numbers, kinds, stops, strict=True)]
+        joint, share = table[..., JOINT].view(complex)[..., 0], table[..., ENGAGEMENT]
+        self.postures = HandPostures(
+            angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1]
+        )
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
         """Return finger, joint and torque of each joint of a hand that stands at a limit."""

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.finger import NONE, Fingernail
+from hand_models.finger import NONE
 from hand_models.hand.closed_fingers import ClosedFingers
 from hand_models.hand.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
 from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
 
-__all__ = ["Nails", "hook_nails", "no_nails"]
+__all__ = ["Nails", "hook_nails"]
 
 
 class Nails(NamedTuple):
@@ -25,26 +25,18 @@ class Nails(NamedTuple):
     angles : ndarray, shape (4,)
     normals : ndarray, shape (4, 3)
     rows : tuple of (ndarray, ndarray)
-    tiles : ndarray, shape (4, `COLUMNS`), or None
-        Numbers of the nails as tiles; None of a hand that does not cling with them.
+    tiles : ndarray, shape (4, `COLUMNS`)
+        Numbers of the nails as tiles; empty of a hand that does not cling with them.
     """
 
     angles: Array
     normals: Array
     rows: tuple[tuple[Array, Array], ...]
-    tiles: Array | None = None
-
-
-def no_nails(nail: Fingernail) -> Nails:
-    """Return nails that are all out of the way; arrays are read-only."""
-    angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
-    angles.setflags(write=False)
-    normals.setflags(write=False)
-    return Nails(angles, normals, ())
+    tiles: Array
 
 
 def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: float) -> Nails:
-    """Return where the nails of a hand hook whose fingers are straight.
+    """Return where the nails of a hand hook; out of the way unless it clings with them.
 
     Parameters
     ----------
@@ -62,10 +54,11 @@ def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: 
     """
     nail = placed.hand.nail
     angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
-    rows, tiles = [], np.zeros((len(FINGERS), COLUMNS))
+    clinging = len(FINGERS) if placed.placements[index].grasp.fingernail else 0
+    rows, tiles = [], np.zeros((clinging, COLUMNS))
     tiles[:, KIND] = NONE
-    frames = placed.frames.hands[index].fingers
-    for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=True)):
+    frames = placed.frames.hands[index]
+    for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=False)):
         section = placed.section(index, i)
         finger = closed.alone[len(FINGERS) * index + i].finger
         if nail.stuck(section, finger.pin):

@@ -12,6 +12,7 @@ reaction, but no normal load (``assumed``).
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.finger import FingerModel, Fingernail, SequentialClosure, TendonLoads
-from hand_models.hand.finger_frames import FingerFrame, FingerFrames, FrameStack, PalmLayout
+from hand_models.hand.finger_frames import OUTER, FingerFrame, FrameStack
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.names import FINGERS
 from hand_models.hand.structure import Structure
@@ -34,7 +35,7 @@ SHARES: Final = 512
 """Choices of palm tiles, and of what one holds, whose shares are kept."""
 
 ROTATIONS: Final = 64
-"""Choices of outer rotations for which frames are kept, at most."""
+"""Choices of outer rotations for which frames are kept, those used last."""
 
 
 class HandModel:
@@ -56,7 +57,7 @@ class HandModel:
     def __init__(self, table: ParameterTable | None = None) -> None:
         self.table = table = table or hand_table()
         self._hash = hash(table)
-        self._frames: dict[tuple[float, ...], FrameStack] = {}
+        self.frame_stack = lru_cache(maxsize=ROTATIONS)(self._frame_stack)
         self.palm_share = lru_cache(maxsize=SHARES)(self._palm_share)
         self.finger = FingerModel.from_table(table)
         self.drive = TendonDrive.from_table(table)
@@ -109,14 +110,6 @@ class HandModel:
                 for y in table.vector("palm", "tile_y")
             ]
         )
-        self.layout = PalmLayout(
-            self.inner_joint,
-            self.outer_axis,
-            self.outer_reach,
-            self.base_tile_reach,
-            self.base_tile_surface,
-            self.palm_tiles,
-        )
         self.palm_tile_size = np.array(table.vector("palm", "tile_size"))
         self.palm_length = table.positive("palm", "length")
         self.palm_friction = table.scalar("palm", "pulley_friction")
@@ -151,23 +144,21 @@ class HandModel:
 
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""
-        return self.finger_frames(outer_rotation).fingers
-
-    def finger_frames(self, outer_rotation: float) -> FingerFrames:
-        """Return the frames with the tiles that do not turn; up to `ROTATIONS` are kept."""
         return self.frame_stack((outer_rotation,)).hands[0]
 
-    def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
-        """Return the frames of hands with these rotations; up to `ROTATIONS` stacks are kept."""
-        found = self._frames.get(outer_rotations)
-        if found is None:
-            if len(self._frames) >= ROTATIONS:
-                self._frames.clear()
-            found = FrameStack.of(
-                [FingerFrames.of(self.layout, angle) for angle in outer_rotations]
-            )
-            self._frames[outer_rotations] = found
-        return found
+    def _frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
+        """Return the frames of hands whose outer fingers are turned outward by these angles."""
+        outer = np.array([[name.startswith("outer")] for name in FINGERS])
+        side = np.array([[1.0 if name.endswith("left") else -1.0] for name in FINGERS])
+        mirror = np.insert(np.ones((len(FINGERS), 2)), [1], side, axis=1)
+        turned = np.array([(math.cos(angle), math.sin(angle), 0.0) for angle in outer_rotations])
+        alongs = np.where(outer, turned[:, None] * mirror, (1.0, 0.0, 0.0))
+        joints = np.where(
+            outer, self.outer_axis * mirror + self.outer_reach * alongs, self.inner_joint * mirror
+        )
+        bases = (joints + alongs * (self.base_tile_reach - self.outer_reach))[:, OUTER]
+        bases[..., 2] = self.base_tile_surface
+        return FrameStack.of(joints, alongs, bases, self.palm_tiles)
 
     def _palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
         """Return what shear palm tiles share of which one holds ``tile_limit`` [N]."""

@@ -84,8 +84,6 @@ class PlacedHands:
     placements : sequence of Placement, length n
     seatings : sequence of Seating, length n
         Where their holds are.
-    shapes : sequence of Swept or None, length n
-        Of their holds.
 
     Attributes
     ----------
@@ -98,14 +96,13 @@ class PlacedHands:
         hand: HandModel,
         placements: Sequence[Placement],
         seatings: Sequence[Seating],
-        shapes: Sequence[Swept | None],
     ) -> None:
         self.hand = hand
         self.placements = placements
         self.seatings = seatings
-        self.shapes = shapes
+        self._shapes = [each.hold.swept for each in placements]
         self.frames = hand.frame_stack(tuple([each.grasp.outer_rotation for each in placements]))
-        swept = np.array([shape or NOTHING for shape in shapes])
+        swept = np.array([shape or NOTHING for shape in self._shapes])
         poses = [seating.pose for seating in seatings]
         rotations = np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
         positions = np.concatenate([pose.position for pose in poses]).reshape(-1, 1, 3)
@@ -123,7 +120,7 @@ class PlacedHands:
         Planes are equal for fingers that are mirror images of one another. None if the rock is not
         smooth.
         """
-        shape, rows = self.shapes[index], self._seen[index]
+        shape, rows = self._shapes[index], self._seen[index]
         if shape is None:
             return None
         into = rows[INTO]
@@ -146,7 +143,7 @@ class PlacedHands:
         """
         return [
             self._gaps_on(i) if shape is None else entry_distances(shape, seen[TILES], seen[INTO])
-            for i, (shape, seen) in enumerate(zip(self.shapes, self._seen, strict=True))
+            for i, (shape, seen) in enumerate(zip(self._shapes, self._seen, strict=True))
         ]
 
     def _gaps_on(self, index: int) -> list[float]:
@@ -161,5 +158,5 @@ class PlacedHands:
         """Return the rock in the plane of a finger of one hand; raw under one that clings."""
         hold, grasp = self.placements[index].hold, self.placements[index].grasp
         hand_in_hold = self.seatings[index].pose.inverse()
-        frame = self.frames.hands[index].fingers[finger]
+        frame = self.frames.hands[index][finger]
         return frame.cut(hold, hand_in_hold, raw=grasp.fingernail)

@@ -27,13 +27,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hand_models.base import Array, Pose
-from hand_models.finger import settle_finger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
 from hand_models.sections import PolylineSection, Section
 
-__all__ = ["CENTRED", "RockUnder", "Seating", "propose", "seat", "seating_given", "touches_seat"]
+__all__ = ["CENTRED", "RockUnder", "Seating", "propose", "seating_given", "touches_seat"]
 
 Angle = TypeVar("Angle", float, Array)
 
@@ -113,21 +112,6 @@ CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
 CENTRED.pose.position.setflags(write=False)
 
 
-def seat(hand: HandModel, hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
-    """Seat a hand on a hold that was given no place; see the module's text.
-
-    Parameters
-    ----------
-    hand : HandModel
-    hold : Hold
-    grasp : Grasp
-    at : Pose, optional
-        A frame, in the hold's, that takes that one's place.
-    """
-    seating, meant = propose(hand, hold, grasp, at)
-    return seating if not meant or _holds(hand, hold, seating) else CENTRED
-
-
 def propose(
     hand: HandModel,
     hold: Hold,
@@ -141,8 +125,11 @@ def propose(
 
     Parameters
     ----------
-    hand, hold, grasp, at
-        As of `seat`.
+    hand : HandModel
+    hold : Hold
+    grasp : Grasp
+    at : Pose, optional
+        A frame, in the hold's, that takes that one's place.
     known : dict, optional
         Rock under hands like this one that was cut already; what is cut is added. It is the same
         for whatever grasp a hand has at a place.
@@ -221,18 +208,6 @@ def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
     first = int(turns[0])
     root = brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
     return place(float(root))
-
-
-def _holds(hand: HandModel, hold: Hold, seating: Seating) -> bool:
-    """Whether an inner finger's proximal tile does touch where seating meant it to."""
-    hand_in_hold = seating.pose.inverse()
-    section = hold.section(
-        hand_in_hold.apply(hand.inner_joint),
-        hand_in_hold.rotation[:, 0],
-        hand_in_hold.rotation[:, 2],
-    )
-    contact = settle_finger(hand.finger, section, (0.0, 0.0)).contacts[0]
-    return contact.kind == "face" and touches_seat(hand, contact.along)
 
 
 # Rock that is known by its outline only -----------------------------------------------------------

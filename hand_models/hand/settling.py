@@ -8,7 +8,7 @@ their holds, the places and axes of their tiles. How each finger rests is found 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -17,20 +17,24 @@ from hand_models.base import InvalidInputError, go_on
 from hand_models.finger import BALANCE, NONE, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import BASES
-from hand_models.hand.hooked_nails import hook_nails, no_nails
+from hand_models.hand.hooked_nails import Nails, hook_nails
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
-from hand_models.hand.seating import CENTRED, RockUnder, propose, seat, seating_given, touches_seat
+from hand_models.hand.seating import (
+    CENTRED,
+    RockUnder,
+    Seating,
+    propose,
+    seating_given,
+    touches_seat,
+)
 from hand_models.hand.settled_hand import HandPostures, SettledHand
 from hand_models.hand.tightening import resting_tensions
 from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_rock
 from hand_models.sections import FingerPlane, cut_of
 
-__all__ = ["settle_hands"]
-
-Known = list[dict[FingerPlane, list[ClosedPhalanx]]]
-"""Phalanges of each hand's fingers by what those depend on."""
+__all__ = ["seated", "settle_hands"]
 
 CLEAR: Final = 1e-6
 """By how much a hand that backs off is clear of rock [m]."""
@@ -56,31 +60,9 @@ def settle_hands(
         In order; an error in place of a hand that cannot be where it is, see `SpinyHand.settle`.
     """
     tensions = [each.grasp.closing_tension or hand.closing_tension for each in placements]
-    refused = {
-        i: InvalidInputError(
-            f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
-            field="grasp.closing_tension",
-        )
-        for i, tension in enumerate(tensions)
-        if tension > hand.maximum_tension
-    }
-    if not refused:
-        return _settle(hand, placements, tensions)
-    closable = [i for i in range(len(placements)) if i not in refused]
-    if not closable:
-        return list(refused.values())
-    settled = iter(
-        _settle(hand, [placements[i] for i in closable], [tensions[i] for i in closable])
-    )
-    return [refused[i] if i in refused else next(settled) for i in range(len(placements))]
-
-
-def _settle(
-    hand: HandModel, placements: Sequence[Placement], tensions: list[float]
-) -> list[SettledHand | InvalidInputError]:
-    """Close hands; those without a place back off rock that stands in their open fingers."""
-    placed, laid = _placed(hand, placements)
+    placed, laid = _seated(hand, placements)
     outcomes, lifts = _close(placed, laid, tensions)
+    # those without a place back off rock that stands in their open fingers
     backing = [
         i
         for i, lift in lifts.items()
@@ -88,14 +70,17 @@ def _settle(
     ]
     if backing:
         seatings = [placed.seatings[i].off(lifts[i] + CLEAR) for i in backing]
-        others = [placements[i] for i in backing]
-        shapes = [each.hold.swept for each in others]
-        off = PlacedHands(hand, others, seatings, shapes)
-        again, _ = _close(off, _laid(off, [{} for _ in others]), [tensions[i] for i in backing])
+        off = PlacedHands(hand, [placements[i] for i in backing], seatings)
+        again, _ = _close(off, _laid(off, range(len(backing))), [tensions[i] for i in backing])
         for i, outcome in zip(backing, again, strict=True):
             if isinstance(outcome, SettledHand):
                 outcomes[i] = outcome
     return outcomes
+
+
+def seated(hand: HandModel, placements: Sequence[Placement]) -> Sequence[Seating]:
+    """Return where hands are at their holds, seated where these have no place."""
+    return _seated(hand, placements)[0].seatings
 
 
 @np.errstate(divide="ignore", invalid="ignore")
@@ -104,27 +89,30 @@ def _close(
 ) -> tuple[list[SettledHand | InvalidInputError], dict[int, float]]:
     """Return hands closed where they are placed, and the lifts of those with rock in fingers."""
     hand, placements = placed.hand, placed.placements
-    errors = {
-        i: _in_palm(hand, depth)
-        for i, depth in enumerate([min(depths[BASES:]) for depths in placed.gaps])
-        if depth < -hand.spine_travel
-    }
+    errors: dict[int, InvalidInputError] = {}
+    for i, (tension, gaps) in enumerate(zip(tensions, placed.gaps, strict=True)):
+        if tension > hand.maximum_tension:
+            errors[i] = InvalidInputError(
+                f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
+                field="grasp.closing_tension",
+            )
+        elif min(gaps[BASES:]) < -hand.spine_travel:
+            errors[i] = _in_palm(hand, min(gaps[BASES:]))
     closed = close_fingers(placed, laid, tensions, errors)
-    postures = closed.of_hands()
-    for i, error in _too_slack(placed, closed, postures, tensions):
+    for i, error in _too_slack(placed, closed, tensions):
         errors.setdefault(i, error)
     tiles = tiles_on_rock(placed, closed, tensions)
-    nails = [no_nails(hand.nail)] * len(placements)
-    for i, each in enumerate(placements):
-        if each.grasp.fingernail and i not in errors:
+    nails: dict[int, Nails] = {}
+    for i, tension in enumerate(tensions):
+        if i not in errors:
             try:
-                nails[i] = hook_nails(placed, closed, i, tensions[i])
+                nails[i] = hook_nails(placed, closed, i, tension)
             except InvalidInputError as error:
                 errors[i] = error
     palms = palms_on_rock(placed)
     outcomes: list[SettledHand | InvalidInputError] = []
-    for i, (each, of_tiles, posture) in enumerate(
-        zip(placements, hand_tiles(tiles, nails), postures, strict=True)
+    for i, (each, of_tiles, *posture) in enumerate(
+        zip(placements, hand_tiles(tiles, nails), *closed.postures, strict=True)
     ):
         if i in errors:
             outcomes.append(errors[i])
@@ -136,13 +124,8 @@ def _close(
             surface=each.surface,
             closing_tension=tensions[i],
             seating=placed.seatings[i],
-            postures=posture,
-            tiles=of_tiles.tiles,
-            finger_of=of_tiles.finger_of,
-            positions=of_tiles.positions,
-            axes=of_tiles.axes,
-            loads=of_tiles.loads,
-            engagement=of_tiles.engagement,
+            postures=HandPostures(*posture),
+            **of_tiles._asdict(),
             nail_angles=nails[i].angles,
             nail_normals=nails[i].normals,
             nail_rows=nails[i].rows,
@@ -167,15 +150,11 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
 def _too_slack(
     placed: PlacedHands,
     closed: ClosedFingers,
-    postures: Sequence[HandPostures],
     tensions: Sequence[float],
 ) -> Iterator[tuple[int, InvalidInputError]]:
     """Yield hands whose tendons do not close their fingers, and why."""
     hand, placements = placed.hand, placed.placements
-    angles = np.array([posture.angles for posture in postures])
-    stops, kinds = (
-        np.array([getattr(posture, name) for posture in postures]) for name in ("stops", "kinds")
-    )
+    angles, stops, kinds = closed.postures.angles, closed.postures.stops, closed.postures.kinds
     idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
     for i in idle.nonzero()[0].tolist():
         if not placements[i].grasp.fingernail:
@@ -207,61 +186,51 @@ def _too_slack(
         )
 
 
-def _placed(
+def _seated(
     hand: HandModel, placements: Sequence[Placement]
 ) -> tuple[PlacedHands, list[list[list[ClosedPhalanx]]]]:
     """Return hands at their holds, seated where these have no place, and their fingers laid."""
-    shapes = [each.hold.swept for each in placements]
-    seatings, meant = [], []
+    seatings: list[Seating] = []
+    meant = []
     under: dict[Hashable, RockUnder] = {}
-    for i, (each, shape) in enumerate(zip(placements, shapes, strict=True)):
+    for i, each in enumerate(placements):
         if each.hold_in_hand is not None:
             seatings.append(seating_given(each.hold_in_hand))
             continue
         go_on()
         seating, on_contact = propose(hand, each.hold, each.grasp, each.at, under)
-        if on_contact and shape is None:
-            seating, on_contact = seat(hand, each.hold, each.grasp), False
         seatings.append(seating)
         if on_contact:
             meant.append(i)
-    known: Known = [{} for _ in placements]
-    placed = PlacedHands(hand, placements, seatings, shapes)
-    laid = _laid(placed, known)
-    off = [i for i in meant if not _on_seat(hand, laid[i][SEATED])]
+    placed = PlacedHands(hand, placements, seatings)
+    laid = _laid(placed, range(len(placements)))
+    # where a finger's proximal contact is not where the seat meant it to be
+    off = [i for i in meant if not (on := laid[i][SEATED]) or not touches_seat(hand, on[0].along)]
     if off:
         for i in off:
             seatings[i] = CENTRED
-        placed = PlacedHands(hand, placements, seatings, shapes)
-        laid = _laid(placed, known)
+        placed = PlacedHands(hand, placements, seatings)
+        for i, fingers in zip(off, _laid(placed, off), strict=True):
+            laid[i] = fingers
     return placed, laid
 
 
-def _laid(placed: PlacedHands, known: Known) -> list[list[list[ClosedPhalanx]]]:
-    """Return the phalanges of the fingers of each hand that rest on smooth rock.
+def _laid(placed: PlacedHands, which: Iterable[int]) -> list[list[list[ClosedPhalanx]]]:
+    """Return the phalanges of the fingers of some hands that rest on smooth rock.
 
-    Of a hand's fingers that are alike the same ones, and those that are known.
+    Of a hand's fingers that are alike the same ones.
     """
     laid: list[list[list[ClosedPhalanx]]] = []
-    for i, lain in enumerate(known):
+    for i in which:
         cuts = placed.cuts(i)
         if cuts is None:
             laid.append([[] for _ in FINGERS])
             continue
         shape, planes = cuts
-        fingers: list[list[ClosedPhalanx]] = []
+        found: dict[FingerPlane, list[ClosedPhalanx]] = {}
         for plane in planes:
-            phalanges = lain.get(plane)
-            if phalanges is None:
+            if plane not in found:
                 cut = cut_of(shape, plane)
-                phalanges = lain[plane] = (
-                    [] if cut is None else placed.hand.sequential_closure.lay(cut)
-                )
-            fingers.append(phalanges)
-        laid.append(fingers)
+                found[plane] = [] if cut is None else placed.hand.sequential_closure.lay(cut)
+        laid.append([found[plane] for plane in planes])
     return laid
-
-
-def _on_seat(hand: HandModel, laid: list[ClosedPhalanx]) -> bool:
-    """Whether a finger's proximal contact is where a seat meant it to be."""
-    return bool(laid) and touches_seat(hand, laid[0].along)

@@ -12,7 +12,6 @@ from hand_models.base import BoundedStore, InvalidInputError, Pose
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.placement import Placement, PlacementKey
-from hand_models.hand.seating import Seating, seat
 from hand_models.hand.settled_hand import SettledHand
 from hand_models.hand.settling import settle_hands
 from hand_models.parameters import ParameterTable, hand_table
@@ -86,10 +85,6 @@ class SpinyHand(HandModel):
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
         return spiny_hand, (self.table,)
 
-    def seat(self, hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
-        """Seat the hand on a hold that was given no place; see `hand_models.hand.seating`."""
-        return seat(self, hold, grasp, at)
-
     def settle(
         self,
         hold: Hold,
@@ -107,8 +102,9 @@ class SpinyHand(HandModel):
             What a tile holds on it.
         grasp : Grasp, optional
         hold_in_hand : Pose, optional
-            The hold's frame in H; without it the hand is seated (see `seat`), and backs off rock
-            that would stand in its open fingers, as far as ``back_off``.
+            The hold's frame in H; without it the hand is seated (see
+            `hand_models.hand.seating`), and backs off rock that would stand in its open fingers, as
+            far as ``back_off``.
         at : Pose, optional
             Where it is then seated: a frame, in the hold's, that takes that one's place.
 

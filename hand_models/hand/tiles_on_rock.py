@@ -5,7 +5,7 @@ Of palms: which of their tiles are engaged, and what these bear together.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -117,12 +117,12 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     return tiles
 
 
-def hand_tiles(tiles: Array, nails: Sequence[Nails]) -> list[HandTiles]:
+def hand_tiles(tiles: Array, nails: Mapping[int, Nails]) -> list[HandTiles]:
     """Return the tiles of each hand, arrays read-only; of those that cling, their nails too."""
     gripping = tiles.take(ORDER[False], axis=1)
     made = _each_hand(gripping, nails=False)
-    for i, each in enumerate(nails):
-        if each.tiles is not None:
+    for i, each in nails.items():
+        if len(each.tiles):
             clinging = np.concatenate([tiles[i], each.tiles]).take(ORDER[True], axis=0)
             made[i : i + 1] = _each_hand(clinging[None], nails=True)
     return made

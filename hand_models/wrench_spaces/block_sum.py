@@ -13,18 +13,16 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from hand_models.base import Array, Indices, LimitError
-from hand_models.wrench_spaces import zonotope
-from hand_models.wrench_spaces.half_spaces import Facets, affine_hull
+from hand_models.wrench_spaces.half_spaces import SCALE, Facets, affine_hull
 from hand_models.wrench_spaces.minkowski_sums import (
     Summand,
     about_facets,
     extreme_points,
-    sum_normals,
+    facets,
     sum_vertices,
     sums,
 )
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull_facets
-from hand_models.wrench_spaces.scaled_wrench import SCALE
 
 __all__ = ["Block", "BlockSum", "Sizes", "coupled_columns"]
 
@@ -176,15 +174,8 @@ class BlockSum:
             normals = np.linalg.solve(image.T, self._whole.A.T).T
             normals /= np.linalg.norm(normals, axis=1)[:, None]
             return Facets(normals, (normals @ parts[0].points.T).max(axis=1))
-        if all(part.dimension == 1 for part in parts):
-            return zonotope.facets(np.array([part.points[1] for part in parts]))
         if all(part.dimension <= 2 for part in parts):
-            normals = sum_normals(parts, r, self.rounding)
-            offsets = sum(
-                ((part.points @ normals.T).max(axis=0) for part in parts),
-                start=np.zeros(len(normals)),
-            )
-            return Facets(normals, np.asarray(offsets))
+            return facets(parts, r, self.rounding)
         return Facets(*hull_facets(sums(parts)))
 
     @cached_property

@@ -1,4 +1,7 @@
-"""Linear programs, asked again where a solver's presolve leaves them undecided."""
+"""Linear programs, asked again where a solver's presolve leaves them undecided.
+
+Among them: how far { o + V y : A y ≤ b } reaches.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,15 @@ from scipy.optimize import linprog
 
 from hand_models.base import Array, SolverError, UnsupportedError
 
-__all__ = ["linear_program"]
+__all__ = ["ends_along", "farthest", "linear_program"]
 
 SOLVED, EMPTY, UNBOUNDED = 0, 2, 3
 """Statuses of `scipy.optimize.linprog`."""
 
 PRESOLVED: Final = (True, False)
+
+EXACT: Final = 1e-9
+"""Tolerance of the linear program of a support function [N]."""
 
 
 def linear_program(
@@ -58,3 +64,46 @@ def linear_program(
     if found.status == UNBOUNDED:
         raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
     raise SolverError(f"{what}: {found.message}")
+
+
+def farthest(slopes: Array, A: Array, b: Array) -> Array | None:
+    """Return the y of { y : A y ≤ b } with the largest slopes · y; None if there is none.
+
+    Raises
+    ------
+    SolverError
+        If the program fails.
+    """
+    return linear_program(-slopes, A, b, "support", tolerance=EXACT)
+
+
+def ends_along(
+    direction: Array, origin: Array, generators: Array, A: Array, b: Array
+) -> tuple[float, float] | None:
+    """Return the least and the largest t for which t d = o + V y, A y ≤ b has a y; None if none.
+
+    Parameters
+    ----------
+    direction, origin : ndarray, shape (n,)
+        d and o.
+    generators : ndarray, shape (n, m)
+        V.
+    A, b : ndarray, shapes (k, m), (k,)
+
+    Raises
+    ------
+    SolverError
+        If a program fails.
+    """
+    m = generators.shape[1]
+    equations = np.hstack([generators, -direction[:, None]])
+    rows = np.hstack([A, np.zeros((len(b), 1))])
+    ends = []
+    for sign in (1.0, -1.0):
+        cost = np.zeros(m + 1)
+        cost[-1] = sign
+        found = linear_program(cost, rows, b, "capability", A_eq=equations, b_eq=-origin)
+        if found is None:
+            return None
+        ends.append(float(found[-1]))
+    return ends[0], ends[1]

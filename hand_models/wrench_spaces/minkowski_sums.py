@@ -1,32 +1,31 @@
 """Minkowski sums of small polytopes, without double description.
 
-The facets of a sum of segments and polygons are spanned by edges of these: every choice of them
-gives a candidate normal, by a cross product, and those that make each edge extreme in its polygon
-are the facets. Other summands go through a hull of the sums of their vertices.
+The facets of a sum of segments (a zonotope) and polygons are spanned by edges of these: every
+choice of them gives a candidate normal, orthogonal to all, and those along which each edge is
+extreme in its part are the facets. Other summands go through a hull of the sums of their vertices.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.wrench_spaces.cross_products import Expansion, cross_products, expansion
+from hand_models.wrench_spaces.half_spaces import Facets
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull
 
-__all__ = [
-    "Summand",
-    "about_facets",
-    "extreme_points",
-    "sum_normals",
-    "sum_vertices",
-    "sums",
-]
+__all__ = ["Summand", "about_facets", "extreme_points", "facets", "sum_vertices", "sums"]
+
+DEPENDENT: Final = 1e-8
+"""Unit vectors that span no more volume than this count as dependent, as does one on a plane from
+which it rises no more."""
+
+CERTAIN: Final = 1e-6
+"""Volume of unit vectors below which rounding of what is orthogonal to them shows."""
 
 
 class Summand(NamedTuple):
@@ -73,71 +72,104 @@ def about_facets(parts: Sequence[Summand], r: int) -> int:
     return math.ceil(2.0 * choices[r - 1]) if 1 <= r <= len(choices) else 0
 
 
-def sum_normals(parts: list[Summand], r: int, rounding: float) -> Array:
-    """Return the unit facet normals (k, r) of a sum of segments and polygons.
+def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
+    """Return the facets of a sum of segments and polygons that spans R^r, r ≥ 1.
 
     A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
-    plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon.
+    plane) of a polygon, each of them where its part reaches farthest along the normal. Several
+    choices of edges may span the same facet: then the same points of the parts lie in it, and by
+    these it is known. Its offset is the support function along the normal, so that no half-space
+    cuts the set, however little its edges differ from dependent ones.
+
+    Parameters
+    ----------
+    parts : sequence of Summand
+        Their points in r dimensions.
+    r : int
+    rounding : float
+        How far rounding may move points, of parts that are about as large as one.
     """
-    if r == 1:
-        return np.array([[1.0], [-1.0]])
-    edges = []
+    ends, choices = _choices(tuple((len(part.points), part.dimension) for part in parts), r)
+    normals, volumes = _orthogonal(np.vstack([_directions(part) for part in parts]), choices)
+    # the roundest choice first: of those that span the same facet it is taken
+    order = np.argsort(-volumes, kind="stable")
+    order = order[volumes[order] > DEPENDENT]
+    choices, volumes = (np.concatenate([each[order]] * 2) for each in (choices, volumes))
+    normals = np.concatenate([normals[order], -normals[order]])
+    slack = DEPENDENT * np.maximum(1.0, CERTAIN / volumes)
+    offsets, lie = np.zeros(len(normals)), []
     for part in parts:
-        around = np.diff(np.vstack([part.points, part.points[:1]]), axis=0)
-        edges.append(around[:1] if part.dimension == 1 else around)
-    shapes = tuple((len(e), part.dimension) for e, part in zip(edges, parts, strict=True))
-    spanning, chosen = _choices(shapes, r)
-    directions = np.vstack(edges)
-    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    normals = cross_products(directions, spanning)
-    lengths = np.linalg.norm(normals, axis=1)
-    independent = lengths > 1e-8
-    normals = normals[independent] / lengths[independent, None]
-    normals = np.vstack([normals, -normals])
-    chosen = np.vstack([chosen[independent]] * 2)
-    keep = np.ones(len(normals), dtype=bool)
-    for k, part in enumerate(parts):
-        if part.dimension == 2:
-            one_edge = np.flatnonzero(chosen[:, k] >= 0)
-            # thin products: a threaded BLAS would spend more on waking its threads
-            heights = np.einsum("nr,pr->pn", normals[one_edge], part.points)
-            here = heights[chosen[one_edge, k], np.arange(len(one_edge))]
-            top = heights.max(axis=0)
-            keep[one_edge] &= here >= top - rounding * (1.0 + np.abs(top))
-    normals = normals[keep]
-    _, first = np.unique(np.round(normals, 7) + 0.0, axis=0, return_index=True)
-    return np.asarray(normals[np.sort(first)])
+        # thin products: a threaded BLAS would spend more on waking its threads
+        heights = np.einsum("pr,nr->pn", part.points, normals)
+        top, highest = heights.max(axis=0), heights.argmax(axis=0)
+        apart = np.linalg.norm(part.points[:, None] - part.points, axis=2)
+        lie.append(top - heights <= slack * apart[:, highest] + rounding * (1.0 + np.abs(top)))
+        offsets += top
+    inside = np.vstack([*lie, np.ones(len(normals), dtype=bool)])
+    extreme = inside[ends[choices], np.arange(len(normals))[:, None, None]].all(axis=(1, 2))
+    _, first = np.unique(np.packbits(inside[:, extreme], axis=0), axis=1, return_index=True)
+    found = np.flatnonzero(extreme)[np.sort(first)]
+    return Facets(normals[found], offsets[found])
+
+
+def _directions(part: Summand) -> Array:
+    """Return unit vectors along a segment, or along a polygon's edges and two that span it."""
+    edges = np.diff(part.points, axis=0, append=part.points[:1])
+    units: Array = edges / np.linalg.norm(edges, axis=1)[:, None]
+    if part.dimension == 1:
+        return units[:1]
+    return np.vstack([units, np.linalg.svd(part.points - part.points.mean(axis=0))[2][:2]])
+
+
+def _orthogonal(vectors: Array, choices: Indices) -> tuple[Array, Array]:
+    """Return the unit vectors (n, r) orthogonal to choices (n, r − 1) of vectors, and volumes (n,).
+
+    Volumes are those that the vectors of a choice span.
+    """
+    turned, spread = np.linalg.qr(vectors[choices].swapaxes(1, 2), mode="complete")
+    volumes = np.abs(np.diagonal(spread, axis1=1, axis2=2)).prod(axis=1)
+    return turned[:, :, -1], volumes
 
 
 @lru_cache(maxsize=16)
-def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Expansion, Indices]:
-    """List every choice of r − 1 edges from parts of given (edges, dimension).
+def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Indices, Indices]:
+    """Return the `_directions` of parts, and every choice of r − 1 that may span a facet.
+
+    Parameters
+    ----------
+    shapes : tuple of (int, int)
+        Points and dimension of each part.
+    r : int
 
     Returns
     -------
-    spanning : Expansion
-        Of the cross products of all parts' edges, one after another.
-    chosen : ndarray of int, shape (n, parts)
-        Which edge of a part is used alone; −1 where none, or its whole plane, is.
+    ends : ndarray of int, shape (k, 2)
+        Points of each edge, those of all parts counted one after another; −1 of what is no edge.
+    choices : ndarray of int, shape (n, r − 1)
+        Of each part none, an edge, or of a polygon the two that span it.
     """
-    firsts = np.cumsum([0, *(count for count, _ in shapes)])
-    spanning, chosen = [], []
-    for use in itertools.product(*(range(dimension + 1) for _, dimension in shapes)):
-        if sum(use) != r - 1:
-            continue
-        options = [
-            range(count) if u == 1 else (-1,) for u, (count, _) in zip(use, shapes, strict=True)
+    ends: list[tuple[int, int]] = []
+    choices: list[list[tuple[int, ...]]] = [[()], *[[] for _ in range(r - 1)]]
+    start = 0
+    for points, dimension in shapes:
+        first, count = len(ends), points if dimension == 2 else 1
+        ends += [(start + i, start + (i + 1) % points) for i in range(count)]
+        own: list[list[tuple[int, ...]]] = [[()], [(first + i,) for i in range(count)]]
+        if dimension == 2:
+            own.append([(len(ends), len(ends) + 1)])
+            ends += [(-1, -1)] * 2
+        start += points
+        choices = [
+            [
+                begun + more
+                for used, options in enumerate(own[: size + 1])
+                for begun in choices[size - used]
+                for more in options
+            ]
+            for size in range(r)
         ]
-        picks = np.array(list(itertools.product(*options)))
-        columns = []
-        for k, u in enumerate(use):
-            if u == 1:
-                columns.append(firsts[k] + picks[:, k])
-            elif u == 2:
-                columns += [np.full(len(picks), firsts[k] + i) for i in range(2)]
-        spanning.append(np.column_stack(columns))
-        chosen.append(picks)
-    return expansion(np.vstack(spanning), r), np.vstack(chosen)
+    listed = np.array(choices[-1], dtype=np.intp).reshape(len(choices[-1]), r - 1)
+    return np.array(ends, dtype=np.intp), listed
 
 
 def sums(parts: list[Summand]) -> Array:

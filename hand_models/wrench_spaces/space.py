@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Self
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,16 +32,38 @@ from hand_models.base import (
 )
 from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes, coupled_columns
 from hand_models.wrench_spaces.clipping import clipped
-from hand_models.wrench_spaces.half_spaces import FLATNESS, Facets, HalfSpaces, lifted
+from hand_models.wrench_spaces.half_spaces import FLATNESS, SCALE, Facets, HalfSpaces, lifted
+from hand_models.wrench_spaces.linear_programs import ends_along, farthest
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope
-from hand_models.wrench_spaces.reaches import ends_along, farthest
-from hand_models.wrench_spaces.row import Row
-from hand_models.wrench_spaces.scaled_wrench import SCALE
 
-__all__ = ["WrenchSpace"]
+__all__ = ["Row", "WrenchSpace"]
 
 MOST_ROWS: Final = 250
 """Rows of more than two coupled columns whose polytope is listed: each takes a linear program."""
+
+
+class Row(NamedTuple):
+    """The name of an inequality.
+
+    Attributes
+    ----------
+    finger, phalanx : str or None
+        Whose it is; None where it is the palm's, or a whole finger's.
+    limit : str
+        What it limits.
+    kind : {'limit', 'hard'}
+    label : str
+        Unique in its set.
+    joint : str or None
+        Of the limb that carries the hand, where the limit is that joint's.
+    """
+
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    kind: Literal["limit", "hard"]
+    label: str
+    joint: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,37 +121,6 @@ class WrenchSpace:
             raise InvalidInputError("one name for each row is needed", field="rows")
         if not (self.s > 0.0).all():
             raise InvalidInputError("every capacity must be above zero", field="s")
-
-    @classmethod
-    def assembled(
-        cls,
-        *,
-        origin: Array,
-        generators: Array,
-        columns: tuple[str, ...],
-        rows: tuple[Row, ...],
-        L: Array,
-        l0: Array,
-        s: Array,
-        H: Array,
-        h: Array,
-        D: Array,
-    ) -> Self:
-        """Return a set of arrays that are known to fit each other: nothing is checked."""
-        space = cls.__new__(cls)
-        space.__dict__.update(
-            origin=origin,
-            generators=generators,
-            columns=columns,
-            rows=rows,
-            L=L,
-            l0=l0,
-            s=s,
-            H=H,
-            h=h,
-            D=D,
-        )
-        return space
 
     @property
     def A(self) -> Array:

@@ -118,7 +118,7 @@ class StanceConstraints:
         C = np.concatenate([np.zeros((0, 6)), *(block.C for block in blocks)])
         limits = tuple(row for block in blocks for row in block.rows)
         constraints = tuple(row for block in blocks for row in block.hard)
-        return WrenchSpace.assembled(
+        return WrenchSpace(
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,

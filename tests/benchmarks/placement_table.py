@@ -25,7 +25,7 @@ from hand_models.rock.triangle_cells import TriangleCells
 from hand_models.sections import Section
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Line, Table, span, times
-from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import fractal_wall
 
 __all__ = ["placement_tables"]
@@ -66,7 +66,7 @@ def placement_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
         )
         for each in (trials[i] for i in chosen)
     ]
-    seats = [HAND.seat(each.hold, each.grasp, each.at) for each in placements]
+    seats = [seating_on(each.hold, each.grasp, each.at) for each in placements]
     wall.planes.clear()
     hands = [each for each in settle_hands(HAND, placements) if isinstance(each, SettledHand)]
     planes, scale = wall.planes, Scale.of()
@@ -93,7 +93,7 @@ def placement_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
             "crop": lambda _: [crop(plane) for plane in planes[:made]],
             "cut": lambda _: [wall.pieces(plane) for plane in planes[:made]],
             "smooth": lambda _: [smoothed_outline(each, scale) for each in pieces],
-            "seat": lambda _: [HAND.seat(each.hold, each.grasp, each.at) for each in placements],
+            "seat": lambda _: [seating_on(each.hold, each.grasp, each.at) for each in placements],
             "close": lambda _: settle_hands(HAND, seated),
             "set": lambda _: supports(hands),
             "robust": lambda k: robustness(HAND, hands[k % len(hands)], PULL_OFF, seed=k),

@@ -11,11 +11,12 @@ from scipy.spatial import KDTree
 
 from hand_models.fixed_wrist import wrench_space
 from hand_models.fixed_wrist.tension_box import parallelepiped
-from hand_models.wrench_spaces import SCALE, zonotope
+from hand_models.wrench_spaces import SCALE
 from tests.benchmarks.paper_search import searched
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Table, lines
 from tests.suite.helpers.hands import pinch
+from tests.suite.helpers.zonotopes import half_spaces
 
 __all__ = ["set_tables"]
 
@@ -40,7 +41,7 @@ def _zonotope(rounds: int, tick: Callable[[], object]) -> Table:
     ]
 
     def ours(number: int) -> np.ndarray:
-        found = zonotope.half_spaces(*sets[number % len(sets)])
+        found = half_spaces(*sets[number % len(sets)])
         return np.column_stack([found.normals, found.offsets])
 
     def theirs(number: int) -> np.ndarray:
@@ -58,7 +59,7 @@ def _zonotope(rounds: int, tick: Callable[[], object]) -> Table:
         lines(
             timed,
             ["ours"],
-            ("`hand_models.wrench_spaces.zonotope`", "ours"),
+            ("`hand_models.wrench_spaces`, a sum of segments", "ours"),
             ("pycapacity, `hyper_plane_shift_method`", "pycapacity"),
         ),
         f"The same half-spaces, to {far:.0e}.",

@@ -20,7 +20,7 @@ from hand_models import (
 from hand_models.fixed_wrist import BEST, PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement
 from hand_models.rock import Mesh
-from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import random_mesh, random_profile
 from tests.suite.helpers.shares import some_and_all
 
@@ -56,7 +56,7 @@ def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
     for seed in seeds:
         each = placement(random_rock(seed), math.pi * (seed % 2))
         (best,) = best_seats(HAND, [each])
-        seat = HAND.seat(each.hold, each.grasp)
+        seat = seating_on(each.hold, each.grasp)
         try:
             rest = reach(HAND.settle(*each))
         except InvalidInputError:

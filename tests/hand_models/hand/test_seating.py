@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Pose, Sphere
 from hand_models.rock import Mesh, Profile
-from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import cylinder_mesh, distance, random_mesh, random_profile
 from tests.suite.helpers.shares import given_some
 
@@ -21,16 +21,16 @@ seeds = st.integers(0, 2**32 - 1)
 @pytest.mark.parametrize("diameter", [0.15, 0.2, 0.3, 0.7, 1.5])
 @pytest.mark.parametrize("rotation", [0.0, math.pi])
 def test_a_meshed_cylinder_seats_as_the_cylinder(diameter, rotation):
-    want = HAND.seat(Cylinder(diameter), Grasp(rotation))
-    got = HAND.seat(Mesh(*cylinder_mesh(diameter, 512)), Grasp(rotation))
+    want = seating_on(Cylinder(diameter), Grasp(rotation))
+    got = seating_on(Mesh(*cylinder_mesh(diameter, 512)), Grasp(rotation))
     assert got.rule == want.rule
     np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
 
 
 def test_a_meshed_ball_seats_as_the_ball():
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
-    want = HAND.seat(Sphere(0.4), Grasp())
-    got = HAND.seat(Mesh(ball.vertices + [0.0, 0.0, 0.2], ball.faces), Grasp())  # noqa: RUF005
+    want = seating_on(Sphere(0.4), Grasp())
+    got = seating_on(Mesh(ball.vertices + [0.0, 0.0, 0.2], ball.faces), Grasp())  # noqa: RUF005
     assert got.rule == want.rule == "palm_on_rock"
     np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
 
@@ -40,7 +40,7 @@ def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng) if rng.random() < 0.5 else random_profile(rng)
     grasp = Grasp(float(rng.choice([0.0, 1.0, math.pi])))
-    seating = HAND.seat(hold, grasp)
+    seating = seating_on(hold, grasp)
     x, y = np.meshgrid(np.linspace(-0.055, 0.055, 23), np.linspace(-0.026, 0.026, 5))
     palm = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     gaps = distance(hold, seating.pose.inverse().apply(palm))
@@ -69,7 +69,7 @@ def bumpy(height: float) -> Profile:
 def test_a_hand_backs_off_rock_that_would_stand_in_its_open_fingers():
     for height in (0.012, 0.02):
         settled = HAND.settle(bumpy(height), ROCK, Grasp())
-        seat, seating = HAND.seat(bumpy(height), Grasp()), settled.seating
+        seat, seating = seating_on(bumpy(height), Grasp()), settled.seating
         assert 0.0 < seating.backed_off < HAND.back_off
         assert seating.rule == seat.rule
         np.testing.assert_allclose(
@@ -84,7 +84,7 @@ def test_a_hand_backs_off_rock_that_would_stand_in_its_open_fingers():
 
 
 def test_a_hand_that_is_placed_does_not_back_off():
-    seat = HAND.seat(bumpy(0.02), Grasp())
+    seat = seating_on(bumpy(0.02), Grasp())
     with pytest.raises(InvalidInputError, match="even with its joints fully open"):
         HAND.settle(bumpy(0.02), ROCK, Grasp(), seat.pose)
 
@@ -95,13 +95,13 @@ def test_a_raised_ridge_under_the_palm_lifts_it():
     log = 0.15 - np.sqrt(np.maximum(0.15**2 - x**2, 0.0))
     ridge = 0.012 * np.exp(-(((x + 0.02) / 0.008) ** 2))
     plain, raised = (Profile(np.column_stack([x, z])) for z in (log, log - ridge))
-    low, high = (HAND.seat(hold, Grasp(1.0)).pose.position[2] for hold in (plain, raised))
+    low, high = (seating_on(hold, Grasp(1.0)).pose.position[2] for hold in (plain, raised))
     assert low == pytest.approx(0.0, abs=1e-5)
     assert high == pytest.approx(0.012 - 0.02**2 / 0.3, abs=1.5e-3)
 
 
 def test_without_rock_under_the_palm_the_hold_keeps_its_place():
     beside = Profile([[0.3, 0.0], [0.5, 0.0]])
-    seating = HAND.seat(beside, Grasp())
+    seating = seating_on(beside, Grasp())
     assert seating.rule == "palm_on_rock_centred"
     np.testing.assert_array_equal(seating.pose.position, 0.0)

@@ -22,7 +22,7 @@ from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
 from planner.prepare.settled_stance import settle_stance
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand
+from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, seating_on
 from tests.suite.helpers.rocks import (
     cylinder_mesh,
     random_axes,
@@ -94,7 +94,7 @@ def forget() -> None:
 def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAND) -> None:
     """Against the hand put together from sections and fingers closed one by one."""
     hold, surface, grasp, pose, _ = placement
-    assert settled.seating.rule == ("given" if pose is not None else HAND.seat(hold, grasp).rule)
+    assert settled.seating.rule == ("given" if pose is not None else seating_on(hold, grasp).rule)
     there = settled.seating.pose
     if pose is not None:
         np.testing.assert_array_equal(there.position, pose.position)

@@ -20,7 +20,7 @@ from hand_models import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.hand import Placement
-from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, settled_at
+from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, seating_on, settled_at
 from tests.suite.helpers.rocks import in_hand
 from tests.suite.helpers.shares import given_some
 
@@ -127,7 +127,7 @@ def test_on_a_plane_every_contact_is_at_its_tiles_centre():
 @pytest.mark.parametrize("hold", [Cylinder(0.005), Sphere(0.01), Edge(0.001, 0.5)])
 def test_where_no_seat_can_be_had_the_crest_is_under_the_palm(hold):
     for grasp in (Grasp(), PINCH):
-        seating = HAND.seat(hold, grasp)
+        seating = seating_on(hold, grasp)
         assert seating.rule == "palm_on_rock_centred"
         np.testing.assert_array_equal(seating.pose.position, 0.0)
 
@@ -181,7 +181,7 @@ def test_left_and_right_mirror_each_other(hold, rotation):
 @pytest.mark.slow
 @pytest.mark.parametrize("hold", [Cylinder(0.3), Cylinder(8.0), Sphere(0.6)])
 def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
-    pose = HAND.seat(hold, PINCH).pose
+    pose = seating_on(hold, PINCH).pose
     turns = np.linspace(0.0, math.pi, 315)
     grasps = [Grasp(outer_rotation=float(turn)) for turn in turns]
     hands = HAND.settle_each([Placement(hold, ROCK, grasp, pose) for grasp in grasps])

@@ -8,11 +8,9 @@ from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 from scipy.spatial import KDTree
 
-from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.wrench_spaces import SCALE, Row, WrenchSpace, hull_facets
-from hand_models.wrench_spaces.cross_products import cross_products, expansion
 from hand_models.wrench_spaces.half_spaces import affine_hull
-from hand_models.wrench_spaces.zonotope import half_spaces
+from tests.suite.helpers.zonotopes import half_spaces
 
 SEEDS = st.integers(0, 10**6)
 
@@ -188,39 +186,3 @@ def test_a_wrench_space_of_independent_loads_is_a_zonotope_in_scaled_wrenches():
         np.column_stack([expected.normals, expected.offsets]),
         1e-9,
     )
-
-
-@given(SEEDS)
-def test_cross_products_are_orthogonal_and_as_long_as_the_volume(seed):
-    rng = np.random.default_rng(seed)
-    r = int(rng.integers(2, 7))
-    vectors = rng.normal(size=(int(rng.integers(1, 9)), r))
-    choices = rng.integers(len(vectors), size=(11, r - 1))
-    products = cross_products(vectors, expansion(choices, r))
-    for choice, product in zip(choices, products, strict=True):
-        spanning = vectors[choice]
-        np.testing.assert_allclose(spanning @ product, 0.0, atol=1e-10)
-        volume = np.linalg.det(np.vstack([product, spanning]))
-        assert volume == pytest.approx(product @ product, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((np.ones(3), [0.0], [1.0]), "generators: shape (d, n) is needed, got (3,)"),
-        ((np.ones((2, 2)), [0.0], [1.0, 1.0]), "lower: shape (2,) is needed, got (1,)"),
-        ((np.ones((2, 2)), [0.0, 3.0], [1.0, 2.0]), "lower[1]: must not be above upper (2), got 3"),
-        ((np.ones((2, 1)), [0.0], [np.nan]), "upper: every number must be finite"),
-        ((np.ones((2, 1)), [0.0], [1.0], np.ones(3)), "origin: shape (2,) is needed, got (3,)"),
-    ],
-)
-def test_what_is_no_zonotope_is_refused(arguments, message):
-    with pytest.raises(InvalidInputError) as caught:
-        half_spaces(*arguments)
-    assert str(caught.value) == message
-
-
-def test_too_many_choices_are_refused():
-    G = np.random.default_rng(0).normal(size=(6, 34))
-    with pytest.raises(UnsupportedError, match="278256 choices of 5 of 34 generators"):
-        half_spaces(G, np.zeros(34), np.ones(34))

@@ -12,6 +12,7 @@ from hand_models import (
     Cylinder,
     Edge,
     Grasp,
+    Hold,
     InvalidInputError,
     Plane,
     Pose,
@@ -23,6 +24,7 @@ from hand_models import (
     spiny_hand,
 )
 from hand_models.finger import PHALANGES
+from hand_models.hand import Placement, Seating, seated
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from tests.suite.helpers.rocks import random_axes
 
@@ -34,6 +36,12 @@ PINCH = Grasp(outer_rotation=math.pi)
 def pinch(diameter: float = 0.3, surface: Surface = ROCK, **grasp) -> SettledHand:
     """A hand that pinches a cylinder, seated."""
     return HAND.settle(Cylinder(diameter), surface, Grasp(outer_rotation=math.pi, **grasp))
+
+
+def seating_on(hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
+    """Where the hand is seated on a hold."""
+    (found,) = seated(HAND, [Placement(hold, ROCK, grasp, None, at)])
+    return found
 
 
 def changed_hand(section: str, name: str, value: float | list[float]) -> SpinyHand:
