@@ -117,13 +117,12 @@ def farthest(
             "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"
         )
-    verdict = found.verdict
-    binding = float(verdict.utilisation[0]) >= 1.0 - KEPT
+    binding = float(found.utilisation[0]) >= 1.0 - KEPT
     return Farthest(
         twist=at,
         wrench=found.wrenches[0],
         reach=float(d @ found.wrenches[0]),
-        limiting=grasp.limits[int(verdict.limiting[0])] if binding else None,
+        limiting=grasp.limits[int(found.limiting[0])] if binding else None,
         rounds=rounds,
     )
 
@@ -186,8 +185,7 @@ def _climb(
 
 def _excess(found: Evaluation, below: tuple[Array, Array] | None) -> float:
     """Return by what share a limit is exceeded, or a hard row in newtons; the most of all."""
-    verdict = found.verdict
-    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]), 0.0)
+    excess = max(float(found.utilisation[0]) - 1.0, float(found.violation[0]), 0.0)
     if below is not None:
         G, g = below
         excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))

@@ -19,7 +19,7 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
-from hand_models.compliance.grasp import CompliantGrasp, Verdict
+from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.pose_box import SearchBox, search_box
 from hand_models.wrench_spaces import SCALE, Row
 
@@ -123,7 +123,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
         t = box.grid(per_axis, start, min(start + CHUNK, total))
         t = t[grasp.sieve(box.poses(t))]
         found = grasp.evaluate(box.poses(t))
-        good = found.verdict.holds
+        good = found.holds
         held += int(good.sum())
         extremes.add(t[good], found.wrenches[good])
     if progress is not None:
@@ -197,11 +197,11 @@ def _pushed(
     components: tuple[int, ...],
 ) -> WristSearch:
     """Return the boundary poses on the rays through some coordinates."""
-    t, verdict = _to_boundary(grasp, box, corners)
+    t, exceeded = _to_boundary(grasp, box, corners)
     poses = box.poses(t)
     wrenches = grasp.evaluate(poses).wrenches
     names = grasp.limits
-    limiting = tuple(names[int(i)] if i >= 0 else None for i in verdict)
+    limiting = tuple(names[int(i)] if i >= 0 else None for i in exceeded)
     return WristSearch(box, tried, held, poses, wrenches, limiting, components)
 
 
@@ -219,16 +219,16 @@ def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array
     low = np.zeros(len(t))
     high = np.ones(len(t))
     for _ in range(GROWTHS):
-        holds = grasp.evaluate(box.poses(t * high[:, None])).verdict.holds
+        holds = grasp.evaluate(box.poses(t * high[:, None])).holds
         if not holds.any():
             break
         low = np.where(holds, high, low)
         high = np.where(holds, 1.5 * high, high)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        holds = grasp.evaluate(box.poses(t * middle[:, None])).verdict.holds
+        holds = grasp.evaluate(box.poses(t * middle[:, None])).holds
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
-    beyond: Verdict = grasp.evaluate(box.poses(t * high[:, None])).verdict
+    beyond = grasp.evaluate(box.poses(t * high[:, None]))
     named = np.isfinite(beyond.utilisation) & (beyond.utilisation > 1.0)
     limiting = np.where(named, beyond.limiting, -1)
     return t * low[:, None], limiting

@@ -87,7 +87,7 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
     at = np.zeros(len(grasp.linearised().columns))
     for _ in range(RECENTRINGS):
         space, centre, axes = _ellipsoid(grasp, at)
-        holds = grasp.evaluate(np.stack([centre, at])).verdict.holds
+        holds = grasp.evaluate(np.stack([centre, at])).holds
         if holds.any():
             at = centre if holds[0] else at
             return SearchBox(at, axes, _range(space, at, axes))
@@ -110,7 +110,7 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
     for _ in range(RESIZES):
         t = box.grid(per_axis, 0, per_axis ** len(centre))
         t = t[grasp.sieve(box.poses(t))]
-        held = t[grasp.evaluate(box.poses(t)).verdict.holds]
+        held = t[grasp.evaluate(box.poses(t)).holds]
         step = 2.0 * box.range / (per_axis - 1)
         outermost = np.abs(held).max(axis=0)
         # a layer more than holds: outward while the outermost holds, inward where none does
