@@ -14,11 +14,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
 
-from hand_models.base import Array, EmptySetError, SolverError
+from hand_models.base import Array, EmptySetError
 from hand_models.compliance.grasp import CompliantGrasp, Evaluation
-from hand_models.wrench_spaces import Row, WrenchSpace
+from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
@@ -136,18 +135,11 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
         If the linear program fails.
     """
     units = pose_units(space.columns)
-    result = linprog(
-        -(direction @ space.generators) * units,
-        A_ub=space.A * units,
-        b_ub=space.b,
-        bounds=[(None, None)] * len(units),
-        method="highs",
-    )
-    if result.status == 2:
+    cost = -(direction @ space.generators) * units
+    found = linear_program(cost, space.A * units, space.b, "extreme of a linearised set")
+    if found is None:
         return None, -np.inf
-    if result.status != 0 or result.x is None:
-        raise SolverError(f"extreme of a linearised set: {result.message}")
-    pose = result.x * units
+    pose = found * units
     return pose, float(direction @ space.wrench(pose))
 
 
@@ -217,14 +209,14 @@ def _step(
         most.append(np.asarray(g - G @ space.origin))
     A: Array = np.vstack(rows)
     b: Array = np.concatenate(most) - A @ at
-    gain = d @ space.generators
-    result = linprog(
-        np.append(-gain * units, weight),
-        A_ub=np.column_stack([A * units, -np.ones(len(b))]),
-        b_ub=b,
-        bounds=[*zip(-half_widths / units, half_widths / units, strict=True), (0.0, None)],
-        method="highs",
+    cost = np.append(-(d @ space.generators) * units, weight)
+    widths = half_widths / units
+    found = linear_program(
+        cost,
+        np.column_stack([A * units, -np.ones(len(b))]),
+        b,
+        "farthest",
+        bounds=[*zip(-widths, widths, strict=True), (0.0, None)],
     )
-    if result.status != 0 or result.x is None or result.fun is None:
-        raise SolverError(f"farthest: {result.message}")
-    return result.x[:-1] * units, float(d @ space.wrench(at)) - float(result.fun)
+    assert found is not None  # the slack exceeds whatever is exceeded
+    return found[:-1] * units, float(d @ space.wrench(at)) - float(cost @ found)
