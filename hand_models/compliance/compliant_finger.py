@@ -197,11 +197,3 @@ class CompliantFinger:
                 rest[:, i] -= normals[:, j] * arms[i, j]
         rest[:, list(self.finger.free)] = 0.0
         return normals, rest
-
-    def stiffness(self) -> Array:
-        """Return K_f = ∂w_f/∂x_f in the plane at rest, shape (3, 3), by complex steps.
-
-        Rows F_x, F_z, M and columns x, z, ψ, both turns from x toward z [N/m, N, N·m/rad].
-        """
-        steps = 1j * STEP * np.eye(3)
-        return np.asarray(self.loads(*steps).planar_wrench.imag.T / STEP)

@@ -112,7 +112,7 @@ class CompliantHand:
         self.fingers = tuple(self._finger(i, name, scheme) for i, name in enumerate(FINGERS))
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
-        self.palm_shear_stiffness = self.palm_pressing_stiffness = 0.0
+        self.palm_stiffness = np.zeros(2)
         for share, tiles in settled.palm.layers:
             sharing = share_load(
                 tuple(hand.palm_contact[i] for i in tiles),
@@ -120,8 +120,8 @@ class CompliantHand:
                 hand.palm_friction,
                 hand.palm_own_friction,
             )
-            self.palm_shear_stiffness += share * float(sharing.tile_stiffness.sum())
-            self.palm_pressing_stiffness += share * hand.palm_pressing_stiffness * len(tiles)
+            each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
+            self.palm_stiffness += share * np.array(each)
 
     def _finger(self, i: int, name: str, scheme: MotorScheme) -> CompliantFinger:
         settled, hand = self.settled, self.settled.hand
@@ -234,14 +234,17 @@ class CompliantHand:
         ]
         return np.stack(pushing, axis=-1) if pushing else np.zeros((m, 0), dtype=torques[0].dtype)
 
+    def palm_travel(self, twists: Numbers) -> Numbers:
+        """Return how far the palm moves toward −x and into the rock, shape (m, 2) [m]."""
+        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
+        return moved[:, ::2] * (-1.0, 1.0)
+
     def palm_loads(self, twists: Numbers) -> Numbers:
         """Return what the palm's shear and pressing would be as two-sided springs, (m, 2) [N].
 
         Negative where the palm moves away and so carries nothing.
         """
-        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
-        shear = -self.palm_shear_stiffness * moved[:, 0]
-        return np.stack([shear, self.palm_pressing_stiffness * moved[:, 2]], axis=-1)
+        return self.palm_travel(twists) * self.palm_stiffness
 
     def wrenches(self, loads: HandLoads) -> Numbers:
         """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""

@@ -14,11 +14,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
 
-from hand_models.base import Array, EmptySetError, SolverError
+from hand_models.base import Array, EmptySetError
 from hand_models.compliance.grasp import CompliantGrasp, Evaluation
-from hand_models.wrench_spaces import Row, WrenchSpace
+from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
@@ -117,13 +116,12 @@ def farthest(
             "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"
         )
-    verdict = found.verdict
-    binding = float(verdict.utilisation[0]) >= 1.0 - KEPT
+    binding = float(found.utilisation[0]) >= 1.0 - KEPT
     return Farthest(
         twist=at,
         wrench=found.wrenches[0],
         reach=float(d @ found.wrenches[0]),
-        limiting=grasp.limits[int(verdict.limiting[0])] if binding else None,
+        limiting=grasp.limits[int(found.limiting[0])] if binding else None,
         rounds=rounds,
     )
 
@@ -137,18 +135,11 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
         If the linear program fails.
     """
     units = pose_units(space.columns)
-    result = linprog(
-        -(direction @ space.generators) * units,
-        A_ub=space.A * units,
-        b_ub=space.b,
-        bounds=[(None, None)] * len(units),
-        method="highs",
-    )
-    if result.status == 2:
+    cost = -(direction @ space.generators) * units
+    found = linear_program(cost, space.A * units, space.b, "extreme of a linearised set")
+    if found is None:
         return None, -np.inf
-    if result.status != 0 or result.x is None:
-        raise SolverError(f"extreme of a linearised set: {result.message}")
-    pose = result.x * units
+    pose = found * units
     return pose, float(direction @ space.wrench(pose))
 
 
@@ -186,8 +177,7 @@ def _climb(
 
 def _excess(found: Evaluation, below: tuple[Array, Array] | None) -> float:
     """Return by what share a limit is exceeded, or a hard row in newtons; the most of all."""
-    verdict = found.verdict
-    excess = max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]), 0.0)
+    excess = max(float(found.utilisation[0]) - 1.0, float(found.violation[0]), 0.0)
     if below is not None:
         G, g = below
         excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))
@@ -219,14 +209,14 @@ def _step(
         most.append(np.asarray(g - G @ space.origin))
     A: Array = np.vstack(rows)
     b: Array = np.concatenate(most) - A @ at
-    gain = d @ space.generators
-    result = linprog(
-        np.append(-gain * units, weight),
-        A_ub=np.column_stack([A * units, -np.ones(len(b))]),
-        b_ub=b,
-        bounds=[*zip(-half_widths / units, half_widths / units, strict=True), (0.0, None)],
-        method="highs",
+    cost = np.append(-(d @ space.generators) * units, weight)
+    widths = half_widths / units
+    found = linear_program(
+        cost,
+        np.column_stack([A * units, -np.ones(len(b))]),
+        b,
+        "farthest",
+        bounds=[*zip(-widths, widths, strict=True), (0.0, None)],
     )
-    if result.status != 0 or result.x is None or result.fun is None:
-        raise SolverError(f"farthest: {result.message}")
-    return result.x[:-1] * units, float(d @ space.wrench(at)) - float(result.fun)
+    assert found is not None  # the slack exceeds whatever is exceeded
+    return found[:-1] * units, float(d @ space.wrench(at)) - float(cost @ found)

@@ -13,28 +13,25 @@ each of its ways of carrying is a set of its own. A tendon's stick and slip stay
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, Indices
-from hand_models.compliance.compliant_finger import STEP
 from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
-from hand_models.compliance.grasp import Evaluation, Verdict, range_rows
+from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps
 from hand_models.compliance.rolling import Numbers
-from hand_models.fixed_wrist import KEPT, RowLayout, layout_of
+from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist import RowLayout, layout_of
 from hand_models.hand import FINGERS, HELD
-from hand_models.wrench_spaces import Row, WrenchSpace
+from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["PALM_MODES", "WRIST", "FloatingWrist", "PalmMode"]
 
 WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
 """Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
-
-ROUNDING: Final = 1e-9
-"""Slope of a load that is none [N/m, N/rad]."""
 
 PALM_ROWS: Final = 1e5
 """Newtons per metre by which rows of the palm's travel are made commensurate."""
@@ -52,8 +49,10 @@ PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class FloatingWrist:
+class FloatingWrist(CompliantGrasp):
     """The limits of a compliant hand.
+
+    Its loads e are the tiles' shears, normals and laterals, tensions, the palm's, torques on stops.
 
     Attributes
     ----------
@@ -68,128 +67,81 @@ class FloatingWrist:
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
+    columns = WRIST
+
     @cached_property
     def layout(self) -> RowLayout:
         """Names and coefficients of the rows."""
         return layout_of(self.hand.settled, sticking=False)
 
     @cached_property
-    def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
-        """Of `RowLayout.planes`, capacities of each tile's spines on the rock."""
-        settled = self.hand.settled
-        tile, *slopes, capacity = self.layout.planes(settled.surface)
-        a_shear, a_normal, a_lateral = slopes
-        return tile, a_shear, a_normal, a_lateral, capacity * settled.engagement[tile]
-
-    @property
-    def limits(self) -> tuple[Row, ...]:
-        """Limit rows; the last `HELD` ones are wrench rows."""
-        return self.layout.limits
-
-    @cached_property
-    def _limit_map(self) -> tuple[Array, Array, Array]:
-        """(P, p, s): loads of the limit rows but the wrench rows are P e + p, capacities s.
-
-        e as of `_elements`: shears, normals, laterals, tensions, palm.
-        """
+    def load_rows(self) -> LoadRows:
+        """What loads and wrenches must keep to, but for the way of the palm."""
         settled, layout = self.hand.settled, self.layout
-        n = len(settled.tiles)
-        rows = len(layout.limits) - len(HELD)
-        P, p, s = np.zeros((rows, 3 * n + len(FINGERS) + 2)), np.zeros(rows), np.empty(rows)
-        tile, a_shear, a_normal, a_lateral, capacity = self._planes
+        n, structure, drive = len(settled.tiles), settled.hand.structure, settled.hand.drive
+        tension, palm = 3 * n, 3 * n + len(FINGERS)
+        stop = palm + 2
+        size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD)
+        P, p, s = np.zeros((nl, size)), np.zeros(nl), np.full(len(layout.limits), np.nan)
+        tile, *slopes, capacity = layout.planes(settled.surface)
         k = len(tile)
-        index = np.arange(k)
-        P[index, tile], P[index, n + tile], P[index, 2 * n + tile] = a_shear, a_normal, a_lateral
-        s[:k] = capacity
-        drive, most = settled.hand.drive, settled.hand.maximum_tension
+        for part, slope in enumerate(slopes):
+            P[np.arange(k), part * n + tile] = slope
+        s[:k] = capacity * settled.engagement[tile]
+        most = settled.hand.maximum_tension
         if self.tension_limit is not None:
             most = min(most, self.tension_limit)
-        tendon = np.arange(len(FINGERS))
-        for per_newton, at_zero, most_of in (
+        for per_newton, at_zero, end in (
             (1.0, 0.0, most),
             (drive.torque_per_newton, 0.0, drive.maximum_torque),
             (drive.current_per_newton, drive.no_load_current, drive.maximum_current),
         ):
-            P[k + tendon, 3 * n + tendon], p[k + tendon], s[k + tendon] = (
-                per_newton,
-                at_zero,
-                most_of,
-            )
-            k += len(tendon)
-        structure = settled.hand.structure
+            own = slice(k, k + len(FINGERS))
+            P[own, tension:palm], p[own], s[own] = per_newton * np.eye(len(FINGERS)), at_zero, end
+            k = own.stop
         for i in layout.engaged:
-            P[k, np.flatnonzero(settled.finger_of == i)] = 1.0
-            s[k] = structure.finger_shear
+            P[k, np.flatnonzero(settled.finger_of == i)], s[k] = 1.0, structure.finger_shear
             k += 1
         for t in layout.tips:
             P[k, n + t], s[k] = 1.0, structure.fingertip_force
             k += 1
         if settled.palm.engaged:
-            P[-2, -2] = P[-1, -1] = 1.0
-            s[-2:] = settled.palm.shear_limit, settled.palm.pressing_limit
-        return P, p, s
-
-    @cached_property
-    def _hard_map(self) -> Array:
-        """Q: hard rows of tendons, tiles, frames and stops are Q (e, stop torques) ≤ 0."""
-        settled, layout = self.hand.settled, self.layout
-        n = len(settled.tiles)
-        size = 3 * n + len(FINGERS) + 2
-        those = [
-            *(3 * n + np.arange(len(FINGERS))),
-            *np.flatnonzero(settled.touching),
-            *(n + t for t in layout.frames),
-        ]
-        Q = np.zeros((len(those) + len(settled.stops), size + len(settled.stops)))
+            P[k:, palm:stop] = np.eye(2)
+            s[k:nl] = settled.palm.shear_limit, settled.palm.pressing_limit
+        s[nl:] = structure.hand_load
+        # in newtons of tension, so that rows stay commensurate
+        pushed = [1.0 / max(abs(float(torque[1])), 1e-6) for _, _, torque in settled.stops]
+        those = [*range(tension, palm), *np.flatnonzero(settled.touching), *(n + layout.frames)]
+        Q = np.zeros((len(those) + len(pushed), size))
         Q[np.arange(len(those)), those] = -1.0
-        for k, (_, _, torque) in enumerate(settled.stops):
-            # in newtons of tension, so that rows stay commensurate
-            Q[len(those) + k, size + k] = -1.0 / max(abs(float(torque[1])), 1e-6)
-        return Q
+        Q[len(those) :, stop:] = -np.diag(pushed)
+        return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q)
 
-    def judge(self, twists: Array) -> Verdict:
-        """Return how near its limits the hand is at some twists of the wrist, shape (m, 6)."""
-        return self.evaluate(twists).verdict
+    def loads_at(self, twists: Numbers) -> GraspLoads:
+        """Return loads and wrenches at some twists of the wrist, shape (m, 6)."""
+        return self._grasp_loads(self.hand.loads(twists))
 
-    def evaluate(self, twists: Array) -> Evaluation:
-        """Return wrenches and limits at some twists of the wrist, shape (m, 6)."""
-        loads = self.hand.loads(twists)
-        P, p, s = self._limit_map
-        D = HELD / self.hand.settled.hand.structure.hand_load
-        e, wrenches = _elements(loads), self.hand.wrenches(loads)
-        with np.errstate(invalid="ignore"):
-            used = np.concatenate([(e @ P.T + p) / s, wrenches[:, :3] @ D.T], axis=1)
-            broken = np.concatenate([e, loads.stop_torques], axis=1) @ self._hard_map.T
-        used = np.where(loads.reached[:, None], used, np.inf)
-        broken = np.where(loads.reached[:, None], broken, np.inf)
-        verdict = Verdict(
-            used.max(axis=1), used.argmax(axis=1), broken.max(axis=1, initial=-np.inf)
+    def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
+        elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm]
+        return GraspLoads(
+            np.concatenate([*elements, loads.stop_torques], axis=1),
+            self.hand.wrenches(loads),
+            loads.reached,
         )
-        return Evaluation(wrenches, verdict)
 
     def sieve(self, twists: Array) -> Indices:
         """Return which twists pass the limits of each finger's tiles, one finger after another."""
-        left = np.arange(len(twists))
-        tile, a_shear, a_normal, a_lateral, capacity = self._planes
+        rows, n, left = self.load_rows, len(self.hand.settled.tiles), np.arange(len(twists))
         for i in self.layout.engaged:
-            own = self.hand.tiles_of(i)
-            mine = np.isin(tile, own)
-            loads = self.hand.finger_loads(i, twists[left])
-            e = np.concatenate(
-                [loads.shears, loads.normals, self.hand.lateral_loads(i, twists[left])], axis=1
-            )
-            n, m = len(own), loads.normals.shape[1]
-            place = tile[mine] - own[0]
-            rows = np.arange(int(mine.sum()))
-            P = np.zeros((len(rows), e.shape[1]))
-            P[rows, place] = a_shear[mine]
-            # a base tile has no normal load
-            bears = place >= n - m
-            P[rows[bears], n + place[bears] - (n - m)] = a_normal[mine][bears]
-            P[rows, n + m + place] = a_lateral[mine]
+            own, phalanges = self.hand.tiles_of(i), self.hand.tiles_of(i)[-len(PHALANGES) :]
+            found = self.hand.finger_loads(i, twists[left])
+            laterals = self.hand.lateral_loads(i, twists[left])
+            elements = np.concatenate([found.shears, found.normals, laterals], axis=1)
+            mine = np.flatnonzero(np.isin(self.layout.plane_tiles, own))
+            P = rows.P[np.ix_(mine, [*own, *n + phalanges, *2 * n + own])]
             with np.errstate(invalid="ignore"):
-                holds = loads.reached & ((e @ P.T <= capacity[mine]).all(axis=1))
-                holds &= (loads.shears >= 0.0).all(axis=1)
+                holds = (elements @ P.T <= rows.s[mine]).all(axis=1)
+                holds &= found.reached & (found.shears >= 0.0).all(axis=1)
             left = left[holds]
         return left
 
@@ -222,76 +174,17 @@ class FloatingWrist:
             Columns `WRIST`; rows as of a fixed wrist, with hard rows that keep the palm's way of
             carrying, and the wrist within its range.
         """
-        hand, settled, layout = self.hand, self.hand.settled, self.layout
-        at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
-        palm = palm or self.palm
-        dragging = palm in ("drags", "drags_and_presses")
-        pressing = palm in ("presses", "drags_and_presses")
-        steps = at + 1j * STEP * np.eye(6)
-        loads = hand.loads(steps)
-        free = hand.palm_loads(steps)
-        loads = loads._replace(palm=free * np.array([dragging, pressing]))
-        e = _elements(loads)
-        slope = _slopes(e)
-        start = e[0].real - slope @ at
-        P, p, s = self._limit_map
-        P_hard = self._hard_map
-        torques = loads.stop_torques
-        torque_slope = _slopes(torques)
-        torque_start = torques[0].real - torque_slope @ at
-        H = P_hard @ np.vstack([slope, torque_slope])
-        h = -P_hard @ np.concatenate([start, torque_start])
-        if settled.palm.engaged:
+        at, palm = self._pose(twist), palm or self.palm
+        carries = next(np.array(ways) for ways, mode in PALM_MODES.items() if mode == palm)
+        steps, rows = complex_steps(at), self.load_rows
+        travel = self.hand.palm_travel(steps)
+        loads = self.hand.loads(steps)._replace(palm=travel * self.hand.palm_stiffness * carries)
+        found = self._grasp_loads(loads)
+        if self.hand.settled.palm.engaged:
             # a palm that carries moves against the rock; one that does not, away from it
-            palm_slope = free.imag.T / STEP / _stiffnesses(hand)[:, None]
-            palm_start = free[0].real / _stiffnesses(hand) - palm_slope @ at
-            signs = np.where([dragging, pressing], -1.0, 1.0)
-            H = np.vstack([H, signs[:, None] * palm_slope * PALM_ROWS])
-            h = np.concatenate([h, -signs * palm_start * PALM_ROWS])
-        rows = layout.rows
-        if within is not None:
-            sides, most, names = range_rows(WRIST, at, within)
-            H, h = np.vstack([H, sides]), np.concatenate([h, most])
-            rows = _with_range(layout, names)
-
-        wrenches = hand.wrenches(loads)
-        generators = _slopes(wrenches)
-        origin = wrenches[0].real - generators @ at
-        D = np.zeros((len(HELD), 6))
-        D[:, :3] = HELD
-        held = np.full(len(D), settled.hand.structure.hand_load)
-        return WrenchSpace(
-            origin=origin,
-            generators=generators,
-            columns=WRIST,
-            rows=rows,
-            L=np.vstack([P @ slope, D @ generators]),
-            l0=np.concatenate([P @ start + p, D @ origin]),
-            s=np.concatenate([s, held]),
-            H=H,
-            h=h,
-            D=D,
-        )
-
-
-@lru_cache(maxsize=KEPT)
-def _with_range(layout: RowLayout, names: tuple[Row, ...]) -> tuple[Row, ...]:
-    """Return the names of all rows, the same tuple for the same rows."""
-    return layout.rows + names
-
-
-def _slopes(values: Numbers) -> Array:
-    """Return the derivatives that complex steps have found, without what is rounding alone."""
-    slopes = np.asarray(values.imag.T / STEP)
-    return np.where(np.abs(slopes) > ROUNDING, slopes, 0.0)
-
-
-def _elements(loads: HandLoads) -> Numbers:
-    """Return shears, normals, laterals, tensions and palm loads, shape (m, 3 n + 6)."""
-    return np.concatenate(
-        [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm], axis=1
-    )
-
-
-def _stiffnesses(hand: CompliantHand) -> Array:
-    return np.array([hand.palm_shear_stiffness, hand.palm_pressing_stiffness])
+            Q = np.zeros((len(rows.Q) + 2, rows.Q.shape[1] + 2))
+            Q[:-2, :-2], Q[-2:, -2:] = rows.Q, np.diag(np.where(carries, -PALM_ROWS, PALM_ROWS))
+            P = np.pad(rows.P, ((0, 0), (0, 2)))
+            found = found._replace(elements=np.hstack([found.elements, travel]))
+            rows = rows._replace(P=P, Q=Q)
+        return self._about(at, found, rows, within)

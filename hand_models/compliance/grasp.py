@@ -1,24 +1,91 @@
-"""What every compliant grasp tells of poses of its wrist: wrenches, limits, a set about a pose."""
+"""A grasp whose wrist gives way: its wrenches and limits at poses, and the set about a pose.
+
+A pose ξ of the wrist gives loads e (of tiles, tendons, the palm) and the wrench w on the rock.
+Limit rows are affine in loads, or of the wrench itself, and hard rows linear in loads,
+
+    P e + p ≤ u s,    D w ≤ u s,    Q e ≤ 0,
+
+so that with e and w linearised about a pose they are a `WrenchSpace`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices
+from hand_models.compliance.compliant_finger import STEP
+from hand_models.compliance.rolling import Numbers
+from hand_models.fixed_wrist import KEPT
 from hand_models.wrench_spaces import Row, WrenchSpace
 
-__all__ = ["CompliantGrasp", "Evaluation", "Verdict", "range_rows"]
+__all__ = [
+    "CompliantGrasp",
+    "Evaluation",
+    "GraspLoads",
+    "LoadRows",
+    "complex_steps",
+    "slopes",
+]
+
+ROUNDING: Final = 1e-9
+"""Slope of a load that is none [N/m, N/rad]."""
 
 
-class Verdict(NamedTuple):
-    """How near its limits a grasp is at m poses of its wrist.
+class GraspLoads(NamedTuple):
+    """What m poses of the wrist give.
 
     Attributes
     ----------
+    elements : ndarray, shape (m, k)
+        e, in an order of the grasp's own.
+    wrenches : ndarray, shape (m, 6)
+        On the rock [N, N·m].
+    reached : ndarray of bool, shape (m,)
+        Whether every phalanx still finds its rock.
+    """
+
+    elements: Numbers
+    wrenches: Numbers
+    reached: NDArray[np.bool_]
+
+
+class LoadRows(NamedTuple):
+    """What loads e and wrenches must keep to.
+
+    Attributes
+    ----------
+    names : tuple of Row
+        Limit rows, then hard rows.
+    P, p : ndarray, shapes (n, k), (n,)
+        Loads of the limit rows P e + p.
+    D : ndarray, shape (nd, 6)
+        Of the limit rows after them, D w.
+    s : ndarray, shape (n + nd,)
+        Capacities of both.
+    Q : ndarray, shape (nh, k)
+        Hard rows Q e ≤ 0.
+    """
+
+    names: tuple[Row, ...]
+    P: Array
+    p: Array
+    D: Array
+    s: Array
+    Q: Array
+
+
+class Evaluation(NamedTuple):
+    """Wrenches at m poses of a wrist, and how near its limits the grasp is.
+
+    Attributes
+    ----------
+    wrenches : ndarray, shape (m, 6)
+        On the rock [N, N·m].
     utilisation : ndarray, shape (m,)
         The largest of all limit rows; infinite where a phalanx finds no rock.
     limiting : ndarray of int, shape (m,)
@@ -27,6 +94,7 @@ class Verdict(NamedTuple):
         By how much the hard rows are broken at most; not above zero where they hold [N].
     """
 
+    wrenches: Array
     utilisation: Array
     limiting: Indices
     violation: Array
@@ -37,51 +105,114 @@ class Verdict(NamedTuple):
         return (self.utilisation <= 1.0) & (self.violation <= 0.0)
 
 
-class Evaluation(NamedTuple):
-    """Wrenches on the rock, shape (m, 6) [N, N·m], and how near its limits the grasp is."""
+class CompliantGrasp(ABC):
+    """A grasp that gives way: a whole hand, or a gripper in a plane.
 
-    wrenches: Array
-    verdict: Verdict
+    Attributes
+    ----------
+    columns : tuple of str, length d
+        Names of the components of a pose of its wrist.
+    """
 
+    columns: tuple[str, ...]
 
-class CompliantGrasp(Protocol):
-    """A grasp that gives way: a whole hand, or a gripper in a plane."""
+    @property
+    @abstractmethod
+    def load_rows(self) -> LoadRows:
+        """What its loads and wrenches must keep to."""
+
+    @abstractmethod
+    def loads_at(self, twists: Numbers) -> GraspLoads:
+        """Return loads and wrenches at wrist poses of shape (m, d)."""
 
     @property
     def limits(self) -> tuple[Row, ...]:
-        """Limit rows, which `Verdict.limiting` counts."""
-
-    def sieve(self, twists: Array) -> Indices:
-        """Return which poses may hold; those left out do not."""
+        """Limit rows, which `Evaluation.limiting` counts."""
+        return self.load_rows.names[: len(self.load_rows.s)]
 
     def evaluate(self, twists: Array) -> Evaluation:
         """Return wrenches and limits at wrist poses of shape (m, d)."""
+        rows, found = self.load_rows, self.loads_at(twists)
+        lost = ~found.reached[:, None]
+        with np.errstate(invalid="ignore"):
+            loads = [found.elements @ rows.P.T + rows.p, found.wrenches @ rows.D.T]
+            used = np.where(lost, np.inf, np.concatenate(loads, axis=1) / rows.s)
+            broken = np.where(lost, np.inf, found.elements @ rows.Q.T)
+        most = broken.max(axis=1, initial=-np.inf)
+        return Evaluation(found.wrenches, used.max(axis=1), used.argmax(axis=1), most)
+
+    def sieve(self, twists: Array) -> Indices:
+        """Return which poses may hold, where some are sooner known not to; all by default."""
+        return np.arange(len(twists))
 
     def linearised(
         self, twist: ArrayLike | None = None, *, within: ArrayLike | None = None
     ) -> WrenchSpace:
-        """Return the set linearised at a pose, of d columns."""
+        """Return the set linearised at a pose.
+
+        Parameters
+        ----------
+        twist : array_like, shape (d,), optional
+            ξ₀ [m, rad]; at rest by default.
+        within : array_like, shape (d,), optional
+            How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
+        """
+        at = self._pose(twist)
+        return self._about(at, self.loads_at(complex_steps(at)), self.load_rows, within)
+
+    def _pose(self, twist: ArrayLike | None) -> Array:
+        if twist is None:
+            return np.zeros(len(self.columns))
+        return np.asarray(twist, dtype=float)
+
+    def _about(
+        self, at: Array, found: GraspLoads, rows: LoadRows, within: ArrayLike | None
+    ) -> WrenchSpace:
+        """Return the set about a pose, of what `complex_steps` from it give."""
+        start, slope = _affine(found.elements, at)
+        origin, generators = _affine(found.wrenches, at)
+        H, h, names = rows.Q @ slope, -rows.Q @ start, rows.names
+        if within is not None:
+            inverse = np.diag(1.0 / np.asarray(within, dtype=float))
+            sides = np.vstack([inverse, -inverse])
+            H, h = np.vstack([H, sides]), np.concatenate([h, 1.0 + sides @ at])
+            names = _with_range(names, self.columns)
+        return WrenchSpace(
+            origin=origin,
+            generators=generators,
+            columns=self.columns,
+            rows=names,
+            L=np.vstack([rows.P @ slope, rows.D @ generators]),
+            l0=np.concatenate([rows.P @ start + rows.p, rows.D @ origin]),
+            s=rows.s,
+            H=H,
+            h=h,
+            D=rows.D,
+        )
 
 
-def range_rows(
-    columns: Sequence[str], at: Array, within: ArrayLike
-) -> tuple[Array, Array, tuple[Row, ...]]:
-    """Return hard rows (H, h, names) that keep a wrist within a box about a pose.
+def complex_steps(at: Array) -> Numbers:
+    """Return a pose d times, each with one component a complex step aside, shape (d, d)."""
+    return np.asarray(at + 1j * STEP * np.eye(len(at)))
 
-    Parameters
-    ----------
-    columns : sequence of str
-        Names of the pose's components, such as ``wrist/vx``.
-    at : ndarray, shape (d,)
-        The middle of the box [m, rad].
-    within : array_like, shape (d,)
-        Its half widths.
-    """
-    inverse = np.diag(1.0 / np.asarray(within, dtype=float))
-    sides = np.vstack([inverse, -inverse])
-    names = tuple(
+
+def slopes(values: Numbers) -> Array:
+    """Return the derivatives that complex steps have found, a column for each."""
+    return np.asarray(values.imag.T / STEP)
+
+
+def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
+    """Return values at zero, and their slopes, of complex steps; without what is rounding alone."""
+    slope = slopes(values)
+    slope = np.where(np.abs(slope) > ROUNDING, slope, 0.0)
+    return values[0].real - slope @ at, slope
+
+
+@lru_cache(maxsize=KEPT)
+def _with_range(rows: tuple[Row, ...], columns: tuple[str, ...]) -> tuple[Row, ...]:
+    """Return rows and those that keep a wrist within a range, the same tuple for the same rows."""
+    return rows + tuple(
         Row(None, None, "wrist_range", "hard", f"wrist_range/{name.split('/')[1]}{sign}")
         for sign in "+-"
         for name in columns
     )
-    return sides, 1.0 + sides @ at, names

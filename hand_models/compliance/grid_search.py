@@ -8,6 +8,7 @@ lie on the boundary, and each tells which phalanx of which finger fails there.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -19,7 +20,7 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
-from hand_models.compliance.grasp import CompliantGrasp, Verdict
+from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.pose_box import SearchBox, search_box
 from hand_models.wrench_spaces import SCALE, Row
 
@@ -57,8 +58,6 @@ class WristSearch:
         On the boundary: extreme wrenches, and where the wrist is then [m, rad, N, N·m].
     limiting : tuple of Row, length n
         What lets go there first.
-    components : tuple of int
-        Of a wrench, those that the grasp's poses span.
     """
 
     box: SearchBox
@@ -67,7 +66,6 @@ class WristSearch:
     poses: Array
     wrenches: Array
     limiting: tuple[Row | None, ...]
-    components: tuple[int, ...]
 
     @cached_property
     def hull(self) -> ConvexHull:
@@ -78,7 +76,7 @@ class WristSearch:
         EmptySetError
             If the wrenches span no volume.
         """
-        components = list(self.components)
+        components = _components(self.poses.shape[1])
         try:
             return ConvexHull(self.wrenches[:, components] * SCALE[components])
         except QhullError:
@@ -112,10 +110,10 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     if per_axis < FEWEST:
         raise InvalidInputError(f"must be at least {FEWEST}, got {per_axis}", field="per_axis")
     box = search_box(grasp)
-    d = len(box.centre)
-    components = PLANAR if d == len(PLANAR) else tuple(range(6))
-    total = per_axis**d
-    extremes = _Extremes(components)
+    total = per_axis ** len(box.centre)
+    components = _components(len(box.centre))
+    directions = _sphere(EXTREMES, len(components)) if len(components) > len(PLANAR) else None
+    outermost, wrenches = np.zeros((0, len(box.centre))), np.zeros((0, 6))
     held = 0
     for start in range(0, total, CHUNK):
         if progress is not None:
@@ -123,58 +121,34 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
         t = box.grid(per_axis, start, min(start + CHUNK, total))
         t = t[grasp.sieve(box.poses(t))]
         found = grasp.evaluate(box.poses(t))
-        good = found.verdict.holds
-        held += int(good.sum())
-        extremes.add(t[good], found.wrenches[good])
+        held += int(found.holds.sum())
+        outermost = np.vstack([outermost, t[found.holds]])
+        wrenches = np.vstack([wrenches, found.wrenches[found.holds]])
+        some = _extremes((wrenches * SCALE)[:, components], directions)
+        outermost, wrenches = outermost[some], wrenches[some]
     if progress is not None:
         progress(total, total)
     if not held:
         raise EmptySetError(f"none of {total} poses of the wrist holds")
-    return _pushed(grasp, box, extremes.coordinates(), total, held, components)
+    return _pushed(grasp, box, outermost, total, held)
 
 
-class _Extremes:
-    """The outermost of wrenches that come in chunks: corners of their hull, or many of them."""
-
-    def __init__(self, components: tuple[int, ...]) -> None:
-        self._components = list(components)
-        self._directions = _sphere(EXTREMES, len(components)) if len(components) > 3 else None
-        self._t: list[Array] = []
-        self._wrenches: list[Array] = []
-
-    def add(self, t: Array, wrenches: Array) -> None:
-        """Take the outermost of some more."""
-        scaled = (wrenches * SCALE)[:, self._components]
-        if self._directions is not None:
-            some = _outermost(scaled, self._directions)
-        else:
-            some = _corners(scaled)
-        self._t.append(t[some])
-        self._wrenches.append(scaled[some])
-
-    def coordinates(self) -> Array:
-        """Return the coordinates of the outermost."""
-        t, scaled = np.concatenate(self._t), np.concatenate(self._wrenches)
-        if self._directions is None:
-            return t[_corners(scaled)]
-        return t[_outermost(scaled, self._directions)]
+def _components(d: int) -> list[int]:
+    """Return the components of a wrench that poses of so many components span."""
+    return list(PLANAR) if d == len(PLANAR) else list(range(6))
 
 
-def _corners(points: Array) -> Indices:
-    """Return which points are corners of their hull; all where they span no volume."""
-    if len(points) <= points.shape[1]:
-        return np.arange(len(points))
-    try:
-        return np.asarray(ConvexHull(points).vertices, dtype=np.intp)
-    except QhullError:
-        return np.arange(len(points))
+def _extremes(points: Array, directions: Array | None) -> Indices:
+    """Return which points are farthest in some direction, or else corners of their hull.
 
-
-def _outermost(points: Array, directions: Array) -> Indices:
-    """Return which points are farthest in some direction."""
-    if not len(points):
-        return np.zeros(0, dtype=np.intp)
-    return np.unique([int((points @ d).argmax()) for d in directions]).astype(np.intp)
+    All where they span no volume.
+    """
+    if directions is not None and len(points):
+        return np.unique([int((points @ d).argmax()) for d in directions]).astype(np.intp)
+    if len(points) > points.shape[1]:
+        with contextlib.suppress(QhullError):
+            return np.asarray(ConvexHull(points).vertices, dtype=np.intp)
+    return np.arange(len(points))
 
 
 def boundary(grasp: CompliantGrasp, box: SearchBox, rays: int) -> WristSearch:
@@ -182,56 +156,33 @@ def boundary(grasp: CompliantGrasp, box: SearchBox, rays: int) -> WristSearch:
 
     Finer than a grid of as many poses where the poses that hold are seen from the middle.
     """
-    d = len(box.centre)
-    components = PLANAR if d == len(PLANAR) else tuple(range(6))
-    t = _sphere(rays, d) * box.range
-    return _pushed(grasp, box, t, 0, 0, components)
+    return _pushed(grasp, box, _sphere(rays, len(box.centre)) * box.range, 0, 0)
 
 
-def _pushed(
-    grasp: CompliantGrasp,
-    box: SearchBox,
-    corners: Array,
-    tried: int,
-    held: int,
-    components: tuple[int, ...],
-) -> WristSearch:
-    """Return the boundary poses on the rays through some coordinates."""
-    t, verdict = _to_boundary(grasp, box, corners)
-    poses = box.poses(t)
-    wrenches = grasp.evaluate(poses).wrenches
-    names = grasp.limits
-    limiting = tuple(names[int(i)] if i >= 0 else None for i in verdict)
-    return WristSearch(box, tried, held, poses, wrenches, limiting, components)
+def _pushed(grasp: CompliantGrasp, box: SearchBox, t: Array, tried: int, held: int) -> WristSearch:
+    """Return the last poses that hold on rays from the middle through some coordinates.
 
-
-def _to_boundary(grasp: CompliantGrasp, box: SearchBox, t: Array) -> tuple[Array, Indices]:
-    """Push coordinates along rays from the middle until something lets go.
-
-    Returns
-    -------
-    t : ndarray, shape (n, d)
-        The last that hold.
-    limiting : ndarray of int, shape (n,)
-        The limit row that is exceeded beyond; −1 where it is a hard row or a phalanx lost its
-        rock.
+    What lets go beyond is None where it is a hard row, or a phalanx lost its rock.
     """
     low = np.zeros(len(t))
     high = np.ones(len(t))
     for _ in range(GROWTHS):
-        holds = grasp.evaluate(box.poses(t * high[:, None])).verdict.holds
+        holds = grasp.evaluate(box.poses(t * high[:, None])).holds
         if not holds.any():
             break
         low = np.where(holds, high, low)
         high = np.where(holds, 1.5 * high, high)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        holds = grasp.evaluate(box.poses(t * middle[:, None])).verdict.holds
+        holds = grasp.evaluate(box.poses(t * middle[:, None])).holds
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
-    beyond: Verdict = grasp.evaluate(box.poses(t * high[:, None])).verdict
+    beyond = grasp.evaluate(box.poses(t * high[:, None]))
     named = np.isfinite(beyond.utilisation) & (beyond.utilisation > 1.0)
-    limiting = np.where(named, beyond.limiting, -1)
-    return t * low[:, None], limiting
+    limiting = tuple(
+        grasp.limits[i] if known else None for i, known in zip(beyond.limiting, named, strict=True)
+    )
+    poses = box.poses(t * low[:, None])
+    return WristSearch(box, tried, held, poses, grasp.evaluate(poses).wrenches, limiting)
 
 
 def _sphere(n: int, d: int) -> Array:

@@ -8,16 +8,15 @@ about y = z × x, as in the contract, whose M_y is minus the paper's.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import replace
+from functools import cached_property
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError
-from hand_models.compliance.compliant_finger import STEP, CompliantFinger, FingerLoads
-from hand_models.compliance.grasp import Evaluation, Verdict, range_rows
+from hand_models.base import InvalidInputError
+from hand_models.compliance.compliant_finger import CompliantFinger, FingerLoads
+from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
@@ -25,7 +24,6 @@ from hand_models.parameters import ParameterTable, Quantity, experiment_table, h
 from hand_models.sections import RoundSection
 from hand_models.tendon import FingerTendon, MotorScheme
 from hand_models.tile import Surface, inner_half_planes
-from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = ["PLANE", "SIDES", "Gripper", "gripper_table"]
 
@@ -69,20 +67,10 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
     return table.replaced(changed)
 
 
-@dataclass(frozen=True)
-class _Numbers:
-    """What of the table the gripper reads itself."""
-
-    half_spacing: float
-    added_radius: float
-    origin_height: float
-    contact_stiffness: tuple[float, ...]
-    entry_friction: float
-    seated_contact: float
-
-
-class Gripper:
+class Gripper(CompliantGrasp):
     """Two opposed fingers on a round surface, their wrist free to move in the plane.
+
+    Its loads e are the tiles' shears, then their normals, the right side's first.
 
     Parameters
     ----------
@@ -103,6 +91,8 @@ class Gripper:
         If a number is out of range, or the fingers do not all lie on the surface.
     """
 
+    columns = PLANE
+
     def __init__(
         self,
         diameter: float,
@@ -117,19 +107,12 @@ class Gripper:
             raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
         self.table = table = table or gripper_table()
         self.surface = surface or sandpaper(table)
-        self.tension = tension
-        self.numbers = _Numbers(
-            half_spacing=table.scalar("gripper", "base_half_spacing"),
-            added_radius=table.scalar("gripper", "added_radius"),
-            origin_height=table.scalar("gripper", "origin_height"),
-            contact_stiffness=table.vector("gripper", "contact_stiffness"),
-            entry_friction=table.scalar("gripper", "entry_friction"),
-            seated_contact=table.scalar("finger", "seated_contact"),
-        )
+        self.half_spacing = spread = table.scalar("gripper", "base_half_spacing")
+        self.origin_height = table.scalar("gripper", "origin_height")
         model = FingerModel.from_table(table)
-        radius = 0.5 * diameter + self.numbers.added_radius
-        away, spread = radius + model.tile_height, self.numbers.half_spacing
-        square = self.numbers.seated_contact**2 + away**2 - spread**2
+        radius = 0.5 * diameter + table.scalar("gripper", "added_radius")
+        away, seated = radius + model.tile_height, table.scalar("finger", "seated_contact")
+        square = seated**2 + away**2 - spread**2
         if square <= 0.0:
             raise InvalidInputError(
                 f"the bases are {2e3 * spread:g} mm apart, too far for this surface",
@@ -148,43 +131,45 @@ class Gripper:
             self.section,
             replace(
                 tendon,
-                contact_stiffness=self.numbers.contact_stiffness,
+                contact_stiffness=table.vector("gripper", "contact_stiffness"),
                 friction=max(table.scalar("tendon", "holding_friction"), tendon.friction),
-                entry_friction=self.numbers.entry_friction,
+                entry_friction=table.scalar("gripper", "entry_friction"),
             ),
             tendon.closed(tension, shears),
             scheme,
         )
-        self._pieces = inner_half_planes(self.surface)
 
-    @property
-    def limits(self) -> tuple[Row, ...]:
-        """Limit rows: each side's tiles, proximal first, and their half-planes."""
-        return tuple(
-            named_row(side, phalanx, piece.limit, "limit")
-            for side in SIDES
-            for phalanx in PHALANGES
-            for piece in self._pieces
+    @cached_property
+    def load_rows(self) -> LoadRows:
+        """What loads must keep to: each side's tiles, proximal first, and their half-planes."""
+        tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+        each, pieces = np.eye(len(tiles)), inner_half_planes(self.surface)
+        limits = [named_row(*tile, piece.limit, "limit") for tile in tiles for piece in pieces]
+        slopes = np.array([(piece.a_shear, piece.a_normal) for piece in pieces])
+        hard = [named_row(*tile, "dragged_backwards", "hard") for tile in tiles]
+        return LoadRows(
+            names=(*limits, *hard),
+            P=np.hstack([np.kron(each, slopes[:, :1]), np.kron(each, slopes[:, 1:])]),
+            p=np.zeros(len(limits)),
+            D=np.zeros((0, 6)),
+            s=np.array([piece.capacity for piece in pieces] * len(tiles)),
+            Q=np.hstack([-each, 0.0 * each]),
         )
 
     def finger_loads(self, twists: Numbers) -> tuple[FingerLoads, FingerLoads]:
         """Return the loads of both fingers, right first, at wrist poses of shape (m, 3)."""
-        return self._finger_loads(0, twists), self._finger_loads(1, twists)
-
-    def _finger_loads(self, side: int, twists: Numbers) -> FingerLoads:
         x, z, turn = np.moveaxis(np.asarray(twists), -1, 0)
-        spread, deep = self.numbers.half_spacing, self.numbers.origin_height
         # the joints are at (±b, −origin_height) of the origin; ω_y turns z toward x
         cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
-        if side == 0:
-            moved = (x + spread * cosine - deep * sine, z - deep * cosine - spread * sine, -turn)
-        else:
-            moved = (-x + spread * cosine + deep * sine, z - deep * cosine + spread * sine, turn)
-        return self.finger.loads(*moved)
+        inward = self.half_spacing * cosine
+        deeper, across = z - self.origin_height * cosine, x - self.origin_height * sine
+        aside = self.half_spacing * sine
+        right = self.finger.loads(inward + across, deeper - aside, -turn)
+        return right, self.finger.loads(inward - across, deeper + aside, turn)
 
     def wrenches(self, loads: tuple[FingerLoads, FingerLoads]) -> Numbers:
         """Return the wrenches on the rock about G's origin, in the contract's signs, (m, 6)."""
-        spread, deep = self.numbers.half_spacing, self.numbers.origin_height
+        spread, deep = self.half_spacing, self.origin_height
         right, left = (side.planar_wrench for side in loads)
         wrenches = np.zeros((len(right), 6), dtype=right.dtype)
         wrenches[:, 0] = right[:, 0] - left[:, 0]
@@ -194,87 +179,15 @@ class Gripper:
         wrenches[:, 4] = own - spread * (right[:, 1] - left[:, 1])
         return wrenches
 
-    def _used(self, loads: Sequence[FingerLoads]) -> Numbers:
-        """Return loads over capacities of the limit rows, shape (m, rows)."""
-        used = [
-            (piece.a_shear * side.shears[:, i] + piece.a_normal * side.normals[:, i])
-            / piece.capacity
-            for side in loads
-            for i in range(len(PHALANGES))
-            for piece in self._pieces
-        ]
-        return np.stack(used, axis=-1)
-
-    def sieve(self, twists: Array) -> Indices:
-        """Return which wrist poses pass the limits of the right finger, then of the left one."""
-        left = np.arange(len(twists))
-        for side in range(len(SIDES)):
-            loads = self._finger_loads(side, twists[left])
-            with np.errstate(invalid="ignore"):
-                used = self._used((loads,)).max(axis=1)
-                holds = loads.reached & (used <= 1.0) & (loads.shears >= 0.0).all(axis=1)
-            left = left[holds]
-        return left
-
-    def evaluate(self, twists: Array) -> Evaluation:
-        """Return wrenches and limits at wrist poses of shape (m, 3)."""
+    def loads_at(self, twists: Numbers) -> GraspLoads:
+        """Return loads and wrenches at wrist poses of shape (m, 3)."""
         loads = self.finger_loads(twists)
-        reached = loads[0].reached & loads[1].reached
-        with np.errstate(invalid="ignore"):
-            used = np.where(reached[:, None], self._used(loads), np.inf)
-            backwards = -np.concatenate([side.shears for side in loads], axis=1)
-            broken = np.where(reached, backwards.max(axis=1), np.inf)
-        return Evaluation(
-            self.wrenches(loads), Verdict(used.max(axis=1), used.argmax(axis=1), broken)
+        elements = [side.shears for side in loads] + [side.normals for side in loads]
+        return GraspLoads(
+            np.concatenate(elements, axis=1),
+            self.wrenches(loads),
+            np.logical_and(*(side.reached for side in loads)),
         )
-
-    def linearised(
-        self, twist: ArrayLike | None = None, within: ArrayLike | None = None
-    ) -> WrenchSpace:
-        """Return the set linearised at a wrist pose, with columns `PLANE`.
-
-        Parameters
-        ----------
-        twist : array_like, shape (3,), optional
-            At rest by default.
-        within : array_like, shape (3,), optional
-            How far from it the pose may go.
-        """
-        at = np.zeros(3) if twist is None else np.asarray(twist, dtype=float)
-        loads = self.finger_loads(at + 1j * STEP * np.eye(3))
-
-        def affine(values: NDArray[Any]) -> tuple[Array, Array]:
-            slope = np.asarray(values.imag.T / STEP)
-            return values[0].real - slope @ at, slope
-
-        origin, generators = affine(self.wrenches(loads))
-        l0, L = affine(self._used(loads))
-        h, H = affine(np.concatenate([side.shears for side in loads], axis=1))
-        rows = self.limits + tuple(
-            named_row(side, phalanx, "dragged_backwards", "hard")
-            for side in SIDES
-            for phalanx in PHALANGES
-        )
-        H = -H
-        if within is not None:
-            sides, most, names = range_rows(PLANE, at, within)
-            H, h, rows = np.vstack([H, sides]), np.concatenate([h, most]), rows + names
-        s = np.array([piece.capacity for piece in self._pieces] * (2 * len(PHALANGES)))
-        return WrenchSpace(
-            origin=origin,
-            generators=generators,
-            columns=PLANE,
-            rows=rows,
-            L=L * s[:, None],
-            l0=l0 * s,
-            s=s,
-            H=H,
-            h=h,
-        )
-
-    def stiffness(self) -> Array:
-        """Return K_g in the plane (F_x, F_z, M_y over x, z, ω_y) at rest, shape (3, 3)."""
-        return self.linearised().generators[[0, 2, 4]]
 
 
 def sandpaper(table: ParameterTable) -> Surface:

@@ -100,88 +100,66 @@ def pieces(
     EmptySetError
         If no pose near rest holds.
     """
-    towards = np.asarray(directions, dtype=float)
     box = search_box(grasp)
-    rest = np.zeros(len(box.centre))
-    offset = towards @ grasp.evaluate(rest[None]).wrenches[0]
+    at = np.zeros(len(box.centre))
     half = np.abs(box.axes) @ box.range
-    seen = boundary(grasp, box, RAYS)
-    poses, exact = [], np.empty(len(towards))
-    for i, d in enumerate(towards):
+    limits = _Limits(grasp, np.asarray(directions, dtype=float), boundary(grasp, box, RAYS))
+    for i, pose in enumerate(limits.poses):
         if progress is not None:
-            progress(i, len(towards))
-        pose, reach = _exact(grasp, d, seen)
-        poses.append(pose)
-        exact[i] = reach - offset[i]
+            progress(i, len(limits.poses))
+        limits.follow(i, pose)
     if progress is not None:
-        progress(len(towards), len(towards))
+        progress(len(limits.poses), len(limits.poses))
     found: list[Piece] = []
-    covered = np.full(len(towards), -np.inf)
-    at = rest
+    covered = np.full(len(limits.poses), -np.inf)
     while len(found) < most:
-        piece, supports = _piece(grasp, at, half, towards, offset, poses, exact, tolerance)
+        piece, supports = _piece(limits, at, half, tolerance)
         found.append(piece)
         covered = np.maximum(covered, supports)
-        worst = int(np.argmin(covered / exact))
-        if covered[worst] >= (1.0 - tolerance) * exact[worst] or np.array_equal(at, poses[worst]):
+        worst = int(np.argmin(covered / limits.exact))
+        enough = covered[worst] >= (1.0 - tolerance) * limits.exact[worst]
+        if enough or np.array_equal(at, limits.poses[worst]):
             break
-        at = poses[worst]
-    return PieceList(tuple(found), towards, exact, covered)
+        at = limits.poses[worst].copy()
+    return PieceList(tuple(found), limits.directions, limits.exact, covered)
 
 
-def _exact(grasp: CompliantGrasp, d: Array, seen: WristSearch) -> tuple[Array, float]:
-    """Return the limiting pose in a direction and its reach: the best of those seen, and beyond."""
-    best = int((seen.wrenches @ d).argmax())
-    pose, reach = seen.poses[best], float(d @ seen.wrenches[best])
-    try:
-        there = farthest(grasp, d, pose)
-    except EmptySetError:
-        return pose, reach
-    return (there.twist, there.reach) if there.reach > reach else (pose, reach)
+class _Limits:
+    """Limiting poses and supports in directions, from the wrench at rest: the best found so far."""
+
+    def __init__(self, grasp: CompliantGrasp, directions: Array, seen: WristSearch) -> None:
+        self.grasp = grasp
+        self.directions = directions
+        self.offset = directions @ grasp.evaluate(np.zeros((1, seen.poses.shape[1]))).wrenches[0]
+        reaches = seen.wrenches @ directions.T
+        self.poses = seen.poses[reaches.argmax(axis=0)]
+        self.exact = np.asarray(reaches.max(axis=0) - self.offset)
+
+    def follow(self, i: int, start: Array) -> None:
+        """Look for a farther limit in a direction, from a pose on."""
+        try:
+            there = farthest(self.grasp, self.directions[i], start)
+        except EmptySetError:
+            return
+        if there.reach - self.offset[i] > self.exact[i]:
+            self.poses[i], self.exact[i] = there.twist, there.reach - self.offset[i]
 
 
-def _piece(
-    grasp: CompliantGrasp,
-    at: Array,
-    half: Array,
-    directions: Array,
-    offset: Array,
-    poses: list[Array],
-    exact: Array,
-    tolerance: float,
-) -> tuple[Piece, Array]:
+def _piece(limits: _Limits, at: Array, half: Array, tolerance: float) -> tuple[Piece, Array]:
     """Return the widest piece about a pose that does not reach too far, and its supports.
 
-    Where it seems to, the exact maximum is looked for again from there; ``poses`` and ``exact`` are
-    mended in place if it is found.
+    Where it seems to, the exact maximum is looked for again from there.
     """
     share = WIDEST
     while True:
         within = share * half
-        space = grasp.linearised(at, within=within)
-        supports = np.empty(len(directions))
-        for i, d in enumerate(directions):
+        space = limits.grasp.linearised(at, within=within)
+        supports = np.empty(len(limits.directions))
+        for i, d in enumerate(limits.directions):
             pose, reach = linear_extreme(space, d)
-            supports[i] = reach - offset[i]
-            if supports[i] > (1.0 + tolerance) * exact[i] and pose is not None:
-                _mend(grasp, d, pose, i, offset, poses, exact)
-        if share <= NARROWEST or (supports <= (1.0 + tolerance) * exact).all():
+            supports[i] = reach - limits.offset[i]
+            if supports[i] > (1.0 + tolerance) * limits.exact[i] and pose is not None:
+                limits.follow(i, pose)
+        if share <= NARROWEST or (supports <= (1.0 + tolerance) * limits.exact).all():
             return Piece(at, within, space), supports
         share *= SHRINK
-
-
-def _mend(
-    grasp: CompliantGrasp,
-    d: Array,
-    start: Array,
-    i: int,
-    offset: Array,
-    poses: list[Array],
-    exact: Array,
-) -> None:
-    try:
-        there = farthest(grasp, d, start)
-    except EmptySetError:
-        return
-    if there.reach - offset[i] > exact[i]:
-        poses[i], exact[i] = there.twist, there.reach - offset[i]

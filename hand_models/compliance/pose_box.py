@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import linprog
 
 from hand_models.base import Array, EmptySetError, SolverError
 from hand_models.compliance.directional_limit import pose_units
 from hand_models.compliance.grasp import CompliantGrasp
-from hand_models.wrench_spaces import WrenchSpace
+from hand_models.wrench_spaces import WrenchSpace, linear_program
 
 __all__ = ["SearchBox", "linear_box", "search_box"]
 
@@ -87,7 +86,7 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
     at = np.zeros(len(grasp.linearised().columns))
     for _ in range(RECENTRINGS):
         space, centre, axes = _ellipsoid(grasp, at)
-        holds = grasp.evaluate(np.stack([centre, at])).verdict.holds
+        holds = grasp.evaluate(np.stack([centre, at])).holds
         if holds.any():
             at = centre if holds[0] else at
             return SearchBox(at, axes, _range(space, at, axes))
@@ -110,7 +109,7 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
     for _ in range(RESIZES):
         t = box.grid(per_axis, 0, per_axis ** len(centre))
         t = t[grasp.sieve(box.poses(t))]
-        held = t[grasp.evaluate(box.poses(t)).verdict.holds]
+        held = t[grasp.evaluate(box.poses(t)).holds]
         step = 2.0 * box.range / (per_axis - 1)
         outermost = np.abs(held).max(axis=0)
         # a layer more than holds: outward while the outermost holds, inward where none does
@@ -161,18 +160,16 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
     keep = size > 0.0
     A, b = A[keep] / size[keep, None], b[keep] / size[keep]
     d = A.shape[1]
-    result = linprog(
+    ball = linear_program(
         np.append(np.zeros(d), -1.0),
-        A_ub=np.column_stack([A, np.ones(len(b))]),
-        b_ub=b,
+        np.column_stack([A, np.ones(len(b))]),
+        b,
+        "search",
         bounds=[(None, None)] * d + [(None, 1e3)],
-        method="highs",
     )
-    if result.status != 0 or result.x is None:
-        raise SolverError(f"search: {result.message}")
-    if not result.x[-1] > 0.0:
+    if ball is None or not ball[-1] > 0.0:
         raise EmptySetError(NOTHING_HOLDS)
-    y, hessian, decrement = result.x[:-1], np.eye(d), np.inf
+    y, hessian, decrement = ball[:-1], np.eye(d), np.inf
     for _ in range(NEWTON_STEPS):
         gap = b - A @ y
         gradient = A.T @ (1.0 / gap)
@@ -190,19 +187,10 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
 def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
     """Return how far the linearised set reaches along each axis from the centre."""
     A, b = space.A @ axes, space.b - space.A @ centre
-    reach = []
-    for i in range(len(centre)):
-        ends = []
-        for sign in (1.0, -1.0):
-            result = linprog(
-                -sign * np.eye(len(centre))[i],
-                A_ub=A,
-                b_ub=b,
-                bounds=[(None, None)] * len(centre),
-                method="highs",
-            )
-            if result.status != 0 or result.fun is None:
-                raise SolverError(f"search: {result.message}")
-            ends.append(-float(result.fun))
-        reach.append(max(ends))
-    return np.array(reach)
+    reach = np.full(len(centre), -np.inf)
+    for way in np.vstack([np.eye(len(centre)), -np.eye(len(centre))]):
+        end = linear_program(-way, A, b, "search")
+        if end is None:
+            raise EmptySetError(NOTHING_HOLDS)
+        reach = np.where(way != 0.0, np.maximum(reach, way * end), reach)
+    return reach

@@ -302,9 +302,9 @@ def rest_state(grasp: Gripper) -> State:
     its limit or dragged backwards.
     """
     at_rest = grasp.evaluate(np.zeros((1, 3)))
-    held, pushed = bool(at_rest.verdict.holds[0]), float(at_rest.wrenches[0, 2]) > 0.0
+    held, pushed = bool(at_rest.holds[0]), float(at_rest.wrenches[0, 2]) > 0.0
     pose = unloaded_pose(grasp)
-    rests = pose is not None and bool(grasp.evaluate(pose[None]).verdict.holds[0])
+    rests = pose is not None and bool(grasp.evaluate(pose[None]).holds[0])
     if pushed and not rests:
         return "ejects"
     return "holds" if held and rests else "contact fails"

@@ -112,7 +112,7 @@ def unloaded(gripper: Gripper) -> Array:
         If it does not hold itself.
     """
     poses, residual = wrist_poses(gripper, np.zeros((1, 3)), np.zeros((1, 3)))
-    if not (residual[0] <= BALANCED and gripper.evaluate(poses).verdict.holds[0]):
+    if not (residual[0] <= BALANCED and gripper.evaluate(poses).holds[0]):
         raise EmptySetError("the gripper lets go before any load: closing alone is too much")
     return np.asarray(poses[0])
 
@@ -146,7 +146,7 @@ def pull(
         tried, residual = wrist_poses(
             gripper, (loads[i] + increments[i])[:, None] * unit[i], poses[i]
         )
-        found = gripper.evaluate(tried).verdict
+        found = gripper.evaluate(tried)
         balanced = residual <= BALANCED
         holds = found.holds & balanced
         poses[i[holds]] = tried[holds]
@@ -180,7 +180,7 @@ def _failures(
     per_tile = len(limits) // (len(SIDES) * len(PHALANGES))
     names = np.array([row.limit for row in limits], dtype=object)
     shears = np.concatenate([side.shears for side in gripper.finger_loads(poses)], axis=1)
-    verdict = gripper.evaluate(poses).verdict
+    verdict = gripper.evaluate(poses)
     exceeded, rows = verdict.utilisation > 1.0, verdict.limiting
     tiles = np.where(exceeded, rows // per_tile, shears.argmin(axis=1))
     ways = np.where(exceeded, names[rows], DRAGGED)

@@ -72,7 +72,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     elsewhere = pull(gripper, around)
     shifts = np.linalg.norm((elsewhere.poses - rest)[:, :2], axis=1)
     progress(3, steps)
-    used = gripper.evaluate(slip.poses).verdict
+    used = gripper.evaluate(slip.poses)
     data: dict[str, Any] = {
         "diameter": diameter,
         "tension": tension,

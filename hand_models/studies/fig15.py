@@ -149,7 +149,7 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
     """
 
     def excess(tension: float) -> float:
-        verdict = Conditions(diameter, tension).gripper(table).evaluate(np.zeros((1, 3))).verdict
+        verdict = Conditions(diameter, tension).gripper(table).evaluate(np.zeros((1, 3)))
         return max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
 
     over = [excess(float(tension)) > 0.0 for tension in tried]

@@ -14,10 +14,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, CruxError, InvalidInputError, SolverError, UnsupportedError
-from hand_models.wrench_spaces import SCALE
 from planner import deadline, programs
-from planner.capability.body_motion import Motion, motion_of
 from planner.explanation import ALIKE, BINDING, joint_name, limit_name
+from planner.floating import disagreements
 from planner.prepare import (
     HandSets,
     LinearisationPoint,
@@ -26,15 +25,36 @@ from planner.prepare import (
     posture_at,
     widest_at_rest,
 )
-from planner.programs import JOINT_TORQUE, SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
+from planner.programs import SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
 from planner.question import Question
 from planner.result import LimitName, Plan
 from planner.solving import plan
 
-__all__ = ["BodyPrograms", "size_of"]
+__all__ = ["BodyPrograms", "Motion", "size_of"]
 
 MISSING: Final = "it was known what the stance can hold"
 """What a deadline may come before."""
+
+
+class Motion(NamedTuple):
+    """How the body's acceleration in W enters, k components: three linear, and three angular.
+
+    Both the wrench that accelerates a robot whose joints stand still and its joints' torques are
+    affine in the acceleration, so that one column for each component says all.
+
+    Attributes
+    ----------
+    rest : StanceData
+        Of the body at rest.
+    wrench : ndarray, shape (6, k)
+        Body wrench for one unit of each component [kg, kg·m, kg·m²].
+    torques : tuple of ndarray, shape (nl, k)
+        What one unit of each adds to each hand's limit rows.
+    """
+
+    rest: StanceData
+    wrench: Array
+    torques: tuple[Array, ...]
 
 
 class BodyPrograms:
@@ -62,28 +82,20 @@ class BodyPrograms:
         self.question = replace(question, want=frozenset(), objective="max_margin", deadline=None)
         self.plan = plan(self.question)
         where = None if self.plan.joints is None else posture_at(question, self.plan.joints)
-        _, hands = assemble(self.question, where, self.plan.body_wrench)
-        self._hands = hands
-        self._point = _where_planned(hands, self.plan)
-        self.exact = not hands.floating
-        spaces, data = hands.sets(self._point)
+        _, self._hands = assemble(self.question, where, self.plan.body_wrench)
+        self._point = _where_planned(self._hands, self.plan)
+        self.exact = not self._hands.floating
+        self.data = _data(self.question, where, self._hands, self._point)
+        self.motion = _motion(self.question, where, self._point)
         limbs = [hand.limb for hand in question.stance.hands]
-        names = [
-            [(limit_name(limb, row), row.label[-1:]) for row in space.rows[: len(space.s)]]
+        spaces = self._hands.sets(self._point).spaces
+        self._names = [
+            [limit_name(limb, row) for row in space.rows[: len(space.s)]]
             for limb, space in zip(limbs, spaces, strict=True)
         ]
-        idle = _idle_rows(where, limbs)
-        # no load changes these: they go with the first hand's
-        names[0] += idle.names
-        first = data.hands[0]
-        first = first._replace(
-            L=np.vstack([first.L, np.zeros((len(idle.names), first.L.shape[1]))]),
-            l0=np.concatenate([first.l0, idle.utilisations]),
-        )
-        self.data = StanceData((first, *data.hands[1:]), data.wrench)
-        self._names = [[name for name, _ in each] for each in names]
-        self.motion = motion_of(question, where)
-        self._torques = _torque_rows(names, self.motion, where)
+        for limb in _idle_limbs(question, where):
+            own = question.stance.robot.model.joint_names[limb]
+            self._names[0] += [joint_name(limb, name) for name in (*own, *own)]
 
     @property
     def cap(self) -> float:
@@ -99,16 +111,8 @@ class BodyPrograms:
     def at_rest(self) -> tuple[StanceData, float] | None:
         """The hands while the body is at rest, and the cap; None if it cannot be held so."""
         assert self.motion is not None
-        asked = self.motion.asked
-        hands = tuple(
-            hand._replace(l0=hand.l0 - torque @ asked)
-            for hand, torque in zip(self.data.hands, self._torques, strict=True)
-        )
-        wrench = self.data.wrench.copy()
-        wrench[:6] -= self.motion.wrench @ asked / WRENCH_UNIT
-        data = StanceData(hands, wrench)
-        cap = self._cap_of(data)
-        return None if cap is None else (data, cap)
+        cap = self._cap_of(self.motion.rest)
+        return None if cap is None else (self.motion.rest, cap)
 
     def _cap_of(self, data: StanceData) -> float | None:
         """Return the utilisation to go up to, where a balance can be had within it."""
@@ -147,7 +151,7 @@ class BodyPrograms:
         data, cap = self.at_rest
         columns = self.motion.wrench @ ways / WRENCH_UNIT[:, None]
         unit = float(np.abs(columns).max())
-        K = [torque @ ways / unit for torque in self._torques]
+        K = [torque @ ways / unit for torque in self.motion.torques]
         return _solved(data, goal, columns / unit, cap, K), unit
 
     def wrench(self, found: Reached) -> Array:
@@ -175,11 +179,8 @@ class BodyPrograms:
         for loads in ends:
             deadline.check(MISSING)
             there = self._hands.sets(replace(self._point, loads=tuple(loads))).spaces
-            for wrist, a, b, y in zip(self._hands.wrists, spaces, there, loads, strict=True):
-                off = 0.0
-                if wrist is not None:
-                    off = float(np.abs((a.wrench(y) - b.wrench(y)) * SCALE).max())
-                worst = max(worst, off) if np.isfinite(off) else worst
+            off = disagreements(self._hands, spaces, there, loads)
+            worst = max([worst, *(each for each in off if np.isfinite(each))])
         return worst
 
 
@@ -226,44 +227,53 @@ def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
     return LinearisationPoint(tuple(loads), tuple(palms))
 
 
-class _Rows(NamedTuple):
-    """Limit rows that no load changes: name and sign, and utilisation."""
-
-    names: list[tuple[LimitName, str]]
-    utilisations: list[float]
-
-
-def _idle_rows(where: Posture | None, limbs: Sequence[str]) -> _Rows:
-    """Return what the joints of limbs without a hand bear."""
-    rows = _Rows([], [])
-    for limb, joints in ({} if where is None else where.joints).items():
-        if limb not in limbs:
-            for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True):
-                for sign, value in (("+", torque), ("-", -torque)):
-                    rows.names.append((joint_name(limb, name), sign))
-                    rows.utilisations.append(float(value / most))
-    return rows
+def _idle_limbs(question: Question, where: Posture | None) -> list[str]:
+    """Return the limbs without a hand whose joints are known."""
+    limbs = {hand.limb for hand in question.stance.hands}
+    return [] if where is None else [limb for limb in where.joints if limb not in limbs]
 
 
-def _torque_rows(
-    names: Sequence[Sequence[tuple[LimitName, str]]], motion: Motion | None, where: Posture | None
-) -> list[Array]:
-    """Return how each hand's limit rows change with acceleration, (nl, k) each."""
-    if motion is None:
-        return []
-    limits = {
-        joint_name(limb, joint): float(most)
-        for limb, joints in ({} if where is None else where.joints).items()
-        for joint, most in zip(joints.names, joints.limits, strict=True)
-    }
+def _data(
+    question: Question, where: Posture | None, hands: HandSets, point: LinearisationPoint
+) -> StanceData:
+    """Return the hands about a point; with the first, rows of limbs without one."""
+    data = hands.sets(point).data
+    first = data.hands[0]
+    idle = []
+    for limb in _idle_limbs(question, where):
+        assert where is not None
+        joints = where.joints[limb]
+        idle += [joints.gravity / joints.limits, -joints.gravity / joints.limits]
+    l0 = np.concatenate([first.l0, *idle])
+    L = np.pad(first.L, ((0, len(l0) - len(first.l0)), (0, 0)))
+    return StanceData((first._replace(L=L, l0=l0), *data.hands[1:]), data.wrench)
+
+
+def _motion(question: Question, where: Posture | None, point: LinearisationPoint) -> Motion | None:
+    """Return how acceleration enters a question; None if its body wrench is given.
+
+    Angular acceleration is known only for the robot's own weight at known joints.
+    """
+    if question.body_wrench is not None:
+        return None
+    count = 6 if where is not None and question.load.own else 3
     found = []
-    for rows in names:
-        K = np.zeros((len(rows), motion.wrench.shape[1]))
-        for i, (name, sign) in enumerate(rows):
-            if name.limit == JOINT_TORQUE:
-                K[i] = (1.0 if sign == "+" else -1.0) * motion.torque[name] / limits[name]
-        found.append(K)
-    return found
+    for x, y, z, *turning in np.vstack([np.zeros(6), np.eye(6)[:count]]).tolist():
+        load = replace(question.load, acceleration=(x, y, z), angular_acceleration=(*turning,))
+        moving = replace(question, load=load)
+        there = None if where is None else posture_at(moving, where.angles)
+        wrench = moving.needed_wrench(None if there is None else there.body_wrench)
+        _, hands = assemble(moving, there, wrench)
+        found.append(_data(moving, there, hands, point))
+    rest, *others = found
+    return Motion(
+        rest,
+        np.column_stack([(data.wrench - rest.wrench)[:6] * WRENCH_UNIT for data in others]),
+        tuple(
+            np.column_stack([data.hands[i].l0 - at_rest.l0 for data in others])
+            for i, at_rest in enumerate(rest.hands)
+        ),
+    )
 
 
 def _error(

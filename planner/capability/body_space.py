@@ -190,7 +190,7 @@ class BodySpace:
     def weight(self) -> Array | None:
         """The body wrench that holds the body at rest, shape (6,); None without a load."""
         motion = self._programs.motion
-        return None if motion is None else np.asarray(self.needed - motion.wrench @ motion.asked)
+        return None if motion is None else np.asarray(motion.rest.wrench[:6] * WRENCH_UNIT)
 
     # Accelerations ------------------------------------------------------------------------------
 
@@ -203,7 +203,7 @@ class BodySpace:
     def turns(self) -> bool:
         """Whether angular accelerations can be told, too: for the robot's own load and joints."""
         motion = self._programs.motion
-        return motion is not None and motion.angular
+        return motion is not None and motion.wrench.shape[1] == 6
 
     def acceleration(self, direction: ArrayLike) -> End | None:
         """Return the largest acceleration of the body, from rest, that is held along a direction.

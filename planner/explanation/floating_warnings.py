@@ -81,7 +81,7 @@ def strained_preloads(
                 "on tendons"
             )
             continue
-        verdict = wrist.judge(np.zeros((1, 6)))
+        verdict = wrist.evaluate(np.zeros((1, 6)))
         used, row = float(verdict.utilisation[0]), wrist.limits[int(verdict.limiting[0])]
         if used > LIMIT:
             where = " of ".join(part for part in (row.phalanx, row.finger) if part is not None)

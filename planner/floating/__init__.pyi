@@ -6,4 +6,4 @@ from .continuation import (
     most_load as most_load,
 )
 from .effort import least_effort as least_effort, with_room as with_room
-from .wrist_iteration import WristSolution as WristSolution
+from .wrist_iteration import WristSolution as WristSolution, disagreements as disagreements

@@ -28,14 +28,14 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hand_models.base import Array
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import deadline, programs
 from planner.deadline import Budget
 from planner.floating.goals import RANK, Goal, LeastUse
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import Outcome
 
-__all__ = ["WristSolution", "solve_wrists"]
+__all__ = ["WristSolution", "disagreements", "solve_wrists"]
 
 ROUNDS: Final = 40
 """Most rounds for one choice of palm modes."""
@@ -148,7 +148,11 @@ class _State(NamedTuple):
         before: Sets | None = None,
     ) -> _State:
         sets = hands.sets(point, within, goal.farthest)
-        error = 0.0 if before is None else _disagreement(hands, before, sets, point.loads)
+        error = (
+            0.0
+            if before is None
+            else max(disagreements(hands, before.spaces, sets.spaces, point.loads))
+        )
         return cls(point, sets, sets.measure(point.loads), error)
 
 
@@ -279,10 +283,15 @@ def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
     return (value - outcome.value) / max(1.0, value)
 
 
-def _disagreement(hands: HandSets, sets: Sets, there: Sets, loads: Sequence[Array]) -> float:
-    """Return how far the sets of a step were off at its end [N]."""
-    return max(
+def disagreements(
+    hands: HandSets,
+    spaces: Sequence[WrenchSpace],
+    there: Sequence[WrenchSpace],
+    loads: Sequence[Array],
+) -> list[float]:
+    """Return how far sets of floating hands are off at loads where others are exact [N]."""
+    return [
         float(np.abs((a.wrench(y) - b.wrench(y)) * SCALE).max())
-        for wrist, a, b, y in zip(hands.wrists, sets.spaces, there.spaces, loads, strict=True)
+        for wrist, a, b, y in zip(hands.wrists, spaces, there, loads, strict=True)
         if wrist is not None
-    )
+    ]

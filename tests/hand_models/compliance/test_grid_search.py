@@ -57,7 +57,7 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
     gripper = GRIPPER
     x, z, turn = 2e-4, -4e-4, 0.006
     loads, _ = gripper.finger_loads(np.array([[x, z, turn]]))
-    deep, spread = gripper.numbers.origin_height, gripper.numbers.half_spacing
+    deep, spread = gripper.origin_height, gripper.half_spacing
     base = (
         x + spread * (math.cos(turn) - 1.0) - deep * math.sin(turn),
         z - spread * math.sin(turn) - deep * (math.cos(turn) - 1.0),
@@ -81,11 +81,11 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
     table = gripper.table
     tendon = FingerTendon(
         2.0,
-        gripper.numbers.contact_stiffness,
+        table.vector("gripper", "contact_stiffness"),
         table.scalar("tile", "spring_stiffness"),
         model.pulley_radii,
         table.scalar("tendon", "holding_friction"),
-        gripper.numbers.entry_friction,
+        table.scalar("gripper", "entry_friction"),
     )
     start = FingerTendon(2.0, (1.0,) * 3, 1.0, model.pulley_radii, 0.0).closed(
         37.0, rest.shears(37.0) @ [1.0, 37.0]
@@ -110,14 +110,12 @@ def test_mirrored_poses_have_mirrored_wrenches():
     np.testing.assert_allclose(
         mirrored.wrenches[:, PLANAR], straight.wrenches[:, PLANAR] * MIRROR, atol=1e-9
     )
-    np.testing.assert_allclose(
-        mirrored.verdict.utilisation, straight.verdict.utilisation, atol=1e-9
-    )
+    np.testing.assert_allclose(mirrored.utilisation, straight.utilisation, atol=1e-9)
 
 
 def test_the_moment_is_that_of_the_forces_about_the_origin():
     loads = GRIPPER.finger_loads(TWISTS)
-    spread, deep = GRIPPER.numbers.half_spacing, GRIPPER.numbers.origin_height
+    spread, deep = GRIPPER.half_spacing, GRIPPER.origin_height
     total = np.zeros(len(TWISTS))
     for side, sign in zip(loads, (1.0, -1.0), strict=True):
         x = sign * (spread + side.points[..., 0])
@@ -164,14 +162,14 @@ def test_the_search_finds_what_a_plain_grid_finds_and_more():
     assert found.tried == 25**3
     assert 0 < found.held < found.tried
     # poses on the boundary: nothing lets go, and a hair further something does
-    verdict = GRIPPER.evaluate(found.poses).verdict
+    verdict = GRIPPER.evaluate(found.poses)
     assert verdict.utilisation.max() <= 1.0
     beyond = found.box.centre + (found.poses - found.box.centre) * (1.0 + 1e-6)
-    assert not GRIPPER.evaluate(beyond).verdict.holds.any()
+    assert not GRIPPER.evaluate(beyond).holds.any()
     plain = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 25)] * 3, indexing="ij"), axis=-1)
     plain = plain.reshape(-1, 3) * [1.6e-3, 1.2e-3, 0.03]
     held = GRIPPER.evaluate(plain)
-    wrenches = held.wrenches[held.verdict.holds]
+    wrenches = held.wrenches[held.holds]
     for way in np.vstack([np.eye(3), -np.eye(3)]):
         assert found.support(planar(way)) >= 0.97 * float((wrenches @ planar(way)).max())
 
@@ -203,7 +201,7 @@ def test_the_search_of_a_whole_hand_reaches_as_far_as_the_linear_programs_nearly
     wrist = floating(surface="sandpaper-36")
     found = search(wrist, 5)
     assert found.tried == 5**6
-    assert (wrist.judge(found.poses).utilisation <= 1.0).all()
+    assert (wrist.evaluate(found.poses).utilisation <= 1.0).all()
     for i in range(6):
         for sign in (1.0, -1.0):
             direction = sign * np.eye(6)[i]
@@ -220,11 +218,11 @@ def test_the_farthest_wrench_is_a_local_maximum():
         direction = planar(way)
         found = farthest(GRIPPER, direction)
         assert found.limiting is not None
-        assert GRIPPER.evaluate(found.twist[None]).verdict.utilisation[0] <= 1.0 + 1e-5
+        assert GRIPPER.evaluate(found.twist[None]).utilisation[0] <= 1.0 + 1e-5
 
         def short(pose, direction=direction):
             there = GRIPPER.evaluate((pose * [1e-3, 1e-3, 1e-2])[None])
-            excess = max(there.verdict.utilisation[0] - 1.0, there.verdict.violation[0], 0.0)
+            excess = max(there.utilisation[0] - 1.0, there.violation[0], 0.0)
             return float(-direction @ there.wrenches[0] + 1e3 * excess)
 
         start = found.twist / [1e-3, 1e-3, 1e-2]
@@ -243,7 +241,7 @@ def test_a_pull_lets_go_where_bisection_says():
     """A symmetric pull along −z: one unknown, so a root of the utilisation tells the pose."""
 
     def used(z):
-        return float(GRIPPER.evaluate(np.array([[0.0, z, 0.0]])).verdict.utilisation[0]) - 1.0
+        return float(GRIPPER.evaluate(np.array([[0.0, z, 0.0]])).utilisation[0]) - 1.0
 
     z = brentq(used, -3e-3, 0.0)
     straight = GRIPPER.evaluate(np.array([[0.0, z, 0.0]])).wrenches[0]
@@ -305,7 +303,7 @@ def wrenches_inside(wrist, count):
     for _ in range(100):
         poses = box.poses(rng.uniform(-1.0, 1.0, (20000, 6)) * box.range)
         there = wrist.evaluate(poses[wrist.sieve(poses)])
-        found = np.vstack([found, there.wrenches[there.verdict.holds]])
+        found = np.vstack([found, there.wrenches[there.holds]])
         if len(found) >= count:
             return found[:count]
     raise AssertionError("too few poses hold")

@@ -63,9 +63,9 @@ def test_motions_that_load_nothing_do_not_stop_the_search(name: str) -> None:
     wrist = floating(name)
     found = boundary(wrist, search_box(wrist), 40)
     assert np.isfinite(found.wrenches).all()
-    assert wrist.judge(found.poses).holds.all()
+    assert wrist.evaluate(found.poses).holds.all()
     end = farthest(wrist, PULL)
-    verdict = wrist.judge(end.twist[None])
+    verdict = wrist.evaluate(end.twist[None])
     assert verdict.utilisation[0] <= 1.0 + 1e-5
     assert verdict.violation[0] <= 1e-5
 
@@ -81,10 +81,10 @@ def test_a_search_is_about_a_pose_that_holds(seed: int) -> None:
     except EmptySetError:
         # then none of many poses about rest holds either
         twists = rng.normal(size=(3000, 6)) * [*[3e-4] * 3, *[3e-3] * 3]
-        assert not wrist.judge(twists).holds.any()
+        assert not wrist.evaluate(twists).holds.any()
         return
-    assert wrist.judge(box.centre[None]).holds[0]
-    assert wrist.judge(boundary(wrist, box, 40).poses).holds.all()
+    assert wrist.evaluate(box.centre[None]).holds[0]
+    assert wrist.evaluate(boundary(wrist, box, 40).poses).holds.all()
 
 
 @pytest.mark.parametrize("per_axis", [-1, 0, 1])

@@ -58,11 +58,11 @@ def test_every_pull_ends_where_the_tile_named_lets_go(gripper, pulled):
     length = np.linalg.norm(found.wrenches * UNITS, axis=1)
     unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
     np.testing.assert_allclose(found.wrenches, length[:, None] * unit, atol=1e-9)
-    verdict = gripper.evaluate(found.poses).verdict
+    verdict = gripper.evaluate(found.poses)
     assert verdict.holds.all()
     beyond, residual = wrist_poses(gripper, (length + 0.02)[:, None] * unit, found.poses)
     assert residual.max() < 1e-8
-    over = gripper.evaluate(beyond).verdict
+    over = gripper.evaluate(beyond)
     assert not over.holds.any()
     names = [
         None if way == DRAGGED else (side, phalanx, way)

@@ -97,7 +97,7 @@ def test_closing_alone_fails_from_the_tension_told(tensions):
         found += 1
         for tension, holds in ((fails - 0.2, True), (fails + 0.2, False)):
             grasp = Conditions(curve["diameter"], tension).gripper(table)
-            assert bool(grasp.evaluate(np.zeros((1, 3))).verdict.holds[0]) is holds
+            assert bool(grasp.evaluate(np.zeros((1, 3))).holds[0]) is holds
     assert found
 
 

@@ -91,7 +91,7 @@ class Model:
             for i, wrist in enumerate(self.wrists):
                 steps = np.vstack([np.zeros(12), self.STEP * np.eye(12)])[:, 6 * i : 6 * i + 6]
                 twists = self.best[i] + (x[6 * i : 6 * i + 6] + steps) * TWIST_UNIT
-                loads, judged = wrist.hand.loads(twists), wrist.judge(twists)
+                loads, judged = wrist.hand.loads(twists), wrist.evaluate(twists)
                 effort = effort + np.sum((loads.tensions / self.most) ** 2, axis=1)
                 total = total + wrist.hand.wrenches(loads) @ self.carried[i].T
                 room += [1.0 - judged.utilisation, -judged.violation / 100.0]

@@ -54,7 +54,7 @@ def test_set_is_tangent_to_the_model():
     )
     exact = wrist.hand.wrenches(wrist.hand.loads(NEAR[None]))[0]
     np.testing.assert_allclose(space.wrench(NEAR), exact, atol=1e-9)
-    judged = wrist.judge(NEAR[None]).utilisation[0]
+    judged = wrist.evaluate(NEAR[None]).utilisation[0]
     assert space.utilisations(NEAR).max() == pytest.approx(judged, abs=1e-9)
 
 
@@ -77,7 +77,7 @@ def test_model_confirms_the_plan(found):
         tensions = [finger.tendon_tension for finger in hand.fingers]
         np.testing.assert_allclose(tensions, loads.tensions[0], atol=1e-9)
         np.testing.assert_allclose(hand.wrench, wrist.hand.wrenches(loads)[0], atol=1e-9)
-        verdict = wrist.judge(hand.wrist.twist[None])
+        verdict = wrist.evaluate(hand.wrist.twist[None])
         assert verdict.utilisation[0] == pytest.approx(hand.utilisation, abs=1e-7)
         assert verdict.violation[0] <= 1e-6
     size = np.linalg.norm(answer.body_wrench)
@@ -150,7 +150,7 @@ def test_nothing_near_a_plan_is_better():
             x = x + unit * np.linalg.lstsq(slopes * unit, question.body_wrench - total)[0]
         if not np.abs(total - question.body_wrench).max() <= 1e-6:
             continue
-        verdicts = [w.judge(p[None]) for w, p in zip(wrists, np.split(x, 2), strict=True)]
+        verdicts = [w.evaluate(p[None]) for w, p in zip(wrists, np.split(x, 2), strict=True)]
         if max(float(v.violation[0]) for v in verdicts) <= 0.0:
             balanced += 1
             used = max(float(v.utilisation[0]) for v in verdicts)

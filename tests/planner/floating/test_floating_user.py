@@ -139,7 +139,7 @@ def test_preload_that_alone_overloads_is_named():
     told = [text for text in answer.warnings if "tendon_preload alone" in text]
     place = asked.stance.hands[1]
     wrist = FloatingWrist(CompliantHand(settle_hand(place, asked.stance), place.tendon_preload))
-    used = wrist.judge(np.zeros((1, 6))).utilisation[0]
+    used = wrist.evaluate(np.zeros((1, 6))).utilisation[0]
     assert used > 1.0
     assert f"utilisation {used:.3g} at rest" in told[0]
     limits = replace(asked.limits, tendon_tension=60.0)
