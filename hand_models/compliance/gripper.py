@@ -21,7 +21,7 @@ from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
-from hand_models.sections import RoundSection
+from hand_models.sections import Disc
 from hand_models.tendon import FingerTendon, MotorScheme
 from hand_models.tile import Surface, inner_half_planes
 
@@ -118,7 +118,7 @@ class Gripper(CompliantGrasp):
                 f"the bases are {2e3 * spread:g} mm apart, too far for this surface",
                 field="gripper.base_half_spacing",
             )
-        self.section = RoundSection((-spread, math.sqrt(square)), radius)
+        self.section = Disc(complex(-spread, math.sqrt(square)), radius)
         finger = settle_finger(model, self.section, (0.0, 0.0))
         if len(finger.bearing) != len(PHALANGES) or not all(finger.touching):
             raise InvalidInputError(

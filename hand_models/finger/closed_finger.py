@@ -30,7 +30,7 @@ from hand_models.finger.path_state import (
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
-from hand_models.sections import Complexes, Flags, Outlines, Section
+from hand_models.sections import Complexes, Face, Flags, Outlines, Section
 
 __all__ = ["cling", "close_all"]
 
@@ -48,9 +48,9 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
     """Return the straight finger, which carries nothing but by its nail, if no rock is there."""
     joints, _ = fan_out(np.zeros(JOINTS), model.joint_spacing)
     places = [(joint.real, joint.imag) for joint in joints.tolist()]
-    tile = *model.tile_range, model.tile_height, 0.0
     if section is not None:
-        depth = max(-section.face_clearance(place, *tile) for place in places)
+        tile = Face(*model.tile_range, model.tile_height)
+        depth = max(-section.face_clearance(joint, 1.0, tile) for joint in joints.tolist())
         if depth > FLUSH * PhalanxShape.of(model).fine:
             return Refused(depth, np.nan)
     contacts = (Contact(0.0, place, model.tile_centre, "none", "balance") for place in places)

@@ -7,8 +7,10 @@ comes to other states `hand_models.finger.closing` finds.
 
 from __future__ import annotations
 
+import cmath
+
 from hand_models.finger.model import Contact, FingerModel, SettledFinger
-from hand_models.sections import Rest, Section, Vector2
+from hand_models.sections import Face, Rest, Section, Vector2
 
 __all__ = ["settle_finger"]
 
@@ -46,10 +48,10 @@ def _lay(
     near, _ = model.tile_range
     if section is None:
         return Contact(high, joint, model.tile_centre, "none", "upper")
-    face = (near, model.joint_spacing, model.tile_height)
-    if section.face_clearance(joint, *face, low) <= 0.0:
+    face, place = Face(near, model.joint_spacing, model.tile_height), complex(*joint)
+    if section.face_clearance(place, cmath.rect(1.0, low), face) <= 0.0:
         return Contact(low, joint, model.tile_centre, "none", "lower")
-    rest = section.rest(joint, *face, low, high)
+    rest = section.rest(place, face, low, high)
     if rest is None:
         return Contact(high, joint, model.tile_centre, "none", "upper")
     return _bearing(model, section, rest, joint)

@@ -31,7 +31,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError
 from hand_models.finger.model import SettledFinger
 from hand_models.parameters import ParameterTable
-from hand_models.sections import Section, Vector2
+from hand_models.sections import Face, Section, Vector2
 
 __all__ = ["CONE_ROWS", "Cling", "Fingernail", "Hook"]
 
@@ -154,15 +154,14 @@ class Fingernail:
         return cls(**numbers)
 
     @property
-    def retracting_tension(self) -> float:
-        """Tension at which a nail that meets no rock is out of the way [N]."""
-        return (self.preload + self.stiffness * self.retraction) / self.pulley_radius
+    def _face(self) -> Face:
+        return Face(ROOT, self.length, 0.0)
 
     def stuck(self, section: Section | None, pin: Vector2) -> bool:
         """Whether rock is in the way of the nail before it turns; arguments as of `hook`."""
         if section is None:
             return False
-        return section.face_clearance(pin, ROOT, self.length, 0.0, 0.0) <= 0.0
+        return section.face_clearance(complex(*pin), 1.0, self._face) <= 0.0
 
     def hook(self, section: Section | None, pin: Vector2) -> Hook | None:
         """Turn the nail until it meets the rock.
@@ -181,7 +180,7 @@ class Fingernail:
         """
         if section is None:
             return None
-        rest = section.rest(pin, ROOT, self.length, 0.0, 0.0, self.retraction)
+        rest = section.rest(complex(*pin), self._face, 0.0, self.retraction)
         if rest is None:
             return None
         met = Hook(rest.angle, rest.distance, (0.0, 0.0))

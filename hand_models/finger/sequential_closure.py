@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
 from hand_models.finger.phalanx_gaps import PhalanxShape, middle_of_bed
-from hand_models.sections import Face, SmoothCut
+from hand_models.sections import Face, SmoothSection
 
 __all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
 
@@ -62,10 +62,6 @@ class ClosedPhalanx(NamedTuple):
         return self._replace(along=self.along + middle_of_bed((near, far), self.bends, depth))
 
 
-Rested = tuple[float, complex, float, bool]
-"""How far a phalanx turns till it rests [rad], its direction and its contact, and if it is flat."""
-
-
 class SequentialClosure:
     """Lays fingers of one model.
 
@@ -75,19 +71,17 @@ class SequentialClosure:
     """
 
     def __init__(self, model: FingerModel) -> None:
-        near, self._far = model.tile_range
+        near, far = model.tile_range
         self._spacing, self._centre = model.joint_spacing, model.tile_centre
-        self.tile = Face(near, self._far, model.tile_height)
-        self._level = PhalanxShape.of(model).fine
-        self._face = Face(near, model.joint_spacing, model.tile_height)
-        ends = (complex(along, model.tile_height) for along in self._face[:2])
-        self._ends = tuple((abs(end), end.conjugate() / abs(end), end) for end in ends)
+        self.tile = Face(near, far, model.tile_height)
+        level = PhalanxShape.of(model).fine
+        self._face = Face(near, model.joint_spacing, model.tile_height, level)
         self._joints = [
             (lower, cmath.rect(1.0, lower), upper - lower)
             for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True)
         ]
 
-    def lay(self, cut: SmoothCut) -> list[ClosedPhalanx]:
+    def lay(self, cut: SmoothSection) -> list[ClosedPhalanx]:
         """Close a finger on rock, its proximal joint at the origin of F.
 
         Returns
@@ -98,15 +92,22 @@ class SequentialClosure:
         """
         laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j
+        if cut.skew:
+            return laid
         for lower, opened, span in self._joints:
-            rest = self._rest(cut, joint, u * opened, span)
+            low = u * opened
+            if not cut.clear(joint, low, self._face):
+                break
+            rest = cut.turned(joint, self._face, low, span)
             if rest is None:
                 break
             turn, u, along, flat = rest
             angle += lower + turn
             bends = (0.0, 0.0)
-            if not flat:
-                if not self._face.start < along < self._far:
+            if flat:
+                along = self._centre
+            else:
+                if not self.tile.start < along < self.tile.end:
                     # on an edge of the tile or beyond it
                     break
                 bends = self._bends(cut, joint, u, along)
@@ -114,55 +115,8 @@ class SequentialClosure:
             joint += self._spacing * u
         return laid
 
-    def _rest(self, cut: SmoothCut, joint: complex, low: complex, span: float) -> Rested | None:
-        """Return where a phalanx that turns from the direction ``low`` on rests, if it does."""
-        face = self._face
-        if not cut.clear(joint, low, face):
-            return None
-        tangent = cut.tangent(joint, face.height)
-        if tangent is not None:
-            u, along = tangent
-            turn = cmath.phase(u / low) % math.tau
-            if turn <= span:
-                if face.start <= along <= face.end:
-                    return turn, u, along, False
-                if not cut.faced:
-                    # the face's line touches the rock beyond this end, which is first on it
-                    beyond = along > face.end
-                    turn, u = self._first(cut, joint, self._ends[beyond], low, span)
-                    return None if turn > span else (turn, u, face[beyond], False)
-        start, end = (self._first(cut, joint, each, low, span) for each in self._ends)
-        turn, u = start if start[0] <= end[0] else end
-        if turn > span:
-            return None
-        level = abs(start[0] - end[0]) * (face.end - face.start) <= self._level
-        if level and all(cut.straight(joint + each * u) for _, _, each in self._ends):
-            return turn, u, self._centre, True
-        return turn, u, face.start if start[0] <= end[0] else face.end, False
-
-    def _first(
-        self,
-        cut: SmoothCut,
-        joint: complex,
-        end: tuple[float, complex, complex],
-        low: complex,
-        span: float,
-    ) -> tuple[float, complex]:
-        """Return how far a phalanx turns till an end of its face is on the rock, and to where.
-
-        Infinitely far where it is not within the span.
-        """
-        arm, back, _ = end
-        first = math.inf, low
-        for way in cut.entries(joint, arm):
-            u = way * back
-            turn = cmath.phase(u / low) % math.tau
-            if turn <= span and turn < first[0]:
-                first = turn, u
-        return first
-
     def _bends(
-        self, cut: SmoothCut, joint: complex, u: complex, along: float
+        self, cut: SmoothSection, joint: complex, u: complex, along: float
     ) -> tuple[float, float]:
         """Return the rock's curvature from a contact toward both ends of the tile."""
         ends = self.tile.start, self.tile.end

@@ -30,7 +30,7 @@ from hand_models.base import Array, Pose
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
-from hand_models.sections import PolylineSection, Section
+from hand_models.sections import Face, PolylineSection, Section
 
 __all__ = ["CENTRED", "RockUnder", "Seating", "propose", "seating_given", "touches_seat"]
 
@@ -267,7 +267,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
         return CENTRED
     x, _, z = hand.inner_joint.tolist()
     model = hand.finger
-    face = model.tile_range[0], model.joint_spacing, model.tile_height
+    face = Face(model.tile_range[0], model.joint_spacing, model.tile_height)
     limits = model.joint_lower[0], model.joint_upper[0]
 
     def miss(places: Array) -> Array:
@@ -277,7 +277,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
         if not there.any():
             return missed
         joints = x - places[there, 0] + 1j * (z - places[there, 1])
-        rests = [section.rests(joints, *face, *limits) for section in under]
+        rests = [section.rests(joints, face, *limits) for section in under]
         along = np.array([each.distance for each in rests])
         mean = np.where(np.isnan(along), model.joint_spacing, along).mean(axis=0)
         blocked = np.any([each.blocked for each in rests], axis=0)
@@ -291,7 +291,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
     if np.isnan(centre).any():
         return CENTRED
     level = centre[0] + [0.0, z + model.tile_height]
-    lying = [section.rest((x, z - level[1]), *face, *limits) for section in under]
+    lying = [section.rest(complex(x, z - level[1]), face, *limits) for section in under]
     if all(rest is not None and rest.flat and abs(rest.angle) < LEVEL for rest in lying):
         return Seating(_shifted(*level.tolist()), "flat")
     if crest is None:

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.sections.rows import Complexes, Flags
+from hand_models.sections.section import Complexes, Flags
 
 __all__ = ["Boundary", "Window", "stretch_minima"]
 

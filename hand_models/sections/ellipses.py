@@ -1,34 +1,34 @@
 """Rock in a finger's plane that is an ellipse: the oblique cut of a log, or that of a boulder.
 
-About a centre c it is
+About a centre c it is the image of a disc,
 
-    G(q − c) ≤ ρ²,   G(v) = m |v|² + Re(κ v²),
+    |A v + B v̄| ≤ ρ,   v = q − c,
 
-with the mean m and the unevenness κ of its quadratic form. What laying asks of it follows from the
-circle that fits it best where the last one led: at its point foremost in the direction n, with the
-support h = √(n·En) and E = ρ² G⁻¹, it bends with the radius det E / h³. From one circle to the next
-the mistake is squared.
+whose square is G(v) = m |v|² + Re(κ v²), with m = |A|² + |B|² and κ = 2 A B̄. What laying asks of
+it follows from the circle that fits it best where the last one led: at its point foremost in the
+direction n, with the support h = √(n·En) and E = ρ² G⁻¹, it bends with the radius det E / h³. From
+one circle to the next the mistake is squared.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.sections.conics import circle_crossings
-from hand_models.sections.smooth_cuts import (
-    Face,
-    SmoothCut,
+from hand_models.base import Array
+from hand_models.sections.section import Complexes, Face
+from hand_models.sections.smooth import (
+    SmoothSection,
     Tangent,
     into_circle,
     past_circle,
     to_face,
 )
 
-__all__ = ["Ellipse"]
+__all__ = ["Ellipse", "arc", "radii", "rock_left"]
 
 LAST_STEP: Final = 1e-8
 """Change of a direction after which the next one would be lost in rounding."""
@@ -41,6 +41,19 @@ CIRCLES: Final = 10
 
 STEPS: Final = 60
 """How many points are tried in turn where circles do not lead on."""
+
+BESIDE: Final = 1e-3
+"""How far from the unit circle a root may be that rounding has moved off it."""
+
+POLISHES: Final = 3
+"""Steps of Newton's method on the crossings."""
+
+ROUNDING: Final = 1e-13
+"""Of what is zero at a crossing, in parts of its terms."""
+
+
+ROUGH: Final = 256
+"""Parts of a curve of which those near a finger are looked at closely."""
 
 
 class _Nearest(NamedTuple):
@@ -64,41 +77,32 @@ class _Nearest(NamedTuple):
     radius: float
 
 
-class Ellipse(SmoothCut):
-    """An ellipse of rock that is no circle.
+class Ellipse(SmoothSection):
+    """An ellipse of rock.
 
     Parameters
     ----------
     centre : complex
         c [m].
-    mean : float
-        m.
-    uneven : complex
-        κ.
-    determinant : float
-        Of G, m² − |κ|².
-    square : float
-        ρ².
+    linear : tuple of complex
+        A and B.
+    rho : float
+        ρ.
     size : float
-        What distances in the quadratic form are multiplied by.
+        What distances from the disc are multiplied by.
     """
 
     def __init__(
-        self,
-        centre: complex,
-        mean: float,
-        uneven: complex,
-        determinant: float,
-        square: float,
-        size: float,
+        self, centre: complex, linear: tuple[complex, complex], rho: float, size: float
     ) -> None:
-        self.centre = centre
-        self._mean, self._uneven, self._size = mean, uneven, size
-        self._rho = math.sqrt(square)
-        self._dual = square / determinant
-        self._bend = square * self._dual
-        most = mean + abs(uneven)
-        self._sharpest = self._rho * math.sqrt(determinant / most) / most
+        self.centre, self._linear, self._rho, self._size = centre, linear, rho, size
+        A, B = linear
+        first, second = abs(A) ** 2, abs(B) ** 2
+        self._mean, self._uneven = first + second, 2.0 * A * B.conjugate()
+        self._dual = (rho / (first - second)) ** 2
+        self._bend = rho**2 * self._dual
+        # its least radius
+        self._sharpest = rho * abs(abs(A) - abs(B)) / (abs(A) + abs(B)) ** 2
         self._joint: complex | None = None
         self._near: _Nearest | None = None
 
@@ -179,25 +183,32 @@ class Ellipse(SmoothCut):
         return self._crossings(away, arm)
 
     def _crossings(self, away: complex, arm: float) -> list[complex]:
-        """Return all entries, in closed form."""
+        """Return all entries: where a conic crosses the unit circle, inward.
+
+        In G's own axes a place of the circle is e = exp(iφ) from the joint, and G − ρ² a polynomial
+        of fourth degree in e over e².
+        """
         spread = abs(self._uneven)
-        axis = (spread / self._uneven) ** 0.5
+        axis = (spread / self._uneven) ** 0.5 if spread else 1.0
         large, small = arm * (self._mean + spread), arm * (self._mean - spread)
         x, z = (axis.conjugate() * away).real, (axis.conjugate() * away).imag
         rest = (large * x * x + small * z * z) / arm - self._rho**2
-        numbers = [arm * large, arm * small, -large * x, -small * z, rest]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            angles, slopes = circle_crossings(*np.array(numbers)[:, None])
-        return [
-            axis * complex(math.cos(angle), math.sin(angle))
-            for angle, slope in zip(angles.ravel().tolist(), slopes.ravel().tolist(), strict=True)
-            if slope < 0.0 and not math.isnan(angle)
-        ]
+        A, B, D, E = arm * large, arm * small, -large * x, -small * z
+        ends, beside = 0.25 * (A - B), complex(D, -E)
+        middle = 0.5 * (A + B) + rest
+        e = np.roots([ends, beside, middle, beside.conjugate(), ends])
+        angles = np.angle(e[np.abs(np.abs(e) - 1.0) < BESIDE])
+        for _ in range(POLISHES):
+            f, slope = _conic(A, B, D, E, rest, angles)
+            angles = angles - np.clip(f / slope, -BESIDE, BESIDE)
+        f, slope = _conic(A, B, D, E, rest, angles)
+        crosses = (np.abs(f) <= ROUNDING * (A + abs(D) + abs(E) + abs(rest))) & (slope < 0.0)
+        return [axis * complex(math.cos(t), math.sin(t)) for t in angles[crosses].tolist()]
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:
         near = self._nearest(joint)
         if near is not None:
-            start, end, height = face
+            start, end, height = face[:3]
             across = u * near.normal.conjugate()
             nearest = max(start * across.real, end * across.real) - height * across.imag
             if nearest < near.distance:
@@ -211,5 +222,57 @@ class Ellipse(SmoothCut):
 
     def distance(self, point: complex) -> float:
         v = point - self.centre
-        square = self._mean * abs(v) ** 2 + (self._uneven * v * v).real
-        return self._size * (math.sqrt(square) - self._rho)
+        A, B = self._linear
+        return self._size * (abs(A * v + B * v.conjugate()) - self._rho)
+
+    def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
+        axes = radii(self._linear, self._rho)
+        return [rock_left(arc(self.centre, axes, math.pi, reach, spacing), axes)]
+
+
+def arc(
+    centre: complex, axes: tuple[complex, complex], most: float, reach: float, spacing: float
+) -> Complexes:
+    """Return places centre + e₁ sin φ − e₂ cos φ, dense where they are within reach, |φ| ≤ most.
+
+    Parameters
+    ----------
+    centre : complex
+        [m]
+    axes : tuple of complex
+        e₁ and e₂ [m].
+    most : float
+        [rad]
+    reach, spacing : float
+        As of `Section.outline` [m].
+    """
+
+    def places(turns: Array) -> Complexes:
+        return np.asarray(centre + axes[0] * np.sin(turns) - axes[1] * np.cos(turns))
+
+    turns = np.linspace(-most, most, ROUGH + 1)
+    rough = places(turns)
+    steps = np.abs(np.diff(rough))
+    near = np.abs(rough[:-1]) <= reach + steps
+    parts = np.where(near, np.ceil(steps / spacing), 1.0).clip(1.0)
+    at = np.append(0.0, np.cumsum(parts))
+    return places(np.interp(np.arange(at[-1] + 1.0), at, turns))
+
+
+def radii(linear: tuple[complex, complex], rho: float) -> tuple[complex, complex]:
+    """Return what A v + B v̄ = ρ and iρ are v of [m]."""
+    A, B = linear
+    part = rho / (abs(A) ** 2 - abs(B) ** 2)
+    return part * (A.conjugate() - B), 1j * part * (A.conjugate() + B)
+
+
+def rock_left(places: Complexes, axes: tuple[complex, complex]) -> Complexes:
+    """Return places of `arc` in the order in which they have the rock on their left."""
+    return places if (axes[0].conjugate() * axes[1]).imag > 0.0 else places[::-1]
+
+
+def _conic(A: float, B: float, D: float, E: float, F: float, angles: Array) -> tuple[Array, Array]:
+    """Return A x² + B y² + 2 D x + 2 E y + F at angles on the unit circle, and its slope."""
+    x, y = np.cos(angles), np.sin(angles)
+    slope = 2.0 * ((B * y + E) * x - (A * x + D) * y)
+    return (A * x + 2.0 * D) * x + (B * y + 2.0 * E) * y + F, slope

@@ -21,7 +21,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.sections.boundary import Boundary, Window, stretch_minima
-from hand_models.sections.rows import Complexes, Flags, Span
+from hand_models.sections.section import Complexes, Face, Flags
 
 __all__ = ["TurningFaces"]
 
@@ -64,38 +64,37 @@ class TurningFaces:
     boundary : Boundary
     joint : ndarray of complex, shape (n,)
         About which they turn [m].
-    span : Span
-    low : ndarray, shape (n,)
+    face : Face
+    low : float
         From where on [rad].
     """
 
-    def __init__(self, boundary: Boundary, joint: Complexes, span: Span, low: Array) -> None:
-        self._boundary, self._joint, self._low = boundary, joint, low
-        self._span = Span(*(np.broadcast_to(v, (*v.shape[:-1], len(low))) for v in span))
-        self._window = boundary.window(joint, float(span.arms.max()))
+    def __init__(self, boundary: Boundary, joint: Complexes, face: Face, low: float) -> None:
+        self._boundary, self._joint, self._face, self._low = boundary, joint, face, low
+        self._ends = np.array([complex(along, face.height) for along in face[:2]])
+        self._window = boundary.window(joint, float(np.abs(self._ends).max()))
         self._s = self._window.vertices.real - joint.real[:, None]
         self._t = self._window.vertices.imag - joint.imag[:, None]
         self._square = self._s * self._s + self._t * self._t
         # along the phalanges where they begin, and above them
-        self._along, self._above = _turned(self._s, self._t, low)
+        self._along, self._above = _turned(self._s, self._t, np.array([low]))
 
     def clearances(self) -> Array:
         """Return how far faces are from the rock where they begin, negative if they cut it [m].
 
         Of those that do not cut it, how far their ends are.
         """
-        (start, end), height = self._span.ends, self._span.height
-        along, gap = self._along, self._above - height[:, None]
-        cuts = np.zeros(len(start), dtype=bool)
+        start, end = self._face[:2]
+        along, gap = self._along, self._above - self._face.height
+        cuts = np.zeros(len(along), dtype=bool)
         if along.size:
             below = gap < 0.0
             row, first = ((below[:, :-1] != below[:, 1:]) & self._window.goes_on[:-1]).nonzero()
             part = gap[row, first] / (gap[row, first] - gap[row, first + 1])
             crossing = along[row, first]
             crossing = crossing + part * (along[row, first + 1] - crossing)
-            cuts[row[(crossing >= start[row]) & (crossing <= end[row])]] = True
-        u = np.exp(1j * self._low)
-        points = self._joint + (self._span.ends + 1j * height) * u
+            cuts[row[(crossing >= start) & (crossing <= end)]] = True
+        points = self._joint + self._ends[:, None] * np.exp(1j * self._low)
         clear = self._boundary.clearances(points).min(axis=0)
         cut = cuts.nonzero()[0]
         if len(cut):
@@ -103,82 +102,70 @@ class TurningFaces:
             clear[cut] = self._boundary.clearances(points).min(axis=0)
         return np.asarray(clear)
 
-    def touches(self) -> Array:
-        """Return the angles at which the ends of faces first meet the boundary, (2, n).
-
-        Infinite where they do not.
-        """
-        if not self._square.size:
-            return np.full((2, len(self._low)), np.inf)
-        return np.asarray(self._low + self._ends().turn.reshape(2, -1))
-
-    def contacts(self, high: Array, faceted: bool) -> tuple[Array, Array, Flags]:
+    def contacts(self, high: float, faceted: bool) -> tuple[Array, Array, Flags]:
         """Return angles and distances at which faces first rest on rock; NaN where they do not.
 
         And whether they lie flat there.
 
         Parameters
         ----------
-        high : ndarray, shape (n,)
+        high : float
             Up to where they turn [rad].
         faceted : bool
             Whether vertices are corners of the rock, not places on a smooth curve.
         """
-        angle, distance = np.full((2, len(high)), np.nan)
-        flat = np.zeros(len(high), dtype=bool)
+        count = len(self._joint)
+        angle, distance = np.full((2, count), np.nan)
+        flat = np.zeros(count, dtype=bool)
         if not self._square.size:
             return angle, distance, flat
         # with one of their ends, or a vertex on them
-        meetings = zip(self._ends(), self._on_face(), strict=True)
+        meetings = zip(self._with_ends(), self._on_face(), strict=True)
         turns, vertices = (np.concatenate(each).reshape(3, -1) for each in meetings)
-        which, rows = turns.argmin(axis=0), np.arange(len(high))
+        which, rows = turns.argmin(axis=0), np.arange(count)
         turn = turns[which, rows]
         met = (self._low + turn <= high).nonzero()[0]
-        angle[met] = self._low[met] + turn[met]
+        angle[met] = self._low + turn[met]
         if len(met):
             distance[met], flat[met] = self._touching(
                 met, angle[met], vertices[which, rows][met], which[met], faceted
             )
         return angle, distance, flat
 
-    def _ends(self) -> _Meetings:
+    def _with_ends(self) -> _Meetings:
         """Return where both ends of faces are first on the boundary, shape (2 n,)."""
         window, shape = self._window, self._square.shape
-        arm, phase = self._span.arms, self._span.phases
+        arm, phase = np.abs(self._ends), np.angle(self._ends)
         # a segment that an end meets begins no farther from its circle than it is long
         least, most = np.maximum(arm - window.longest, 0.0) ** 2, (arm + window.longest) ** 2
-        near = (self._square >= least[:, :, None]) & (self._square <= most[:, :, None])
+        near = (self._square >= least[:, None, None]) & (self._square <= most[:, None, None])
         row, first = (near.reshape(-1, shape[1]) & window.goes_on).nonzero()
         place = row % shape[0] * shape[1] + first
         x, y = self._along.ravel()[place], self._above.ravel()[place]
         d_x, d_y = self._along.ravel()[place + 1] - x, self._above.ravel()[place + 1] - y
-        square, arm = self._square.ravel()[place], arm.ravel()[row]
+        square, which = self._square.ravel()[place], row // shape[0]
+        arm, phase = arm[which], phase[which]
         long, b = d_x * d_x + d_y * d_y, x * d_x + y * d_y
         root = np.sqrt(b * b - long * (square - arm * arm))
         part = np.stack([-b - root, root - b], axis=1) / long[:, None]
         cut, side = ((part >= 0.0) & (part <= 1.0)).nonzero()
-        part, row, phase = part[cut, side], row[cut], phase.ravel()[row[cut]]
+        part, row, phase = part[cut, side], row[cut], phase[cut]
         x, y = x[cut] + part * d_x[cut], y[cut] + part * d_y[cut]
         u, v = np.cos(phase), np.sin(phase)
         return _first(2 * shape[0], row, x * u + y * v, y * u - x * v, first[cut] + 1)
 
     def _on_face(self) -> _Meetings:
         """Return where a vertex is first on a face."""
-        (start, end), h = self._span.ends, self._span.height
-        nearest = np.maximum(start, 0.0) ** 2 + h * h - SLACK
-        farthest = np.maximum(start * start, end * end) + h * h + SLACK
-        near = (self._square >= nearest[:, None]) & (self._square <= farthest[:, None])
+        start, end, h, _ = self._face
+        nearest, farthest = start * start + h * h - SLACK, end * end + h * h + SLACK
+        near = (self._square >= nearest) & (self._square <= farthest)
         row, vertex = near.nonzero()
-        place, h = row * near.shape[1] + vertex, h[row]
+        place = row * near.shape[1] + vertex
         x, y = self._along.ravel()[place], self._above.ravel()[place]
         along = np.sqrt(self._square.ravel()[place] - h * h)
-        if (start < 0.0).any():
-            # behind the joint as well
-            row, vertex, x, y, h = (np.repeat(value, 2) for value in (row, vertex, x, y, h))
-            along = np.stack([along, -along], axis=1).ravel()
-        on = ((along >= start[row]) & (along <= end[row])).nonzero()[0]
-        row, x, y, h, along = row[on], x[on], y[on], h[on], along[on]
-        return _first(len(start), row, x * along + y * h, y * along - x * h, vertex[on])
+        on = ((along >= start) & (along <= end)).nonzero()[0]
+        row, x, y, along = row[on], x[on], y[on], along[on]
+        return _first(len(near), row, x * along + y * h, y * along - x * h, vertex[on])
 
     def _touching(
         self, met: Indices, angle: Array, vertex: Indices, which: Indices, faceted: bool
@@ -188,16 +175,16 @@ class TurningFaces:
         Each met a vertex, or with one of its ends (``which`` of them) a place before it.
         """
         rows = np.arange(len(met))
-        (start, end), height = self._span.ends[:, met], self._span.height[met]
+        start, end, height, _ = self._face
         along, gap = _turned(self._s[met], self._t[met], angle)
-        gap -= height[:, None]
+        gap -= height
         by_end = which < 2
         here = np.where(by_end, np.where(which == 0, start, end), along[rows, vertex])
         level = np.where(by_end, 0.0, gap[rows, vertex])
         sides = _Sides.of(self._window, vertex, by_end)
         # how far the rock stays at the face on both sides, the last step of it taken as straight
         limit = level + FLAT
-        apart = (gap > limit[:, None]) | (along < start[:, None]) | (along > end[:, None])
+        apart = (gap > limit[:, None]) | (along < start) | (along > end)
         reaches = []
         for out, inner, own, ends in sides.stretches(apart):
             near = np.where(own, here, along[rows, inner])

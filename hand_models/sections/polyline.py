@@ -7,19 +7,39 @@ and where a face that turns first meets it `hand_models.sections.first_contact`.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.sections.boundary import Boundary
 from hand_models.sections.first_contact import TurningFaces
-from hand_models.sections.rows import Rests, Span
-from hand_models.sections.section import Complexes, Rest, Section, Vector2
+from hand_models.sections.section import Complexes, Face, Flags, Rest, Section, Vector2
 
 __all__ = ["PolylineSection"]
+
+
+class Rests(NamedTuple):
+    """Faces that turn until they rest on the rock, shape (n,) each.
+
+    Attributes
+    ----------
+    angle, distance : ndarray
+        As of `Rest`; NaN where a face meets no rock [rad, m].
+    flat : ndarray of bool
+        Whether it lies flat.
+    blocked : ndarray of bool
+        Whether there is rock in its way from the first; the others mean nothing then.
+    """
+
+    angle: Array
+    distance: Array
+    flat: Flags
+    blocked: Flags
 
 
 class PolylineSection(Section):
@@ -44,53 +64,30 @@ class PolylineSection(Section):
         """Where places are near it; a line that only `highest` is asked of needs none."""
         return Boundary(self.pieces)
 
-    def rest(
-        self, joint: Vector2, start: float, end: float, height: float, low: float, high: float
-    ) -> Rest | None:
-        joints = np.array([complex(*joint)])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            sweep = self._sweep(joints, Span.of(start, end, height), low)
-            angle, distance, flat = sweep.contacts(np.array([high]), self.faceted)
-        if math.isnan(angle.item()):
+    def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
+        found = self.rests(np.array([joint]), face, low, high)
+        if math.isnan(found.angle[0]):
             return None
-        middle = 0.5 * (start + end)
-        return Rest(angle.item(), middle if flat.item() else distance.item(), flat.item())
+        return Rest(float(found.angle[0]), float(found.distance[0]), bool(found.flat[0]))
 
-    def rests(
-        self, joints: Complexes, start: float, end: float, height: float, low: float, high: float
-    ) -> Rests:
+    def rests(self, joints: Complexes, face: Face, low: float, high: float) -> Rests:
         """Return what `rest` does for joints (n,)."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            sweep = self._sweep(joints, Span.of(start, end, height), low)
-            angle, distance, flat = sweep.contacts(np.full(len(joints), high), self.faceted)
-            distance = np.where(flat, 0.5 * (start + end), distance)
-            return Rests(angle, distance, flat, sweep.clearances() <= 0.0)
+            faces = TurningFaces(self.boundary, joints, face, low)
+            angle, distance, flat = faces.contacts(high, self.faceted)
+            distance = np.where(flat, 0.5 * (face.start + face.end), distance)
+            return Rests(angle, distance, flat, faces.clearances() <= 0.0)
 
-    def touch(
-        self, joint: Vector2, along: float, height: float, low: float, high: float
-    ) -> float | None:
+    def face_clearance(self, joint: complex, u: complex, face: Face) -> float:
         with np.errstate(invalid="ignore", divide="ignore"):
-            joints = np.array([complex(*joint)])
-            touches = self._sweep(joints, Span.of(along, along, height), low).touches()
-        angle = float(touches[0, 0])
-        return angle if angle <= high else None
-
-    def face_clearance(
-        self, joint: Vector2, start: float, end: float, height: float, angle: float
-    ) -> float:
-        joints = np.array([complex(*joint)])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            sweep = self._sweep(joints, Span.of(start, end, height), angle)
-            return float(sweep.clearances()[0])
-
-    def _sweep(self, joints: Complexes, span: Span, low: float) -> TurningFaces:
-        return TurningFaces(self.boundary, joints, span, np.full(len(joints), low))
+            faces = TurningFaces(self.boundary, np.array([joint]), face, cmath.phase(u))
+            return float(faces.clearances()[0])
 
     def outline(self, reach: float, spacing: float) -> list[Complexes]:
         return [piece[:, 0] + 1j * piece[:, 1] for piece in self.pieces]
 
-    def clearance(self, point: Vector2) -> float:
-        return float(self.boundary.clearances(np.array(complex(*point))))
+    def distance(self, point: complex) -> float:
+        return float(self.boundary.clearances(np.array(point)))
 
     def clearances(self, places: Complexes) -> Array:
         return self.boundary.clearances(places)

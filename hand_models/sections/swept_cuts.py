@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
-from hand_models.sections.ellipses import Ellipse
-from hand_models.sections.smooth_cuts import Disc, Face, SmoothCut, Tangent, Wall
-from hand_models.sections.swept_ball import PARALLEL, Swept
+import numpy as np
+
+from hand_models.sections.ellipses import Ellipse, arc, radii, rock_left
+from hand_models.sections.section import Complexes, Face
+from hand_models.sections.smooth import Disc, SmoothSection, Tangent, Wall
+from hand_models.sections.swept_ball import PARALLEL, Swept, entry_distances
 
 __all__ = ["FingerPlane", "cut_of"]
 
@@ -26,32 +29,59 @@ BESIDE: Final = -1e-9
 """How far on the inner side of a line through the ball's centre counts as beside it [m]."""
 
 
-def cut_of(shape: Swept, plane: FingerPlane) -> SmoothCut | None:
-    """Return the rock in a plane; None if the plane misses it, or runs along its axis."""
+def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
+    """Return the rock in a plane; None if the plane misses it."""
     a, b, c, d, e, f, x, y, z = plane
     if not shape.radius:
         steep = math.hypot(c, f)
         return None if steep < PARALLEL else Wall(complex(c, f) / steep, -z / steep)
-    g11, g12, g22 = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
-    b1, b2 = a * x + b * y + c * z, d * x + e * y + f * z
-    determinant = g11 * g22 - g12 * g12
-    if determinant <= SKEW * (0.5 * (g11 + g22)) ** 2:
-        return None
-    centre = complex(g12 * b2 - g22 * b1, g12 * b1 - g11 * b2) / determinant
-    square = shape.radius**2 - (x * x + y * y + z * z) - b1 * centre.real - b2 * centre.imag
-    if square <= 0.0:
-        return None
-    mean, uneven = 0.5 * (g11 + g22), complex(0.5 * (g11 - g22), -g12)
+    if shape.scale_y:
+        # Cholesky's factor of the ellipsoid's quadratic form in the plane
+        g11, g12, g22 = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
+        b1, b2 = a * x + b * y + c * z, d * x + e * y + f * z
+        determinant = g11 * g22 - g12 * g12
+        centre = complex(g12 * b2 - g22 * b1, g12 * b1 - g11 * b2) / determinant
+        square = shape.radius**2 - (x * x + y * y + z * z) - b1 * centre.real - b2 * centre.imag
+        if square <= 0.0:
+            return None
+        rho, size = math.sqrt(square), determinant**-0.25
+        a, c = math.sqrt(g11), 0.0
+        d, f = g12 / a, math.sqrt(determinant) / a
+    else:
+        turned = a * f - c * d
+        if abs(turned) < PARALLEL:
+            return _along_axis(shape, plane)
+        centre = complex(d * z - f * x, c * x - a * z) / turned
+        rho, size = shape.radius, 1.0
+    # w = A v + B v̄ for the matrix of a, d over c, f
+    A, B = 0.5 * complex(a + f, c - d), 0.5 * complex(a - f, c + d)
     core: Disc | Ellipse
-    if abs(uneven) <= ROUND * mean:
-        core = Disc(centre, math.sqrt(square / mean))
+    # a boulder's cut is an ellipse wherever it is, round or not
+    less, more = sorted((abs(A), abs(B)))
+    if less <= ROUND * more and shape.scale_y in (0.0, 1.0):
+        core = Disc(centre, rho / more)
     else:
         # distances to an ellipsoid's section are told in metres by its mean radius
-        size = determinant**-0.25 if shape.scale_y else 1.0
-        core = Ellipse(centre, mean, uneven, determinant, square, size)
+        core = Ellipse(centre, (A, B), rho, size)
+        core.skew = (more**2 - less**2) ** 2 <= SKEW * (more**2 + less**2) ** 2
     if not shape.sine:
         return core
-    return _Edge(core, _line(shape, plane, 1.0), _line(shape, plane, -1.0))
+    lines = (_line(shape, plane, side) for side in (1.0, -1.0))
+    return _Edge(core, radii((A, B), rho), math.atan2(shape.cosine, shape.sine), *lines)
+
+
+def _along_axis(shape: Swept, plane: FingerPlane) -> Wall | None:
+    """Return the straight rock in a plane that holds the axis of an extrusion."""
+    depth = entry_distances(shape, [plane[6:]], plane[3:6])[0]
+    if not math.isfinite(depth):
+        return None
+    # where a vector of the plane is all but lost across the axis
+    a, _, c, d, _, f = plane[:6]
+    lost = complex(d * d + f * f - a * a - c * c, -2.0 * (a * d + c * f))
+    along = (lost / abs(lost)) ** 0.5
+    wall = Wall(1j * along, along.real * depth)
+    wall.skew = True
+    return wall
 
 
 class _Line(NamedTuple):
@@ -113,13 +143,32 @@ def _line(shape: Swept, plane: FingerPlane, side: float) -> _Line:
     )
 
 
-class _Edge(SmoothCut):
-    """A disc or an ellipse of rock that is swept along two faces."""
+class _Edge(SmoothSection):
+    """A disc or an ellipse of rock that is swept along two faces.
+
+    Parameters
+    ----------
+    core : Disc or Ellipse
+    axes : tuple of complex
+        As of `Ellipse` [m].
+    most : float
+        How far the normal out of the core turns from the crest to each face [rad].
+    first, second : _Line
+        The faces, with φ growing toward the first.
+    """
 
     faced = True
 
-    def __init__(self, core: Disc | Ellipse, first: _Line, second: _Line) -> None:
-        self._core, self._first, self._second = core, first, second
+    def __init__(
+        self,
+        core: Disc | Ellipse,
+        axes: tuple[complex, complex],
+        most: float,
+        first: _Line,
+        second: _Line,
+    ) -> None:
+        self._core, self._axes, self._most = core, axes, most
+        self._first, self._second, self.skew = first, second, core.skew
 
     def _bounded(self, normal: complex) -> bool:
         """Whether a line of that normal, into the rock, can be beside it: no face crosses it."""
@@ -167,3 +216,11 @@ class _Edge(SmoothCut):
             line.beside(point) >= 0.0 and line.beyond(point) + line.ball >= BESIDE
             for line in (self._first, self._second)
         )
+
+    def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
+        places = arc(self._core.centre, self._axes, self._most, reach, spacing)
+        ends = []
+        for end, line in ((places[0], self._second), (places[-1], self._first)):
+            way = line.way.conjugate()
+            ends.append(end + (abs(end) + reach) / abs(way) * way)
+        return [rock_left(np.concatenate([ends[:1], places, ends[1:]]), self._axes)]

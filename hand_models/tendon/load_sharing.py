@@ -15,8 +15,7 @@ before a pulley and s′ after it obey (Eq. 19)
 
 with ρ = (1 − μ/2)/(1 + μ/2), at the tiles' pulleys with one μ, at the palm's with another, which
 Eq. 18 leaves out (μ = 0: A_{i+1} = B_i). The directions are unknown: each change of load is a
-linear complementarity problem. They are those of the *increments* of m and n, so a palm remembers
-where its tiles were; from rest everything is proportional to x.
+linear complementarity problem. From rest, as here, everything is proportional to x.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -32,38 +31,10 @@ import numpy as np
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.tendon.complementarity import stick_slip
 
-__all__ = ["PalmSharing", "PalmState", "PalmTendon", "share_load", "shear_capacity"]
+__all__ = ["PalmSharing", "PalmTendon", "share_load", "shear_capacity"]
 
 FRICTIONLESS: Final = 1e-8
 """A coefficient of friction that is as good as none: such pulleys are left out."""
-
-
-@dataclass(frozen=True, eq=False)
-class PalmState:
-    """A loaded palm.
-
-    Attributes
-    ----------
-    travel : float
-        x, of the palm's frame [m].
-    tile_travel : ndarray, shape (N,)
-        x_i [m].
-    tile_loads : ndarray, shape (N,)
-        k_i x_i [N].
-    strands : ndarray, shape (N, 2)
-        Tensions A_i and B_i [N]. Where neighbouring pulleys stick, the loads leave them open, and
-        these are some that fit.
-    """
-
-    travel: float
-    tile_travel: Array
-    tile_loads: Array
-    strands: Array
-
-    @cached_property
-    def slip(self) -> Array:
-        """δ_i = x − x_i, shape (N,) [m]."""
-        return self.travel - self.tile_travel
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +47,10 @@ class PalmSharing:
         Load of each tile, k_i x_i / x [N/m].
     tile_travel : ndarray, shape (N,)
         x_i / x.
-    strand_stiffness : ndarray, shape (N, 2)
-        Tensions before and after each tile's pulley, A_i / x and B_i / x [N/m].
     """
 
     tile_stiffness: Array
     tile_travel: Array
-    strand_stiffness: Array
 
     def capacity(self, tile_limits: Sequence[float] | Array) -> float:
         """Return the palm's load when its first tile reaches its limit [N]."""
@@ -132,89 +100,48 @@ class PalmTendon:
                     f"must be in [0, 2), got {getattr(self, field):g}", field=field
                 )
 
-    def rest(self) -> PalmState:
-        """Return the palm without load."""
-        n = len(self.contact_stiffness)
-        return PalmState(0.0, np.zeros(n), np.zeros(n), np.zeros((n, 2)))
+    def sharing(self) -> PalmSharing:
+        """Return how the tiles share the load.
 
-    def advance(self, state: PalmState, increment: float) -> PalmState:
-        """Move the palm, and let its tiles follow.
-
-        One complementarity problem, exact for a step at whose end every pulley that slipped on the
-        way still slips; from rest that is any step forward.
-
-        Parameters
-        ----------
-        state : PalmState
-            From `rest` or an earlier increment of this palm.
-        increment : float
-            Of the palm's travel, of either sign [m].
-
-        Returns
-        -------
-        PalmState
+        Tensions are in units of the mean contact stiffness (so they are lengths), the palm's travel
+        is one. The unknowns are the a of `complementarity`, one for each pulley with friction,
+        s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s = G a + g s_0, with s_0 by the
+        tendon's length, and from these the slips δ = (k x − A − B)/(k + k_p) and the travels V δ.
 
         Raises
         ------
-        InvalidInputError
-            If the palm would be pushed back beyond where it began: nothing is loaded there.
         SolverError
             If the complementarity problem ends without a solution.
         """
-        travel = state.travel + increment
-        if not (math.isfinite(travel) and travel >= 0.0):
-            raise InvalidInputError(
-                f"must keep the palm's travel at 0 m or above, leads to {travel:g}",
-                field="increment",
-            )
-        return self._equations.solve(travel, state.slip)
+        k = np.array(self.contact_stiffness)
+        scale = k.mean()
+        kappa = k / scale
+        compliance = 1.0 / (kappa + self.spring_stiffness / scale)
+        pull = compliance * kappa
+        ratio, travel_of_slip, beside = _thread(self)
 
-    @cached_property
-    def _equations(self) -> _Equations:
-        return _Equations(self)
+        def pair(strands: Array) -> Array:
+            """Return A + B of every tile."""
+            return np.asarray(strands[beside[:, 0]] + strands[beside[:, 1]])
 
-
-class _Equations:
-    """A palm's stick–slip problem, all of it that does not depend on the load.
-
-    Tensions are in units of the mean contact stiffness (so they are lengths). The unknowns are the
-    a of `complementarity`, one for each pulley with friction, s′ = ρ s + ω a with ω = 1/ρ − ρ. They
-    give all the strands s = G a + g s_0, with s_0 by the tendon's length, and from these the slips
-    δ = (k x − A − B)/(k + k_p) and the travels V (δ − δ_before).
-    """
-
-    def __init__(self, palm: PalmTendon) -> None:
-        self.k = np.array(palm.contact_stiffness)
-        self.scale = self.k.mean()
-        kappa = self.k / self.scale
-        self.compliance = 1.0 / (kappa + palm.spring_stiffness / self.scale)
-        self.pull = self.compliance * kappa
-        ratio, self.travel_of_slip, self.strands = _thread(palm)
         # G and g: products of the ratios between two strands
         logs = np.concatenate([[0.0], np.cumsum(np.log(ratio))])
         decay = np.tril(np.exp(np.minimum(logs[:, None] - logs[None, :], 0.0)))
         by_first, by_a = decay[:, 0], decay[:, 1:] * (1.0 / ratio - ratio)
         weight = np.zeros(len(logs))
-        np.add.at(weight, self.strands, self.compliance[:, None])
-        self.by_load = by_first / (weight @ by_first)
-        self.by_a = by_a - np.outer(self.by_load, weight @ by_a)
-        self.travel_by_a = -self.travel_of_slip @ (self.compliance[:, None] * self._pair(self.by_a))
-
-    def _pair(self, strands: Array) -> Array:
-        """Return A + B of every tile."""
-        return np.asarray(strands[self.strands[:, 0]] + strands[self.strands[:, 1]])
-
-    def solve(self, travel: float, slip_before: Array) -> PalmState:
-        """Return the palm's state at a travel, from where its tiles lagged before."""
-        constant = self.by_load * (self.pull.sum() * travel)
-        slip = self.pull * travel - self.compliance * self._pair(constant)
+        np.add.at(weight, beside, compliance[:, None])
+        by_load = by_first / (weight @ by_first)
+        by_a = by_a - np.outer(by_load, weight @ by_a)
+        constant = by_load * pull.sum()
         a = stick_slip(
-            (self.travel_by_a, self.travel_of_slip @ (slip - slip_before)),
-            (self.by_a[:-1], constant[:-1]),
+            (
+                -travel_of_slip @ (compliance[:, None] * pair(by_a)),
+                travel_of_slip @ (pull - compliance * pair(constant)),
+            ),
+            (by_a[:-1], constant[:-1]),
         )
-        strands = self.by_a @ a + constant
-        tiles = travel * (1.0 - self.pull) + self.compliance * self._pair(strands)
-        return PalmState(travel, tiles, self.k * tiles, self.scale * strands[self.strands])
+        travel = 1.0 - pull + compliance * pair(by_a @ a + constant)
+        return PalmSharing(k * travel, travel)
 
 
 def _thread(palm: PalmTendon) -> tuple[Array, Array, Indices]:
@@ -267,9 +194,7 @@ def share_load(
         If the complementarity problem ends without a solution.
     """
     stiffness = tuple(float(k) for k in contact_stiffness)
-    palm = PalmTendon(stiffness, spring_stiffness, friction, own_friction)
-    state = palm.advance(palm.rest(), 1.0)
-    return PalmSharing(state.tile_loads, state.tile_travel, state.strands)
+    return PalmTendon(stiffness, spring_stiffness, friction, own_friction).sharing()
 
 
 @lru_cache(maxsize=4096)

@@ -126,7 +126,7 @@ def _grid(points: Array) -> Triangles:
 
 def _round_outline(hold: Cylinder | Edge, hand: Array) -> Array:
     """Return the outline (x, z) of a hold with a round crest, near a hand."""
-    radius, faces = hold.profile_radius, hold.faces
+    radius, sine, cosine = hold.swept.radius, hold.swept.sine, hold.swept.cosine
     # points of the circle are at angles from the crest; flat faces begin where it ends
     end = math.pi / 2.0 - hold.angle / 2.0 if isinstance(hold, Edge) else math.inf
     over = math.atan2(float(hand[0]), radius - float(hand[2]))
@@ -134,10 +134,11 @@ def _round_outline(hold: Cylinder | Edge, hand: Array) -> Array:
     half = min(math.pi, 2.0 * AROUND / radius)
     t = np.linspace(max(middle - half, -end), min(middle + half, end), STEPS + 1)
     arc = np.column_stack([radius * np.sin(t), radius - radius * np.cos(t)])
-    if not len(faces):
+    if not sine:
         return arc
     far = float(np.abs(hand).max()) + 4.0 * AROUND
-    return np.vstack([arc[0] + far * faces[1], arc, arc[-1] + far * faces[0]])
+    ends = arc[0] + far * np.array([-sine, cosine]), arc[-1] + far * np.array([sine, cosine])
+    return np.vstack([ends[0], arc, ends[1]])
 
 
 def _cap(semi_axes: Array, hand: Array) -> Triangles:

@@ -18,7 +18,7 @@ from hand_models.finger import (
 )
 from hand_models.hand.tightening import resting_tensions
 from hand_models.rock import Profile
-from hand_models.sections import FlatSection, PolylineSection, RoundSection
+from hand_models.sections import Disc, PolylineSection, Wall
 from tests.suite.helpers.fingers import (
     GRASPS,
     any_hold,
@@ -199,12 +199,12 @@ def test_on_a_cylinder_phalanges_come_to_the_rock_one_after_the_other():
 
 
 def test_on_flat_rock_a_path_ends_as_laid():
-    closed = close_one(FlatSection((0.0, 1.0), H), ROCK, 37.0)
+    closed = close_one(Wall(1j, H), ROCK, 37.0)
     np.testing.assert_allclose(closed.finger.joint_angles, 0.0, atol=1e-4)
     assert kinds(closed) == [("face", None)] * 3
     along = [contact.along for contact in closed.finger.contacts]
     np.testing.assert_allclose(along, MODEL.tile_centre, atol=2e-4)
-    laid = settle_finger(MODEL, FlatSection((0.0, 1.0), H), (0.0, 0.0))
+    laid = settle_finger(MODEL, Wall(1j, H), (0.0, 0.0))
     normals = laid.normals(laid.shears(37.0)) @ [1.0, 37.0]
     np.testing.assert_allclose(closed.normals @ [1.0, 37.0], normals, atol=0.2)
 
@@ -271,9 +271,8 @@ def test_fingers_close_together_as_they_do_alone(seed):
 def test_what_is_scaled_closes_alike(seed):
     """Lengths by a, forces by b: springs' torques by a b, stiffness of the bed by b / a."""
     rng = np.random.default_rng(seed)
-    section = RoundSection(
-        (float(rng.uniform(0.0, 0.1)), float(rng.uniform(0.05, 0.2))), float(rng.uniform(0.02, 0.1))
-    )
+    centre = complex(rng.uniform(0.0, 0.1), rng.uniform(0.05, 0.2))
+    section = Disc(centre, float(rng.uniform(0.02, 0.1)))
     tension, strength = float(rng.uniform(15.0, 60.0)), float(rng.uniform(10.0, 80.0))
     a, b = 1.25, 3.0
     long = ("joint_spacing", "tile_height", "tile_centre", "tile_length", "spine_travel")
@@ -283,7 +282,7 @@ def test_what_is_scaled_closes_alike(seed):
         numbers[name] = tuple(a * b * each for each in getattr(MODEL, name))
     numbers["bed_stiffness"] = MODEL.bed_stiffness * b / a
     larger = FingerModel(**{**vars(MODEL), **numbers})
-    disc = RoundSection((a * section.centre[0], a * section.centre[1]), a * section.radius)
+    disc = Disc(a * section.centre, a * section.radius)
     surfaces = [Surface.from_values({"shear_limit": each * strength}) for each in (1.0, b)]
     one = close_one(section, surfaces[0], tension)
     other = close_one(disc, surfaces[1], b * tension, model=larger)
@@ -305,7 +304,7 @@ def test_the_same_rock_told_otherwise_is_the_same(seed):
     into = complex(-math.sin(turn), math.cos(turn))
     offset = float(rng.uniform(H, 0.03))
     line = into * (offset + 1j * np.array([0.3, -0.3]))
-    flat = close_one(FlatSection((into.real, into.imag), offset), ROCK, 37.0)
+    flat = close_one(Wall(complex(into.real, into.imag), offset), ROCK, 37.0)
     drawn = close_one(
         PolylineSection([np.column_stack([line.real, line.imag])], faceted=True), ROCK, 37.0
     )
@@ -347,7 +346,7 @@ def test_a_little_change_of_the_rock_changes_little():
     ]
     one, other = (
         close_all(
-            MODEL, [OpenFinger(RoundSection((x, z + dz), r), ROCK, 37.0) for (x, z), r in discs]
+            MODEL, [OpenFinger(Disc(complex(x, z + dz), r), ROCK, 37.0) for (x, z), r in discs]
         )
         for dz in (0.0, 1e-6)
     )
@@ -372,14 +371,14 @@ def test_a_finger_that_snaps_ends_alike_at_every_tension():
 
 
 def test_a_finger_in_the_rock_says_how_deep_and_how_to_leave_it():
-    section = FlatSection((0.0, 1.0), -0.06)
+    section = Wall(1j, -0.06)
     refused = close_one(section, ROCK, 37.0)
     assert isinstance(refused, Refused)
     # its joint is that deep, and the tiles' faces or the bar's end deeper still
     assert 0.06 < refused.depth < 0.2
-    higher = close_one(FlatSection((0.0, 1.0), -0.06 + refused.lift + 1e-6), ROCK, 37.0)
+    higher = close_one(Wall(1j, -0.06 + refused.lift + 1e-6), ROCK, 37.0)
     assert isinstance(higher, ClosedFinger)
-    lower = close_one(FlatSection((0.0, 1.0), -0.06 + refused.lift - 1e-4), ROCK, 37.0)
+    lower = close_one(Wall(1j, -0.06 + refused.lift - 1e-4), ROCK, 37.0)
     assert isinstance(lower, Refused)
 
 
@@ -391,18 +390,18 @@ def test_a_finger_in_the_rock_says_how_deep_and_how_to_leave_it():
     ],
 )
 def test_a_finger_amid_rock_cannot_be_lifted_out_of_it(radius):
-    refused = close_one(RoundSection((0.05, 0.0), radius), ROCK, 37.0)
+    refused = close_one(Disc(0.05 + 0j, radius), ROCK, 37.0)
     assert isinstance(refused, Refused)
     assert refused.depth > 0.0
     assert math.isinf(refused.lift)
 
 
 def test_a_straight_finger_clings_where_no_rock_is_in_its_way():
-    free = cling(MODEL, FlatSection((0.0, 1.0), 0.008))
+    free = cling(MODEL, Wall(1j, 0.008))
     assert isinstance(free, ClosedFinger)
     np.testing.assert_array_equal(free.finger.joint_angles, 0.0)
     assert not free.finger.bearing
-    deep = cling(MODEL, FlatSection((0.0, 1.0), 0.002))
+    deep = cling(MODEL, Wall(1j, 0.002))
     assert isinstance(deep, Refused)
     assert deep.depth == pytest.approx(H - 0.002, abs=5e-5)
     assert isinstance(cling(MODEL, None), ClosedFinger)

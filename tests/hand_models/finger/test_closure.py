@@ -8,7 +8,7 @@ import pytest
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface
 from hand_models.finger import OpenFinger, close_all, settle_finger
-from hand_models.sections import RoundSection
+from hand_models.sections import Disc
 from tests.suite.helpers.hands import HAND, PINCH, ROCK
 
 MODEL = HAND.finger
@@ -41,7 +41,7 @@ def test_a_pinch_whose_palm_is_far_from_the_rock_holds_without_its_proximal_cont
         assert distal[0] in ("face", "edge")
     plain = settle_finger(
         MODEL,
-        RoundSection((0.03226 - 0.06615, stand_off + 0.15 + 0.0006), 0.15),
+        Disc(complex(0.03226 - 0.06615, stand_off + 0.15 + 0.0006), 0.15),
         (0.0, 0.0),
     )
     assert plain.contacts[0].angle > settled.fingers[1].contacts[0].angle

@@ -152,8 +152,7 @@ def test_without_rock_a_nail_turns_by_half_a_turn_and_carries_nothing():
     assert contacts(settled) == ["none"] * 4
     np.testing.assert_allclose(settled.nail_angles, math.pi)
     # 0.025 N·m/rad over π rad, on 7.5 mm
-    assert HAND.nail.retracting_tension == pytest.approx(10.47, abs=0.01)
-    assert closing_sequence(settled)[0].stages[0].ends == HAND.nail.retracting_tension
+    assert closing_sequence(settled)[0].stages[0].ends == pytest.approx(10.47, abs=0.01)
     space = wrench_space(settled)
     assert not any("nail" in name for name in space.columns)
     assert not np.abs(space.generators).any()

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 from hand_models import Plane, spiny_hand
 from hand_models.finger import Contact, SettledFinger, settle_finger
-from hand_models.sections import LEVEL, FlatSection, RoundSection
+from hand_models.sections import LEVEL, Disc, Wall
 from tests.suite.helpers.rocks import distance, random_axes, random_hold
 
 MODEL = spiny_hand().finger
@@ -28,9 +28,7 @@ def on_circle(radius, first_contact=0.0247, first_angle=0.25):
     u = np.array([math.cos(first_angle), math.sin(first_angle)])
     n = np.array([-u[1], u[0]])
     centre = first_contact * u + (radius + H) * n
-    return settle_finger(
-        MODEL, RoundSection((float(centre[0]), float(centre[1])), radius), (0.0, 0.0)
-    )
+    return settle_finger(MODEL, Disc(complex(*centre), radius), (0.0, 0.0))
 
 
 def random_finger(seed):
@@ -95,7 +93,7 @@ def test_contacts_lie_on_the_rock_and_tangent_faces_do_not_cut_it(seed):
 def off_disc(stand_off, radius=0.3):
     """A finger whose joint is off the crest of a disc."""
     centre = np.array([0.0, stand_off + radius])
-    return settle_finger(MODEL, RoundSection((0.0, float(centre[1])), radius), (0.0, 0.0)), centre
+    return settle_finger(MODEL, Disc(complex(*centre), radius), (0.0, 0.0)), centre
 
 
 def test_a_phalanx_that_touches_beyond_its_tile_holds_by_its_edge_if_spines_reach():
@@ -125,16 +123,14 @@ def test_a_bare_frame_presses_where_spines_cannot_reach():
     u = np.array([math.cos(angle), math.sin(angle)])
     n = np.array([-u[1], u[0]])
     centre = 0.042 * u + (H + 0.003) * n
-    contact = settle_finger(
-        MODEL, RoundSection((centre[0], centre[1]), 0.003), (0.0, 0.0)
-    ).contacts[0]
+    contact = settle_finger(MODEL, Disc(complex(*centre), 0.003), (0.0, 0.0)).contacts[0]
     assert (contact.kind, contact.stop) == ("frame", None)
     assert contact.angle == pytest.approx(angle, abs=1e-9)
     assert contact.along == pytest.approx(0.042, abs=1e-9)
 
 
 def test_from_a_joint_close_to_the_rock_a_tile_touches_with_its_near_edge():
-    section = RoundSection((0.0, 0.303), 0.3)
+    section = Disc(0.303j, 0.3)
     contact = settle_finger(MODEL, section, (0.0, 0.0)).contacts[0]
     assert (contact.kind, contact.along) == ("edge", MODEL.tile_range[0])
     assert np.hypot(*(contact.point(H) - np.array([0.0, 0.303]))) == pytest.approx(0.3, abs=1e-9)
@@ -157,7 +153,7 @@ def test_phalanges_form_a_chain_within_their_joints_limits(seed):
 
 
 def test_on_flat_rock_at_tile_height_every_tile_lies_flat_at_its_centre():
-    finger = settle_finger(MODEL, FlatSection((0.0, 1.0), H), (0.0, 0.0))
+    finger = settle_finger(MODEL, Wall(1j, H), (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, 0.0, atol=1e-12)
     assert [c.along for c in finger.contacts] == [MODEL.tile_centre] * 3
     assert all(finger.touching)

@@ -1,7 +1,5 @@
 """How near a phalanx is to rock: the level of a bed of springs, and where its force acts."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -13,7 +11,7 @@ from hand_models.finger.phalanx_gaps import (
     fan_out,
     nearest_points,
 )
-from hand_models.sections import FlatSection, Outlines, RoundSection
+from hand_models.sections import Disc, Outlines, Wall
 from tests.suite.helpers.hands import HAND
 
 MODEL = HAND.finger
@@ -37,7 +35,7 @@ def beside(section, angle, joint=0.0, depth=DEPTH):
 
 
 def flat(offset):
-    return FlatSection((0.0, 1.0), offset)
+    return Wall(1j, offset)
 
 
 def test_a_bar_is_as_high_as_its_tile_and_as_thick_as_the_frame():
@@ -77,7 +75,7 @@ def test_the_force_wanders_to_the_edge_of_a_face_that_tilts_without_a_jump():
 def test_on_rock_that_bends_away_it_acts_where_the_distance_is_least():
     for along in (0.012, 0.02, 0.028):
         centre = along + 1j * (H + 0.05)
-        found = beside(RoundSection((centre.real, centre.imag), 0.05), 0.0)
+        found = beside(Disc(centre, 0.05), 0.0)
         assert found.place.real == pytest.approx(along, abs=3e-4)
         assert found.push == pytest.approx(1j, abs=0.02)
         assert -5.0 * SHAPE.fine < found.gap < 5.0 * SHAPE.fine
@@ -85,12 +83,12 @@ def test_on_rock_that_bends_away_it_acts_where_the_distance_is_least():
 
 def test_the_end_of_a_phalanx_presses_as_a_disc():
     """On rock right ahead of it, and on rock behind its back."""
-    wall = FlatSection((1.0, 0.0), SHAPE.end + SHAPE.radius)
+    wall = Wall(1.0 + 0j, SHAPE.end + SHAPE.radius)
     found = beside(wall, 0.0)
     assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
     assert found.place == pytest.approx(SHAPE.end + SHAPE.radius, abs=3e-4)
     assert found.push == pytest.approx(1.0, abs=0.05)
-    behind = FlatSection((0.0, -1.0), SHAPE.radius)
+    behind = Wall(-1j, SHAPE.radius)
     found = beside(behind, 0.0)
     assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
     assert found.place == pytest.approx(complex(SHAPE.end, -SHAPE.radius), abs=5e-3)
@@ -100,7 +98,7 @@ def test_the_end_of_a_phalanx_presses_as_a_disc():
 def test_the_gap_of_the_tile_leaves_out_the_frame():
     """A rung under the end of the phalanx: on the bar, but off the tile."""
     centre = complex(SHAPE.end, SHAPE.radius + 0.003)
-    found = beside(RoundSection((centre.real, centre.imag), 0.003), 0.0)
+    found = beside(Disc(centre, 0.003), 0.0)
     corner = complex(SHAPE.far, SHAPE.lift)
     assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
     off = abs(centre - corner) - 0.003 - SHAPE.radius
@@ -127,10 +125,10 @@ def test_the_gap_falls_by_the_arm_of_the_push(seed):
     rng = np.random.default_rng(seed)
     if rng.random() < 0.5:
         turn = rng.uniform(-0.5, 0.8)
-        section = FlatSection((-math.sin(turn), math.cos(turn)), float(rng.uniform(0.005, 0.03)))
+        section = Wall(1j * np.exp(1j * turn), float(rng.uniform(0.005, 0.03)))
     else:
         r = float(rng.uniform(0.01, 0.3))
-        section = RoundSection((float(rng.uniform(0.0, 0.1)), r + float(rng.uniform(0.0, 0.03))), r)
+        section = Disc(complex(rng.uniform(0.0, 0.1), r + rng.uniform(0.0, 0.03)), r)
     q = rng.uniform(-0.2, 0.6, 3)
     # level = gap + fine
     found, joints, u = bed(section, q, SHAPE.fine)
@@ -153,7 +151,7 @@ def test_gaps_are_within_a_few_of_the_least_distance():
     for _ in range(40):
         r = float(rng.uniform(0.005, 0.3))
         centre = complex(rng.uniform(0.01, 0.04), H + r + rng.uniform(0.0, 0.005))
-        found = beside(RoundSection((centre.real, centre.imag), r), 0.0)
+        found = beside(Disc(centre, r), 0.0)
         part = np.linspace(0.0, 1.0, 4001)
         corner = complex(SHAPE.far, SHAPE.lift)
         axis = np.concatenate(
@@ -179,7 +177,7 @@ def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
     """Where they are, and wherever they may yet turn to."""
     rng = np.random.default_rng(seed)
     r, turn = float(rng.uniform(0.003, 0.3)), float(rng.choice([0.0, 1e-7, 1e-3]))
-    round_rock = RoundSection((float(rng.uniform(0.0, 0.1)), r + float(rng.uniform(0.0, 0.03))), r)
+    round_rock = Disc(complex(rng.uniform(0.0, 0.1), r + rng.uniform(0.0, 0.03)), r)
     rock = Outlines.of([flat(H), round_rock], 0.2, SHAPE.spacing, NEAREST)
     q, depth = rng.uniform(-0.1, 0.4, (2, 3)), rng.uniform(0.0, 5e-4, (2, 3))
     near = nearest_points(rock, SHAPE, q, depth, turn)

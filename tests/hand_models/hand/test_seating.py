@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Pose, Sphere
 from hand_models.rock import Mesh, Profile
+from hand_models.sections import Face
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import cylinder_mesh, distance, random_mesh, random_profile
 from tests.suite.helpers.shares import given_some
@@ -50,12 +51,12 @@ def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
         assert gaps.min() < 3e-3
     if seating.rule in ("pinch", "palm_on_rock"):
         model = HAND.finger
-        face = model.tile_range[0], model.joint_spacing, model.tile_height
+        face = Face(model.tile_range[0], model.joint_spacing, model.tile_height)
         along = []
         for side in (1.0, -1.0):
             joint = seating.pose.inverse().apply(HAND.inner_joint * [1.0, side, 1.0])
             section = hold.section(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-            rest = section.rest((0.0, 0.0), *face, model.joint_lower[0], model.joint_upper[0])
+            rest = section.rest(0j, face, model.joint_lower[0], model.joint_upper[0])
             along.append(model.joint_spacing if rest is None else rest.distance)
         assert np.mean(along) == pytest.approx(HAND.seated_contact, abs=2e-4)
 

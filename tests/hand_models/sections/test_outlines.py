@@ -8,12 +8,12 @@ from hypothesis import given, settings, strategies as st
 
 from hand_models import Cylinder, Edge
 from hand_models.sections import (
-    FlatSection,
+    Disc,
     Outlines,
     PolylineSection,
-    ProfileSection,
-    RoundSection,
+    Wall,
 )
+from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import random_axes, random_ellipsoid, random_mesh, random_profile
 
 REACH, SPACING = 0.16, 5e-4
@@ -33,10 +33,10 @@ def random_smooth(rng):
     kind = rng.integers(5)
     if kind == 0:
         turn = rng.uniform(-3.0, 3.0)
-        return FlatSection((math.cos(turn), math.sin(turn)), float(rng.uniform(-0.1, 0.1)))
+        return Wall(complex(math.cos(turn), math.sin(turn)), float(rng.uniform(-0.1, 0.1)))
     if kind == 1:
         centre = rng.uniform(-0.1, 0.1, 2)
-        return RoundSection((float(centre[0]), float(centre[1])), float(rng.uniform(0.01, 0.3)))
+        return Disc(complex(*centre), float(rng.uniform(0.01, 0.3)))
     hold = (
         Edge(float(rng.uniform(0.01, 0.1)), float(rng.uniform(0.5, 3.0))),
         Cylinder(float(rng.uniform(0.05, 1.0))),
@@ -100,7 +100,7 @@ def test_distances_of_many_places_are_their_clearances_one_by_one(kind, seed):
 
 @pytest.mark.parametrize("offset", [0.0, 0.05, -0.1])
 def test_flat_rock_is_as_long_as_within_reach(offset):
-    points, lengths = outlines(FlatSection((0.6, 0.8), offset))
+    points, lengths = outlines(Wall(complex(0.6, 0.8), offset))
     assert lengths.sum() == pytest.approx(2.0 * math.sqrt(REACH**2 - offset**2), abs=2 * SPACING)
     np.testing.assert_allclose((points * (0.6 - 0.8j)).real, offset, atol=1e-12)
 
@@ -108,21 +108,21 @@ def test_flat_rock_is_as_long_as_within_reach(offset):
 @pytest.mark.parametrize("radius", [0.02, 0.05, 0.1])
 def test_a_disc_within_reach_is_as_long_as_its_circle(radius):
     centre = 0.03 + 0.01j
-    points, lengths = outlines(RoundSection((centre.real, centre.imag), radius))
+    points, lengths = outlines(Disc(centre, radius))
     assert lengths.sum() == pytest.approx(math.tau * radius, rel=1e-3)
     np.testing.assert_allclose(np.abs(points - centre), radius, atol=SPACING**2 / radius)
 
 
 def test_a_large_disc_is_as_long_as_its_arc_within_reach():
     centre, radius = 0.32j, 0.3
-    _, lengths = outlines(RoundSection((centre.real, centre.imag), radius))
+    _, lengths = outlines(Disc(centre, radius))
     cosine = (0.32**2 + radius**2 - REACH**2) / (2.0 * 0.32 * radius)
     assert lengths.sum() == pytest.approx(2.0 * radius * math.acos(cosine), abs=3 * SPACING)
 
 
 def test_an_upright_cut_of_a_cylinder_is_a_circle():
     """The same points as the disc's, up to where along it they begin."""
-    section = ProfileSection(np.eye(2), np.array([0.01, -0.02]), 0.06)
+    section = Ellipse(-0.01 + 0.08j, (1.0 + 0j, 0j), 0.06, 1.0)
     points, lengths = outlines(section)
     # the crest is where the profile is zero
     centre = -0.01 + 0.08j
@@ -134,7 +134,7 @@ def test_an_upright_cut_of_a_cylinder_is_a_circle():
 
 def test_an_edge_has_its_rounding_and_both_faces():
     half = math.radians(45.0)
-    section = ProfileSection(np.eye(2), np.array([0.0, -0.03]), 0.01, half)
+    section = Edge(0.01, 2.0 * half).section([0.0, 0.0, -0.03], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     points, _ = outlines(section)
     # as far from its axis as the rounding, along their normals
     normals = np.exp(1j * np.radians([-45.0, -135.0]))
@@ -167,8 +167,8 @@ def test_closed_rock_is_seen_all_around():
 
 def test_what_is_out_of_reach_is_left_out():
     for section in (
-        FlatSection((0.0, 1.0), 0.2),
-        RoundSection((0.0, 0.5), 0.3),
+        Wall(1j, 0.2),
+        Disc(0.5j, 0.3),
         PolylineSection([np.array([[-1.0, 0.2], [1.0, 0.2]])]),
         None,
     ):
@@ -177,7 +177,7 @@ def test_what_is_out_of_reach_is_left_out():
 
 
 def test_fingers_with_less_rock_are_filled_with_places_far_off():
-    rock = Outlines.of([None, FlatSection((0.0, 1.0), 0.0)], REACH, SPACING, 96)
+    rock = Outlines.of([None, Wall(1j, 0.0)], REACH, SPACING, 96)
     assert rock.points.shape == rock.lengths.shape
     assert rock.points.shape[0] == 2
     assert rock.points.shape[1] >= 96

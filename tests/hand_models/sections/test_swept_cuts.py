@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.rock import Hold
-from hand_models.sections import Face, SmoothCut, cut_of
+from hand_models.sections import Face, SmoothSection
 from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import distance, random_axes, random_ellipsoid, random_hold
 
@@ -20,12 +20,9 @@ seeds = st.integers(0, 2**32 - 1)
 FACE = Face(0.0085, 0.0431, 0.0047)
 
 
-def cut_through(hold: Hold, origin: np.ndarray, axes: np.ndarray) -> SmoothCut | None:
+def cut_through(hold: Hold, origin: np.ndarray, axes: np.ndarray) -> SmoothSection | None:
     """The rock in the plane of the first and the third axis."""
-    shape = hold.swept
-    scale = np.array(shape[:3])
-    start = scale * (origin - [0.0, 0.0, shape.depth])
-    return cut_of(shape, (*(scale * axes[:, 0]), *(scale * axes[:, 2]), *start))
+    return hold.section(origin, axes[:, 0], axes[:, 2])
 
 
 def random_cut(seed: int):
@@ -128,6 +125,33 @@ def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
         assert away(grid).min() > -1e-9
 
 
+@settings(max_examples=150, deadline=None)
+@given(seeds)
+def test_a_face_rests_where_it_first_meets_the_rock(seed):
+    """By the rock's distance function alone: clear until then, and on it there."""
+    found = random_cut(seed)
+    if found is None:
+        return
+    cut, away, joint = found
+    low, high = -0.5, 1.7
+    along = np.linspace(FACE.start, FACE.end, 100)
+
+    def clearance(angle, along):
+        return away(joint + (along + 1j * FACE.height) * np.exp(1j * np.asarray(angle)))
+
+    if not cut.clear(joint, cmath.rect(1.0, low), FACE) or clearance(low, along).min() <= 1e-6:
+        return
+    rest = cut.rest(joint, FACE, low, high)
+    angles = np.linspace(low, high if rest is None else rest.angle - 1e-5, 100)
+    # what a sample between two places may miss of the sharpest edge
+    missed = (along[1] - along[0]) ** 2 / 8.0 / 10.0**-3
+    assert clearance(angles[:, None], along).min() > -missed
+    if rest is not None:
+        near = 1e-4 if rest.flat else 1e-9
+        assert abs(clearance(rest.angle, rest.distance)) < near
+        assert clearance(rest.angle, along).min() > -max(near, missed)
+
+
 def test_the_kinds_of_cuts():
     level, tilted = np.eye(3), random_axes(np.random.default_rng(2), 0.5)
     origin = np.array([0.05, 0.0, -0.02])
@@ -152,19 +176,19 @@ def test_the_kinds_of_cuts():
     ("hold", "origin", "along", "into"),
     [
         (Plane(), (0.0, 0.0, -0.01), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        (Cylinder(0.3), (0.0, 0.0, -0.01), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        (Cylinder(0.3), (0.16, 0.0, -0.01), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
         (Sphere(0.1), (0.0, 0.06, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         (Ellipsoid((0.2, 0.1, 0.3)), (0.0, 0.11, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     ],
 )
-def test_a_plane_beside_the_rock_or_along_its_axis_has_no_cut(hold, origin, along, into):
+def test_a_plane_beside_the_rock_has_no_cut(hold, origin, along, into):
     axes = np.column_stack([along, np.cross(into, along), into])
     assert cut_through(hold, np.array(origin), axes) is None
 
 
 def test_an_ellipse_in_hand_worked_places():
     """Half axes 2 along x and 1 along z about 3i: G = x²/4 + z²."""
-    oval = Ellipse(3j, 0.625, complex(-0.375, 0.0), 0.25, 1.0, 1.0)
+    oval = Ellipse(3j, (0.75 + 0j, -0.25 + 0j), 1.0, 1.0)
     assert oval.distance(3j) == pytest.approx(-1.0)
     assert oval.distance(0j) == pytest.approx(2.0)
     # the lowest place is straight ahead of a face that is one above its phalanx
