@@ -60,6 +60,13 @@ MEASURES: Final[dict[Measure, str]] = {
 largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y.
 """
 
+GOALS: Final[dict[Measure, tuple[float, float, float]]] = {
+    "shear": (1.0, 0.0, 0.0),
+    "normal": (0.0, -1.0, 0.0),
+    "moment": (0.0, 0.0, 1.0),
+}
+"""Directions in which a hull's farthest wrench is a measure."""
+
 PARAMETER_STUDIES: Final = "parameter_studies"
 """Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
 
@@ -175,13 +182,9 @@ def limit(points: Array, measure: Measure) -> Limit:
     EmptySetError
         If no wrench of the hull is in question.
     """
-    if measure == "normal":
-        goal, planes = np.array([0.0, -1.0, 0.0]), np.zeros((0, 3))
-    elif measure == "moment":
-        goal, planes = np.array([0.0, 0.0, 1.0]), np.zeros((0, 3))
-    else:
-        ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
-        goal, planes = np.array([1.0, 0.0, 0.0]), np.array([[1.0, 0.0, -ratio]])
+    goal = np.array(GOALS[measure])
+    ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
+    planes = np.array([[1.0, 0.0, -ratio]] if measure == "shear" else np.zeros((0, 3)))
     result = linprog(
         -points @ goal,
         A_eq=np.vstack([planes @ points.T, np.ones(len(points))]),

@@ -10,10 +10,9 @@ it, and what lies on a face counts as within: nothing jumps where a wrench cross
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, Indices
@@ -28,7 +27,6 @@ __all__ = [
     "distance_along",
     "extents",
     "in_paper_signs",
-    "label_solid",
     "section",
     "vertices",
     "volume",
@@ -39,12 +37,6 @@ UNITS: Final = SCALE[list(PLANAR)]
 
 PULL_OFF: Final = (0.0, 1.0, 0.0)
 """Normal of the cut that keeps F_z ≤ 0, the part of a hull that the paper shows."""
-
-LABEL_GAP: Final = 8.0
-"""Between numbers and labels of three-dimensional axes [pt]."""
-
-CORNER: Final = 0.1
-"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
 
 
 class Extents(NamedTuple):
@@ -188,19 +180,3 @@ def _outermost(flat: Array, slack: float) -> Indices:
         return np.asarray(hull(flat).vertices, dtype=np.intp)
     along = flat @ axes[0]
     return np.unique([along.argmin(), along.argmax()] if widths[0] > slack else [0])
-
-
-def label_solid(axes: Any, title: str) -> None:
-    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
-    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(5))
-        axis.labelpad = LABEL_GAP
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        corner = CORNER * (high - low)
-        ticks = MaxNLocator(4).tick_values(low, high)
-        axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
-    axes.invert_zaxis()
-    axes.set_box_aspect(None, zoom=0.85)
-    axes.view_init(elev=25.0, azim=-50.0)

@@ -26,8 +26,8 @@ class Coarse:
 
         return self.module.run(tell, hand, *self.settings)
 
-    def plot(self, result, folder):
-        return self.module.plot(result, folder)
+    def plot(self, result):
+        return self.module.plot(result)
 
 
 def coarse(module, folder, *settings):
