@@ -15,10 +15,18 @@ from matplotlib.figure import Figure
 
 from hand_models.base import EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments.force_limits import MEASURES, Measure, force_limits, rest_state
+from hand_models.experiments.force_limits import (
+    GOALS,
+    MEASURES,
+    HullPoints,
+    Measure,
+    rest_state,
+    sharpened,
+)
 from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend
 from hand_models.experiments.study_result import StudyResult, told
 from hand_models.experiments.sweep_axis import Axis, Conditions
+from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["Cell", "Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
@@ -56,10 +64,19 @@ def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence
     state = rest_state(grasp)
     if state != "holds" or not measures:
         return Cell(state, {})
+    limits: dict[Measure, float] = {}
     try:
-        return Cell(state, force_limits(grasp, RAYS, measures, CUTS, STARTS))
+        points = HullPoints.explored(grasp, RAYS)
+        for measure in measures:
+            if measure in GOALS:
+                points, end = sharpened(grasp, points, measure, CUTS, STARTS)
+                limits[measure] = end.value
     except EmptySetError:
         return Cell("contact fails", {})
+    if "volume" in measures:
+        below = clipped_vertices(points.wrenches)
+        limits["volume"] = volume(below) if len(below) else 0.0
+    return Cell(state, limits)
 
 
 def sweep_map(

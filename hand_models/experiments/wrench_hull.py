@@ -20,7 +20,6 @@ from hand_models.compliance import PLANAR
 from hand_models.wrench_spaces import SCALE, TOLERANCE, hull, hull_facets
 
 __all__ = [
-    "PULL_OFF",
     "UNITS",
     "Extents",
     "clipped_vertices",
@@ -34,9 +33,6 @@ __all__ = [
 
 UNITS: Final = SCALE[list(PLANAR)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
-
-PULL_OFF: Final = (0.0, 1.0, 0.0)
-"""Normal of the cut that keeps F_z ≤ 0, the part of a hull that the paper shows."""
 
 
 class Extents(NamedTuple):
@@ -74,30 +70,18 @@ def volume(points: Array) -> float:
     return float(hull(points * UNITS).volume / np.prod(UNITS))
 
 
-def clipped_vertices(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
-    """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
+def clipped_vertices(points: Array) -> Array:
+    """Return the vertices of the part of a hull with F_z ≤ 0, which the paper shows, shape (k, 3).
 
-    None, shape (0, 3), if no vertex of the hull is below the plane.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Wrenches [N, N, N·m].
-    normal : array_like, shape (3,)
-        By default `PULL_OFF`.
-    offset : float
+    None, shape (0, 3), if no vertex of the hull is below.
     """
-    way = np.asarray(normal, dtype=float) / UNITS
-    height = (points @ np.asarray(normal, dtype=float) - offset) / np.linalg.norm(way)
-    slack = _slack(points)
+    height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():
         return np.zeros((0, 3))
     if (height <= slack).all():
         return vertices(points)
-    met = _met(points, height, slack)
     # exactly on the plane: the part's face there is one face
-    beyond = (met @ np.asarray(normal, dtype=float) - offset) / (way @ way)
-    face = met - beyond[:, None] * way / UNITS
+    face = _met(points, height, slack) * (1.0, 0.0, 1.0)
     return vertices(np.vstack([points[height < -slack], face]))
 
 

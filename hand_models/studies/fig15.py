@@ -42,6 +42,7 @@ TENSIONS: Final = 29
 """How many are tried."""
 
 RAYS: Final = 2000
+CUTS: Final = 12
 STARTS: Final = 4
 """Of each hull, before its limits are looked for; and of each search for them."""
 
@@ -58,17 +59,8 @@ SLACK: Final = 0.02
 by local search."""
 
 
-def run(
-    progress: Progress, hand: ParameterTable, tensions: int = TENSIONS, rays: int = RAYS
-) -> StudyResult:
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Compute the limits at evenly spaced tensions.
-
-    Parameters
-    ----------
-    progress : Progress
-    hand : ParameterTable
-    tensions, rays : int, optional
-        How many tensions, and rays of each first hull.
 
     Raises
     ------
@@ -78,13 +70,13 @@ def run(
     table = gripper_table(hand)
     settings = experiment_table()
     least, most = settings.vector("fig15", "tensions")
-    tried = np.linspace(least, most, tensions)
+    tried = np.linspace(least, most, TENSIONS)
     diameters = settings.vector(PARAMETER_STUDIES, "diameters")
     each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
-    found = [_at(conditions.gripper(table), rays) for conditions in told(progress, each)]
+    found = [_at(conditions.gripper(table)) for conditions in told(progress, each)]
     curves = []
     for i, diameter in enumerate(diameters):
-        rows = found[i * tensions : (i + 1) * tensions]
+        rows = found[i * TENSIONS : (i + 1) * TENSIONS]
         columns = {key: [row[key] for row in rows] for key in rows[0]}
         curves.append(
             {
@@ -105,13 +97,13 @@ def run(
     return StudyResult("fig15", title, data, tuple(_claims(tried, curves)))
 
 
-def _at(grasp: Gripper, rays: int) -> dict[str, Any]:
+def _at(grasp: Gripper) -> dict[str, Any]:
     """Return the limits of a gripper, and what is behind them."""
     state = rest_state(grasp)
     try:
-        points = HullPoints.explored(grasp, rays)
-        points, _ = sharpened(grasp, points, "shear", starts=STARTS)
-        points, normal = sharpened(grasp, points, "normal", starts=STARTS)
+        points = HullPoints.explored(grasp, RAYS)
+        points, _ = sharpened(grasp, points, "shear", CUTS, STARTS)
+        points, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
         # the points added for one limit may raise the other
         shear = limit(points.wrenches, "shear")
     except EmptySetError:

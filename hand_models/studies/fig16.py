@@ -37,7 +37,8 @@ __all__ = ["plot", "run"]
 
 POINTS: Final = 16
 COARSE_POINTS: Final = 6
-"""Radii along an axis, at the printed tension and at the lower one; the latter among the former."""
+"""Radii along an axis, at the printed tension and at the lower one; the latter among the former:
+``POINTS - 1`` is a multiple of ``COARSE_POINTS - 1``."""
 
 MEASURES_SHOWN: Final[tuple[Measure, ...]] = ("shear", "normal")
 SURFACES: Final = ("A", "B")
@@ -49,28 +50,17 @@ UNMOVED: Final = 1e-6
 """Newtons per millimetre of radius below which a contact force does not depend on it."""
 
 
-def run(
-    progress: Progress, hand: ParameterTable, points: int = POINTS, coarse: int = COARSE_POINTS
-) -> StudyResult:
-    """Compute the maps of both surfaces, and coarser ones at a lower tension.
-
-    Parameters
-    ----------
-    progress : Progress
-    hand : ParameterTable
-    points, coarse : int, optional
-        Radii along an axis at the printed tension and at the lower one; the coarse radii must be
-        among the others to be compared: ``points - 1`` a multiple of ``coarse - 1``.
-    """
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
+    """Compute the maps of both surfaces, and coarser ones at a lower tension."""
     table = gripper_table(hand)
     usual = dict(zip(SURFACES, Conditions.of_fig16(), strict=True))
     tension = experiment_table().scalar("fig16", "lower_tension")
     lower = {name: replace(conditions, tension=tension) for name, conditions in usual.items()}
     # limits at the lower tension at fewer radii, but whether it holds at all of them
     jobs: list[tuple[str, dict[str, Conditions], int, Sequence[Measure]]] = [
-        ("maps", usual, points, MEASURES_SHOWN),
-        ("maps_at_lower_tension", lower, coarse, MEASURES_SHOWN),
-        ("states_at_lower_tension", lower, points, ()),
+        ("maps", usual, POINTS, MEASURES_SHOWN),
+        ("maps_at_lower_tension", lower, COARSE_POINTS, MEASURES_SHOWN),
+        ("states_at_lower_tension", lower, POINTS, ()),
     ]
     done, total = 0, sum(n * n * len(surfaces) for _, surfaces, n, _ in jobs)
     data: dict[str, Any] = {}

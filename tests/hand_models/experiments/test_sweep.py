@@ -10,13 +10,14 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     Axis,
     Conditions,
+    HullPoints,
     Sweep,
     radius_axes,
     rest_state,
+    sharpened,
     sweep_cell,
     sweep_map,
 )
-from hand_models.experiments.force_limits import force_limits
 from hand_models.experiments.pictures import entry_name
 from hand_models.experiments.sweep import CUTS, RAYS, STARTS
 from hand_models.parameters import ParameterTable, Quantity, hand_table
@@ -81,7 +82,9 @@ def test_a_cell_is_what_the_gripper_holds(table):
     grasp = CONDITIONS.gripper(table)
     cell = sweep_cell(table, CONDITIONS, ["shear", "normal"])
     assert cell.state == rest_state(grasp)
-    assert cell.limits == force_limits(grasp, RAYS, ["shear", "normal"], CUTS, STARTS)
+    points, shear = sharpened(grasp, HullPoints.explored(grasp, RAYS), "shear", CUTS, STARTS)
+    _, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
+    assert cell.limits == {"shear": shear.value, "normal": normal.value}
 
 
 def test_the_rows_of_a_grid_are_those_of_y(table):
