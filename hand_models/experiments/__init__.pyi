@@ -8,36 +8,37 @@ from .force_limits import (
     sharpened as sharpened,
 )
 from .hard_stop import PalmExperiment as PalmExperiment
+from .pictures import (
+    conditions_title as conditions_title,
+    draw_map as draw_map,
+    label_solid as label_solid,
+    legend as legend,
+    panels as panels,
+)
 from .pulling import (
-    BALANCED as BALANCED,
     DRAGGED as DRAGGED,
     UNBALANCED as UNBALANCED,
     Pulled as Pulled,
     even_pulls as even_pulls,
     pull as pull,
+    pulled_off_poses as pulled_off_poses,
     unloaded as unloaded,
     wrist_poses as wrist_poses,
 )
 from .study_result import (
     Claim as Claim,
     StudyResult as StudyResult,
-    save_picture as save_picture,
+    part as part,
+    told as told,
 )
 from .sweep import (
     Cell as Cell,
     Sweep as Sweep,
-    failing as failing,
-    map_data as map_data,
     radius_axes as radius_axes,
     sweep_cell as sweep_cell,
-    sweep_grid as sweep_grid,
+    sweep_map as sweep_map,
 )
 from .sweep_axis import Axis as Axis, Conditions as Conditions
-from .sweep_picture import (
-    conditions_title as conditions_title,
-    draw_map as draw_map,
-    legend as legend,
-)
 from .wrench_hull import (
     UNITS as UNITS,
     Extents as Extents,
@@ -45,7 +46,6 @@ from .wrench_hull import (
     distance_along as distance_along,
     extents as extents,
     in_paper_signs as in_paper_signs,
-    label_solid as label_solid,
     section as section,
     vertices as vertices,
     volume as volume,

@@ -13,35 +13,30 @@ from typing import Final, Literal
 import numpy as np
 from scipy.optimize import brentq, linprog
 
-from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, SolverError
+from hand_models.base import Array, EmptySetError, Indices, SolverError
 from hand_models.compliance import (
     PLANAR,
     Farthest,
     Gripper,
     boundary,
     farthest,
-    pulled_off,
-    sandpaper,
     search_box,
 )
-from hand_models.experiments.wrench_hull import PULL_OFF, clipped_vertices, in_paper_signs, volume
-from hand_models.parameters import ParameterTable, experiment_table
-from hand_models.tile import Surface
+from hand_models.experiments.wrench_hull import in_paper_signs
+from hand_models.parameters import experiment_table
 from hand_models.wrench_spaces import Row
 
 __all__ = [
+    "GOALS",
     "MEASURES",
     "PARAMETER_STUDIES",
-    "SANDPAPER",
     "HullPoints",
     "Limit",
     "Measure",
     "State",
-    "force_limits",
     "limit",
     "rest_state",
     "sharpened",
-    "surface_named",
     "unloaded_pose",
 ]
 
@@ -60,17 +55,18 @@ MEASURES: Final[dict[Measure, str]] = {
 largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y.
 """
 
+GOALS: Final[dict[Measure, tuple[float, float, float]]] = {
+    "shear": (1.0, 0.0, 0.0),
+    "normal": (0.0, -1.0, 0.0),
+    "moment": (0.0, 0.0, 1.0),
+}
+"""Directions in which a hull's farthest wrench is a measure."""
+
 PARAMETER_STUDIES: Final = "parameter_studies"
 """Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
 
-SANDPAPER: Final = "sandpaper-36"
-"""The preset in whose place stands what the gripper's experiments tell of the same sandpaper."""
-
 MIRRORED: Final = np.array([-1.0, 1.0, -1.0])
 """Of a pose or a wrench, when left and right change places."""
-
-CUTS: Final = 12
-"""How many points are added for one limit at most."""
 
 GAIN: Final = 1e-3
 """What a new point must promise to be worth another, relative to the limit."""
@@ -145,22 +141,6 @@ class Limit:
     weights: Array
 
 
-def surface_named(name: str, table: ParameterTable) -> Surface:
-    """Return what a tile of the gripper holds on a surface of ``surfaces.toml``.
-
-    Raises
-    ------
-    InvalidInputError
-        If there is none of that name.
-    """
-    if name == SANDPAPER:
-        return sandpaper(table)
-    try:
-        return pulled_off(Surface.named(name), table)
-    except InvalidInputError as error:
-        raise error.within("surface") from None
-
-
 def limit(points: Array, measure: Measure) -> Limit:
     """Return how far the hull of some wrenches goes.
 
@@ -175,18 +155,14 @@ def limit(points: Array, measure: Measure) -> Limit:
     EmptySetError
         If no wrench of the hull is in question.
     """
-    if measure == "normal":
-        goal, planes = np.array([0.0, -1.0, 0.0]), np.zeros((0, 3))
-    elif measure == "moment":
-        goal, planes = np.array([0.0, 0.0, 1.0]), np.zeros((0, 3))
-    else:
-        ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
-        goal, planes = np.array([1.0, 0.0, 0.0]), np.array([[1.0, 0.0, -ratio]])
+    goal = np.array(GOALS[measure])
+    ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
+    planes = np.array([[1.0, 0.0, -ratio]] if measure == "shear" else np.zeros((0, 3)))
     result = linprog(
         -points @ goal,
         A_eq=np.vstack([planes @ points.T, np.ones(len(points))]),
         b_eq=np.append(np.zeros(len(planes)), 1.0),
-        A_ub=(points @ PULL_OFF)[None],
+        A_ub=points[None, :, 1],
         b_ub=[0.0],
         method="highs",
     )
@@ -200,14 +176,14 @@ def limit(points: Array, measure: Measure) -> Limit:
         wrench=result.x @ points,
         direction=goal
         + result.eqlin.marginals[:-1] @ planes
-        + result.ineqlin.marginals[0] * np.array(PULL_OFF),
+        + result.ineqlin.marginals[0] * np.array([0.0, 1.0, 0.0]),
         corners=corners,
         weights=result.x[corners],
     )
 
 
 def sharpened(
-    grasp: Gripper, points: HullPoints, measure: Measure, cuts: int = CUTS, starts: int = 1
+    grasp: Gripper, points: HullPoints, measure: Measure, cuts: int, starts: int
 ) -> tuple[HullPoints, Limit]:
     """Add points until the hull goes as far as local search finds, and return how far that is.
 
@@ -258,39 +234,6 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
         if end.reach - reached.max() > GAIN * abs(found.value):
             return end
     return None
-
-
-def force_limits(
-    grasp: Gripper, rays: int, measures: Sequence[Measure], cuts: int = CUTS, starts: int = 1
-) -> dict[Measure, float]:
-    """Return how far a gripper's hull goes, by measure.
-
-    Parameters
-    ----------
-    grasp : Gripper
-    rays : int
-        Of the first, coarse hull.
-    measures : sequence of str
-        Of `MEASURES`, whose units apply.
-    cuts, starts : int
-        For each, as of `sharpened`.
-
-    Raises
-    ------
-    EmptySetError
-        If nothing holds.
-    """
-    points = HullPoints.explored(grasp, rays)
-    found: dict[Measure, float] = {}
-    for measure in measures:
-        if measure == "volume":
-            continue
-        points, end = sharpened(grasp, points, measure, cuts, starts)
-        found[measure] = end.value
-    if "volume" in measures:
-        below = clipped_vertices(points.wrenches)
-        found["volume"] = volume(below) if len(below) else 0.0
-    return found
 
 
 def rest_state(grasp: Gripper) -> State:

@@ -68,15 +68,6 @@ class PalmExperiment:
         softest = np.array(stiffness) == min(stiffness)
         return float(sharing.tile_stiffness.sum() / sharing.tile_travel[softest].max())
 
-    def gain(self, sequence: Sequence[int], own: bool = False) -> float:
-        """Return what rods in place of bearings do to the load, relative to bearings everywhere.
-
-        Parameters
-        ----------
-        sequence : sequence of int
-            As of `load`.
-        own : bool, optional
-            Whether the palm's own pulleys are rods too.
-        """
-        with_rods = self.load(sequence, self.friction, self.friction if own else 0.0)
-        return with_rods / self.load(sequence, 0.0) - 1.0
+    def gain(self, sequence: Sequence[int]) -> float:
+        """Return what rods in place of the tiles' bearings do to the load, as a share of it."""
+        return self.load(sequence, self.friction) / self.load(sequence, 0.0) - 1.0

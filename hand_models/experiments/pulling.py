@@ -8,19 +8,27 @@ signs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, EmptySetError, Indices
+from hand_models.base import Array, EmptySetError, Indices, Progress
 from hand_models.compliance import SIDES, STEP, Gripper, Numbers
 from hand_models.experiments.wrench_hull import UNITS, in_paper_signs
 from hand_models.finger import PHALANGES
 
-__all__ = ["DRAGGED", "UNBALANCED", "Pulled", "even_pulls", "pull", "unloaded", "wrist_poses"]
+__all__ = [
+    "DRAGGED",
+    "UNBALANCED",
+    "Pulled",
+    "even_pulls",
+    "pull",
+    "pulled_off_poses",
+    "unloaded",
+    "wrist_poses",
+]
 
 DRAGGED: Final = "dragged_backwards"
 UNBALANCED: Final = "no_pose"
@@ -117,9 +125,21 @@ def unloaded(gripper: Gripper) -> Array:
     return np.asarray(poses[0])
 
 
-def pull(
-    gripper: Gripper, directions: Array, progress: Callable[[Array], None] | None = None
-) -> Pulled:
+def pulled_off_poses(gripper: Gripper, pulls: Array) -> Array:
+    """Return the poses at ascending pulls straight off [N], up to the last that can be balanced.
+
+    Limits are not looked at.
+    """
+    at, poses = np.zeros((1, 3)), []
+    for force in pulls:
+        at, residual = wrist_poses(gripper, np.array([[0.0, -force, 0.0]]), at)
+        if not residual[0] <= BALANCED:
+            break
+        poses.append(at[0])
+    return np.array(poses)
+
+
+def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) -> Pulled:
     """Load a gripper along directions of the wrench until something lets go.
 
     Parameters
@@ -128,7 +148,7 @@ def pull(
     directions : ndarray, shape (m, 3)
         Of any length.
     progress : callable, optional
-        Told which directions are done, as booleans of shape (m,), after each increment.
+        Told how many directions are done, of how many, after each increment.
 
     Raises
     ------
@@ -157,7 +177,7 @@ def pull(
         going[over] = increments[over] >= FINEST
         going &= loads < LARGEST
         if progress is not None:
-            progress(~going)
+            progress(m - int(going.sum()), m)
     tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
     fails = [
         (None, None) if way == UNBALANCED else tiles[tile]

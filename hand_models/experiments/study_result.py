@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, TypeVar
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from hand_models.base import Progress
 
-from hand_models.base import whole_file
+__all__ = ["Claim", "StudyResult", "part", "told"]
 
-__all__ = ["Claim", "StudyResult", "save_picture"]
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,9 @@ class StudyResult:
     name, title : str
         Its name, such as ``fig06``, and what it is about.
     data : dict
-        The figure's data, as JSON can write it, SI units. ``not_tested``, if there, lists in words
-        what the paper says and nothing published can decide; ``summary`` what else a person
-        should read.
+        The figure's data, SI units: what JSON can write, and arrays. ``not_tested``, if there,
+        lists in words what the paper says and nothing published can decide; ``summary`` what else
+        a person should read.
     claims : tuple of Claim
     hand : dict
         By section and name, the entries in which the hand is not the bundled one; filled in by
@@ -61,8 +60,14 @@ class StudyResult:
     hand: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def save_picture(figure: Figure, path: Path) -> Path:
-    """Write a figure of a study as PNG."""
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
-    return path
+def told(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
+    """Yield items, and tell how many of them are done."""
+    for done, item in enumerate(items):
+        progress(done, len(items))
+        yield item
+    progress(len(items), len(items))
+
+
+def part(progress: Progress, start: int, end: int, total: int) -> Progress:
+    """Return what tells the progress of a part of the work, from ``start`` to ``end`` of all."""
+    return lambda done, of: progress(start + (end - start) * done // of, total)

@@ -5,9 +5,9 @@ Fig. 16 is such a map, over the pulley radii of the middle and the distal joint.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,23 +15,21 @@ from matplotlib.figure import Figure
 
 from hand_models.base import EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments.force_limits import MEASURES, Measure, force_limits, rest_state
-from hand_models.experiments.study_result import StudyResult, save_picture
+from hand_models.experiments.force_limits import (
+    GOALS,
+    MEASURES,
+    HullPoints,
+    Measure,
+    rest_state,
+    sharpened,
+)
+from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend
+from hand_models.experiments.study_result import StudyResult, told
 from hand_models.experiments.sweep_axis import Axis, Conditions
-from hand_models.experiments.sweep_picture import NO_GRASP, conditions_title, draw_map, legend
+from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = [
-    "Cell",
-    "Sweep",
-    "failing",
-    "map_data",
-    "plot",
-    "radius_axes",
-    "run",
-    "sweep_cell",
-    "sweep_grid",
-]
+__all__ = ["Cell", "Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
 
 RAYS: Final = 300
 CUTS: Final = 4
@@ -66,21 +64,46 @@ def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence
     state = rest_state(grasp)
     if state != "holds" or not measures:
         return Cell(state, {})
+    limits: dict[Measure, float] = {}
     try:
-        return Cell(state, force_limits(grasp, RAYS, measures, CUTS, STARTS))
+        points = HullPoints.explored(grasp, RAYS)
+        for measure in measures:
+            if measure in GOALS:
+                points, end = sharpened(grasp, points, measure, CUTS, STARTS)
+                limits[measure] = end.value
     except EmptySetError:
         return Cell("contact fails", {})
+    if "volume" in measures:
+        below = clipped_vertices(points.wrenches)
+        limits["volume"] = volume(below) if len(below) else 0.0
+    return Cell(state, limits)
 
 
-def sweep_grid(
+def sweep_map(
     table: ParameterTable,
     x: Axis,
     y: Axis,
     conditions: Conditions,
     measures: Sequence[Measure],
-    tell: Progress,
-) -> list[list[Cell]]:
-    """Return the cells of a map, a row for each value of ``y``.
+    progress: Progress,
+) -> dict[str, Any]:
+    """Return what a gripper holds over two of its numbers, enough to draw it again.
+
+    Parameters
+    ----------
+    table : ParameterTable
+        The gripper's.
+    x, y : Axis
+        Of the columns and of the rows.
+    conditions : Conditions
+    measures : sequence of str
+    progress : Progress
+
+    Returns
+    -------
+    dict
+        ``state`` of each cell, ``limits`` by measure, not a number where there are none, the share
+        of cells that are ``failing``, and of what: ``conditions``, ``x``, ``y``.
 
     Raises
     ------
@@ -88,22 +111,29 @@ def sweep_grid(
         If there is no grasp with the table's own values.
     """
     conditions.gripper(table)
-    total = len(x.values) * len(y.values)
-    rows: list[list[Cell]] = []
-    for j, up in enumerate(y.values):
-        row = []
-        for i, across in enumerate(x.values):
-            tell(j * len(x.values) + i, total)
-            row.append(sweep_cell(y.set(x.set(table, across), up), conditions, measures))
-        rows.append(row)
-    tell(total, total)
-    return rows
-
-
-def failing(rows: Sequence[Sequence[Cell]]) -> float:
-    """Return the share of a map's cells without limits."""
-    states = [cell.state != "holds" for row in rows for cell in row]
-    return sum(states) / len(states)
+    cells = [
+        sweep_cell(y.set(x.set(table, across), up), conditions, measures)
+        for up, across in told(progress, list(itertools.product(y.values, x.values)))
+    ]
+    shape = len(y.values), len(x.values)
+    state = np.array([cell.state for cell in cells]).reshape(shape)
+    sides = {
+        name: {
+            "entry": axis.entry,
+            "unit": axis.unit,
+            "values": axis.values,
+            "current": axis.current(table),
+        }
+        for name, axis in (("x", x), ("y", y))
+    }
+    limits = {m: np.array([cell.limits.get(m, np.nan) for cell in cells]) for m in measures}
+    return {
+        "conditions": asdict(conditions),
+        **sides,
+        "state": state,
+        "limits": {measure: values.reshape(shape) for measure, values in limits.items()},
+        "failing": float((state != "holds").mean()),
+    }
 
 
 def radius_axes(table: ParameterTable, points: int = POINTS) -> tuple[Axis, Axis]:
@@ -161,20 +191,19 @@ class Sweep:
         x, y = axes
         if x.entry == y.entry:
             raise InvalidInputError(f"must not be that of --x, {x.entry}", field="--y")
-        rows = sweep_grid(table, x, y, conditions, self.measures, progress)
-        if all(cell.state == NO_GRASP for row in rows for cell in row):
+        found = sweep_map(table, x, y, conditions, self.measures, progress)
+        if (found["state"] == NO_GRASP).all():
             # tells why
             conditions.gripper(y.set(x.set(table, x.values[0]), y.values[0]))
-        current = sweep_cell(table, conditions, self.measures)
         data = {
-            **map_data(table, x, y, conditions, self.measures, rows),
+            **found,
             "tile_shear_limit": grasp.surface.shear_limit,
-            "current": current._asdict(),
-            "summary": _summary(x, y, rows, self.measures),
+            "current": sweep_cell(table, conditions, self.measures)._asdict(),
+            "summary": _summary(found),
         }
         return StudyResult("sweep", f"{x.entry} and {y.entry}: what the gripper holds", data, ())
 
-    def plot(self, result: StudyResult, folder: Path) -> list[Path]:
+    def plot(self, result: StudyResult) -> dict[str, Figure]:
         """Draw a map for each measure."""
         data = result.data
         measures: list[Measure] = list(data["limits"])
@@ -185,50 +214,23 @@ class Sweep:
             draw_map(axes, data, measure)
         legend(figure, [data])
         figure.suptitle(conditions_title(data["conditions"]))
-        return [save_picture(figure, folder / "sweep.png")]
+        return {"sweep": figure}
 
 
-def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Compute the map of the default axes and conditions."""
-    return Sweep().run(progress, hand)
+run, plot = Sweep().run, Sweep().plot
+"""Of the study without options: the axes and the conditions of Fig. 16."""
 
 
-def plot(result: StudyResult, folder: Path) -> list[Path]:
-    """Draw a map for each measure."""
-    return Sweep().plot(result, folder)
-
-
-def map_data(
-    table: ParameterTable,
-    x: Axis,
-    y: Axis,
-    conditions: Conditions,
-    measures: Sequence[Measure],
-    rows: Sequence[Sequence[Cell]],
-) -> dict[str, Any]:
-    """Return a map as JSON can write it, enough to draw it again; a limit is null where none is."""
-    return {
-        "conditions": asdict(conditions),
-        "x": {"entry": x.entry, "unit": x.unit, "values": x.values, "current": x.current(table)},
-        "y": {"entry": y.entry, "unit": y.unit, "values": y.values, "current": y.current(table)},
-        "state": [[cell.state for cell in row] for row in rows],
-        "limits": {m: [[cell.limits.get(m) for cell in row] for row in rows] for m in measures},
-        "failing": failing(rows),
-    }
-
-
-def _summary(
-    x: Axis, y: Axis, rows: Sequence[Sequence[Cell]], measures: Sequence[Measure]
-) -> list[str]:
-    """Return in words where the map works and where it is best."""
-    lines = [f"{failing(rows):.0%} of the cells fail before any load"]
-    cells = [(cell, i, j) for j, row in enumerate(rows) for i, cell in enumerate(row)]
-    for measure in measures:
-        held = [(cell.limits[measure], i, j) for cell, i, j in cells if cell.limits]
+def _summary(found: dict[str, Any]) -> list[str]:
+    """Return in words where a map works and where it is best."""
+    lines = [f"{found['failing']:.0%} of the cells fail before any load"]
+    for measure, limits in found["limits"].items():
+        held = [(v, i, j) for (j, i), v in np.ndenumerate(limits) if np.isfinite(v)]
         if held:
-            best, i, j = max(held)
-            lines.append(
-                f"most {measure}: {best:.4g} {MEASURES[measure]} at {x.entry} = {x.values[i]:.4g} "
-                f"{x.unit}, {y.entry} = {y.values[j]:.4g} {y.unit}"
+            best, *place = max(held)
+            there = ", ".join(
+                f"{side['entry']} = {side['values'][k]:.4g} {side['unit']}"
+                for side, k in zip((found["x"], found["y"]), place, strict=True)
             )
+            lines.append(f"most {measure}: {best:.4g} {MEASURES[measure]} at {there}")
     return lines

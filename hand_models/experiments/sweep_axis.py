@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.compliance import Gripper
-from hand_models.experiments.force_limits import PARAMETER_STUDIES, surface_named
+from hand_models.compliance import Gripper, pulled_off
+from hand_models.experiments.force_limits import PARAMETER_STUDIES
 from hand_models.parameters import (
     LARGEST,
     ParameterTable,
@@ -20,11 +20,15 @@ from hand_models.parameters import (
     hand_table,
     own_hand,
 )
+from hand_models.tile import Surface
 
 __all__ = ["CONCRETE", "Axis", "Conditions"]
 
 CONCRETE: Final = "concrete-fine"
 """The surface of Figs. 15 and 16."""
+
+SANDPAPER: Final = "sandpaper-36"
+"""The preset in whose place stands what the gripper's experiments tell of the same sandpaper."""
 
 MOST_POINTS: Final = 201
 """Of an axis."""
@@ -76,9 +80,13 @@ class Conditions:
         InvalidInputError
             If a number is out of range, there is no such surface, or the fingers do not lie on it.
         """
-        if not (math.isfinite(self.tension) and self.tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {self.tension:g}", field="tension")
-        return Gripper(self.diameter, self.tension, surface_named(self.surface, table), table)
+        surface = None
+        if self.surface != SANDPAPER:
+            try:
+                surface = pulled_off(Surface.named(self.surface), table)
+            except InvalidInputError as error:
+                raise error.within("surface") from None
+        return Gripper(self.diameter, self.tension, surface, table)
 
 
 @dataclass(frozen=True)

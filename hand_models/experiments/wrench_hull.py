@@ -10,10 +10,9 @@ it, and what lies on a face counts as within: nothing jumps where a wrench cross
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, Indices
@@ -21,14 +20,12 @@ from hand_models.compliance import PLANAR
 from hand_models.wrench_spaces import SCALE, TOLERANCE, hull, hull_facets
 
 __all__ = [
-    "PULL_OFF",
     "UNITS",
     "Extents",
     "clipped_vertices",
     "distance_along",
     "extents",
     "in_paper_signs",
-    "label_solid",
     "section",
     "vertices",
     "volume",
@@ -36,15 +33,6 @@ __all__ = [
 
 UNITS: Final = SCALE[list(PLANAR)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
-
-PULL_OFF: Final = (0.0, 1.0, 0.0)
-"""Normal of the cut that keeps F_z ≤ 0, the part of a hull that the paper shows."""
-
-LABEL_GAP: Final = 8.0
-"""Between numbers and labels of three-dimensional axes [pt]."""
-
-CORNER: Final = 0.1
-"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
 
 
 class Extents(NamedTuple):
@@ -82,30 +70,18 @@ def volume(points: Array) -> float:
     return float(hull(points * UNITS).volume / np.prod(UNITS))
 
 
-def clipped_vertices(points: Array, normal: ArrayLike = PULL_OFF, offset: float = 0.0) -> Array:
-    """Return the vertices of the part of a hull with normal · w ≤ offset, shape (k, 3).
+def clipped_vertices(points: Array) -> Array:
+    """Return the vertices of the part of a hull with F_z ≤ 0, which the paper shows, shape (k, 3).
 
-    None, shape (0, 3), if no vertex of the hull is below the plane.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Wrenches [N, N, N·m].
-    normal : array_like, shape (3,)
-        By default `PULL_OFF`.
-    offset : float
+    None, shape (0, 3), if no vertex of the hull is below.
     """
-    way = np.asarray(normal, dtype=float) / UNITS
-    height = (points @ np.asarray(normal, dtype=float) - offset) / np.linalg.norm(way)
-    slack = _slack(points)
+    height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():
         return np.zeros((0, 3))
     if (height <= slack).all():
         return vertices(points)
-    met = _met(points, height, slack)
     # exactly on the plane: the part's face there is one face
-    beyond = (met @ np.asarray(normal, dtype=float) - offset) / (way @ way)
-    face = met - beyond[:, None] * way / UNITS
+    face = _met(points, height, slack) * (1.0, 0.0, 1.0)
     return vertices(np.vstack([points[height < -slack], face]))
 
 
@@ -188,19 +164,3 @@ def _outermost(flat: Array, slack: float) -> Indices:
         return np.asarray(hull(flat).vertices, dtype=np.intp)
     along = flat @ axes[0]
     return np.unique([along.argmin(), along.argmax()] if widths[0] > slack else [0])
-
-
-def label_solid(axes: Any, title: str) -> None:
-    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
-    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(5))
-        axis.labelpad = LABEL_GAP
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        corner = CORNER * (high - low)
-        ticks = MaxNLocator(4).tick_values(low, high)
-        axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
-    axes.invert_zaxis()
-    axes.set_box_aspect(None, zoom=0.85)
-    axes.view_init(elev=25.0, azim=-50.0)

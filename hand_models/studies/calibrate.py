@@ -14,20 +14,31 @@ the data exclude.
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
-from hand_models.base import Array, Progress
-from hand_models.compliance import gripper_table
-from hand_models.experiments import Claim, StudyResult, save_picture
-from hand_models.parameters import ParameterTable, hand_table
-from hand_models.studies.gripper_fit import Fit
+from hand_models.base import Array, CruxError, Progress, SolverError
+from hand_models.compliance import Gripper, boundary, gripper_table, linear_box
+from hand_models.experiments import (
+    Axis,
+    Claim,
+    StudyResult,
+    clipped_vertices,
+    extents,
+    in_paper_signs,
+    panels,
+    pulled_off_poses,
+)
+from hand_models.finger import PHALANGES
+from hand_models.parameters import ParameterTable, experiment_table, hand_table
 from hand_models.tile import Surface
 
-__all__ = ["plot", "run"]
+__all__ = ["Fit", "plot", "run"]
 
 FITS: Final = 25
 REFITS: Final = 10
@@ -39,6 +50,22 @@ BEFOREHAND: Final = 1.0 / np.sqrt(12.0)
 FIXED: Final = 0.5
 """A number counts as fixed by the data if they leave this share of what was unknown beforehand."""
 
+FORCE_TOLERANCE: Final = 0.3
+RELATIVE_TOLERANCE: Final = 0.1
+MOMENT_TOLERANCE: Final = 0.25
+"""Of Fig. 12's values [N] and relative; of the extents in force; of that in moment."""
+
+RAYS: Final = 3000
+"""Of the wrench space's boundary."""
+
+POWER: Final = 3
+"""To which residuals are raised, sign kept."""
+
+STEP: Final = 2e-3
+"""Of finite differences, in plausible ranges."""
+
+HOPELESS: Final = 30.0
+"""Residual where a set of numbers gives no gripper that holds."""
 
 SANDPAPER: Final = "sandpaper-36"
 
@@ -55,32 +82,156 @@ HELD: Final = (
 """Numbers that are held in turn at what plans have for the hand and for sandpaper."""
 
 
+def _numbers() -> tuple[Axis, ...]:
+    """Return the gripper's numbers to be found, each from the least to the most plausible."""
+    alone = (
+        *(("gripper", name) for name in ("base_half_spacing", "added_radius", "origin_height")),
+        *(("finger", name) for name in ("tile_height", "seated_contact")),
+    )
+    entries: list[tuple[str, str, int | None, str]] = [
+        *((section, name, None, name) for section, name in alone),
+        ("finger", "pulley_radii", 1, "middle_radius"),
+        ("finger", "pulley_radii", 2, "distal_radius"),
+        *(("tile", "engagement", i, "engagement") for i in range(len(PHALANGES))),
+        *(("gripper", "contact_stiffness", i, "contact_stiffness") for i in range(len(PHALANGES))),
+        *(("gripper", name, None, name) for name in ("shear_limit", "pull_off_slope")),
+    ]
+    table = experiment_table()
+    return tuple(
+        Axis(
+            section,
+            name,
+            index,
+            table.vector("calibration", plausible),
+            table.quantity("calibration", plausible).unit,
+        )
+        for section, name, index, plausible in entries
+    )
+
+
+class Fit:
+    """Residuals of the fifteen data over the numbers, each in plausible ranges from 0 to 1."""
+
+    def __init__(self, table: ParameterTable) -> None:
+        self.table = table
+        self.numbers = _numbers()
+        self.names = [number.entry.partition(".")[2] for number in self.numbers]
+        self.low, high = np.array([number.values for number in self.numbers]).T
+        self.width = high - self.low
+        data = experiment_table()
+        self.tension = data.scalar("fig12", "tension")
+        self.diameter = data.scalar("fig12", "diameter")
+        self.pull = data.scalar("fig12", "pull")
+        self.labels: list[str] = []
+        values: list[float] = []
+        for end in ("unloaded", "pulled"):
+            for kind in ("shear", "normal"):
+                values += data.vector("fig12", f"{kind}_{end}")
+                self.labels += [f"{phalanx} {kind}, {end}" for phalanx in PHALANGES]
+        self.labels += ["extent of F_x", "extent of F_z", "extent of M_y"]
+        far = [data.scalar("fig13", name) for name in ("force_x", "force_z", "moment")]
+        self.wanted = np.array([*values, *far])
+        self.tolerance = RELATIVE_TOLERANCE * np.abs(self.wanted)
+        self.tolerance[: len(values)].clip(FORCE_TOLERANCE, out=self.tolerance[: len(values)])
+        self.tolerance[-1] = MOMENT_TOLERANCE * abs(far[-1])
+
+    def start(self) -> Array:
+        """Return where the table is."""
+        now = [number.current(self.table) for number in self.numbers]
+        return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
+
+    def values(self, x: Array) -> Array:
+        """Return the numbers in SI units."""
+        return np.asarray(self.low + self.width * x)
+
+    def gripper(self, x: Array) -> Gripper:
+        """Return the gripper of some numbers."""
+        table = self.table
+        for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
+            table = number.set(table, value)
+        return Gripper(self.diameter, self.tension, table=table)
+
+    def model(self, x: Array) -> Array:
+        """Return what the model has for the fifteen data, shape (15,) [N, N·m].
+
+        Raises
+        ------
+        CruxError
+            If the fingers do not lie on the surface, or nothing holds.
+        """
+        gripper = self.gripper(x)
+        poses = pulled_off_poses(gripper, np.array([0.0, self.pull]))
+        if len(poses) < 2:
+            raise SolverError(f"no pose of the gripper balances a pull of {self.pull:g} N")
+        loads, _ = gripper.finger_loads(poses)
+        space = boundary(gripper, linear_box(gripper), RAYS)
+        far = extents(clipped_vertices(in_paper_signs(space.wrenches)))
+        return np.array([*np.hstack([loads.shears, loads.normals]).flat, *far])
+
+    def residuals(self, x: Array) -> Array:
+        """Return how many tolerances each datum is off, shape (15,)."""
+        try:
+            return np.asarray((self.model(x) - self.wanted) / self.tolerance)
+        except CruxError:
+            return np.full(len(self.wanted), HOPELESS)
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the residuals' slopes over plausible ranges, shape (15, n)."""
+        columns = []
+        for i in range(len(x)):
+            ends = [np.clip(x[i] + side * STEP, 0.0, 1.0) for side in (1.0, -1.0)]
+            there = [self.residuals(np.concatenate([x[:i], [end], x[i + 1 :]])) for end in ends]
+            columns.append((there[0] - there[1]) / (ends[0] - ends[1]))
+        return np.column_stack(columns)
+
+    def fitted(
+        self, x: Array, held: NDArray[np.bool_], rounds: int, tick: Callable[[], None]
+    ) -> Array:
+        """Return the numbers that fit best, some of them held."""
+        free = np.flatnonzero(~held)
+
+        def cubes(part: Array) -> Array:
+            tick()
+            whole = x.copy()
+            whole[free] = part
+            found = self.residuals(whole)
+            return np.asarray(np.sign(found) * np.abs(found) ** POWER)
+
+        best = least_squares(
+            cubes,
+            np.clip(x[free], STEP, 1.0 - STEP),
+            bounds=(0.0, 1.0),
+            diff_step=np.full(len(free), STEP),
+            max_nfev=rounds,
+        )
+        whole = x.copy()
+        whole[free] = best.x
+        return whole
+
+
 def _own(fit: Fit) -> Array:
     """Return the numbers as plans have them, of the hand and of sandpaper, shape (n,)."""
     hand = hand_table()
     joints = hand.vector("fingers", "inner_joint")
     axis, reach = hand.vector("fingers", "outer_axis"), hand.scalar("fingers", "outer_reach")
-    own = {
+    paper = Surface.named(SANDPAPER)
+    angle = paper.pull_off_angle
+    of_gripper = {
         "base_half_spacing": 0.5 * (joints[0] - (axis[0] - reach)),
         "added_radius": 0.0,
         "origin_height": -joints[2],
-        "tile_height": hand.scalar("finger", "tile_height"),
-        "seated_contact": hand.scalar("finger", "seated_contact"),
+        "contact_stiffness": hand.scalar("tile", "contact_stiffness"),
+        "shear_limit": paper.shear_limit,
+        # T + k P = T_max goes through f_min at its angle
+        "pull_off_slope": (paper.shear_limit / paper.pull_off_limit - math.cos(angle))
+        / math.sin(angle),
     }
-    own |= {f"contact_stiffness[{i}]": hand.scalar("tile", "contact_stiffness") for i in range(3)}
-    for entry, section in (
-        ("pulley_radii", "finger"),
-        ("engagement", "tile"),
-    ):
-        own |= {f"{entry}[{i}]": v for i, v in enumerate(hand.vector(section, entry))}
-    paper = Surface.named(SANDPAPER)
-    own["shear_limit"] = paper.shear_limit
-    # T + k P = T_max goes through f_min at its angle
-    angle = paper.pull_off_angle
-    own["pull_off_slope"] = (paper.shear_limit / paper.pull_off_limit - math.cos(angle)) / math.sin(
-        angle
+    return np.array(
+        [
+            of_gripper[number.name] if number.section == "gripper" else number.current(hand)
+            for number in fit.numbers
+        ]
     )
-    return np.array([own[number.label] for number in fit.numbers])
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -97,86 +248,79 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 
     start = fit.start()
     before = fit.residuals(start)
-    x = fit.fitted(start, (), FITS, tick)
+    x = fit.fitted(start, np.zeros(n, dtype=bool), FITS, tick)
     after = fit.residuals(x)
     if np.abs(after).max() > np.abs(before).max():
         x, after = start, before
     done = FITS * (n + 1)
     jacobian = fit.jacobian(x)
     spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(n) / BEFOREHAND**2)))
-    values = np.linalg.svd(jacobian, compute_uv=False)
     own = _own(fit)
     held = []
     for k, labels in enumerate(HELD):
         done = FITS * (n + 1) + 2 * n + k * REFITS * n
-        those = tuple(i for i, number in enumerate(fit.numbers) if number.label in labels)
-        fixed = x.copy()
-        fixed[list(those)] = ((own - fit.low) / fit.width)[list(those)]
-        again = fit.fitted(fixed, those, REFITS, tick)
-        found = fit.residuals(again)
+        those = np.isin(fit.names, labels)
+        fixed = np.where(those, (own - fit.low) / fit.width, x)
+        found = fit.residuals(fit.fitted(fixed, those, REFITS, tick))
         held.append(
             {
-                "held": list(labels),
-                "at": [float(own[i]) for i in those],
-                "worst": float(np.abs(found).max()),
+                "held": labels,
+                "at": own[those],
+                "worst": np.abs(found).max(),
                 "datum": fit.labels[int(np.abs(found).argmax())],
-                "root_mean_square": float(np.sqrt((found**2).mean())),
+                "root_mean_square": np.sqrt((found**2).mean()),
             }
         )
     progress(total, total)
-    at = fit.values(x)
     hand_residuals = fit.residuals((own - fit.low) / fit.width)
-    data: dict[str, Any] = {
+    model = fit.wanted + after * fit.tolerance
+    numbers = {
+        "recorded": fit.values(start),
+        "fitted": fit.values(x),
+        "hand": own,
+        "plausible": [number.values for number in fit.numbers],
+        "standard_error": spread * fit.width,
+        "share_of_range": spread,
+        "left_unknown": spread / BEFOREHAND,
+        "fixed_by_data": spread <= FIXED * BEFOREHAND,
+    }
+    data = {
         "residuals": [
-            {"datum": label, "wanted": w, "model": w + r * t, "tolerances_off": r}
-            for label, w, t, r in zip(
-                fit.labels,
-                fit.wanted.tolist(),
-                fit.tolerance.tolist(),
-                after.tolist(),
-                strict=True,
-            )
+            {"datum": label, "wanted": wanted, "model": found, "tolerances_off": off}
+            for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
         ],
         "numbers": [
             {
-                "name": number.label,
+                "name": name,
                 "unit": number.unit,
-                "recorded": float(was),
-                "fitted": float(value),
-                "hand": float(mine),
-                "plausible": [number.low, number.high],
-                "standard_error": float(error * width),
-                "share_of_range": float(error),
-                "left_unknown": float(error / BEFOREHAND),
-                "fixed_by_data": bool(error <= FIXED * BEFOREHAND),
+                **{key: values[i] for key, values in numbers.items()},
             }
-            for number, was, value, mine, error, width in zip(
-                fit.numbers, fit.values(start), at, own, spread, fit.width, strict=True
-            )
+            for i, (name, number) in enumerate(zip(fit.names, fit.numbers, strict=True))
         ],
-        "singular_values": values.tolist(),
+        "singular_values": np.linalg.svd(jacobian, compute_uv=False),
         "held": held,
-        "worst_before": float(np.abs(before).max()),
-        "worst_after": float(np.abs(after).max()),
-        "worst_with_the_hands_numbers": float(np.abs(hand_residuals).max()),
+        "worst_before": np.abs(before).max(),
+        "worst_after": np.abs(after).max(),
+        "worst_with_the_hands_numbers": np.abs(hand_residuals).max(),
     }
     claims = tuple(
         Claim(
             f"{label} ({'Fig. 13' if label.startswith('extent') else 'Fig. 12'})",
-            float(w),
-            float(w + r * t),
-            bool(abs(r) <= 1.0),
+            float(wanted),
+            float(found),
+            bool(abs(off) <= 1.0),
             role="calibration",
         )
-        for label, w, t, r in zip(fit.labels, fit.wanted, fit.tolerance, after, strict=True)
+        for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
     )
     return StudyResult("calibrate", "one set of numbers for Figs. 12 and 13", data, claims)
 
 
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw residuals, what the data fix, and what they exclude."""
-    figure = Figure(figsize=(16.0, 6.0), layout="constrained")
-    left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.2, 1.0))
+    figure, (left, middle, right) = panels(
+        1, 3, (16.0, 6.0), grid="x", width_ratios=(1.0, 1.2, 1.0)
+    )
     residuals = result.data["residuals"]
     places = np.arange(len(residuals))[::-1]
     left.barh(places, [r["tolerances_off"] for r in residuals], color="tab:blue")
@@ -188,8 +332,7 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
     rows = np.arange(len(numbers_found))[::-1]
     for row, number in zip(rows, numbers_found, strict=True):
         low, high = number["plausible"]
-        at = (number["fitted"] - low) / (high - low)
-        own = (number["hand"] - low) / (high - low)
+        at, own = ((number[which] - low) / (high - low) for which in ("fitted", "hand"))
         share = number["share_of_range"]
         colour = "tab:blue" if number["fixed_by_data"] else "0.6"
         middle.errorbar(at, row, xerr=share, fmt="o", color=colour, capsize=3)
@@ -211,6 +354,4 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
         xlabel="largest residual [tolerances]",
         title="numbers held as in plans, the rest fitted again",
     )
-    for axes in (left, middle, right):
-        axes.grid(axis="x", alpha=0.3)
-    return [save_picture(figure, folder / "calibrate.png")]
+    return {"calibrate": figure}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, save_picture
+from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, told
 from hand_models.parameters import ParameterTable
 from hand_models.tendon import share_load
 
@@ -29,6 +29,8 @@ SPRING_RANGE: Final = np.linspace(0.0, 3000.0, 61)
 EXACT: Final = 1e-9
 """Relative difference that still counts as the same."""
 
+Pair = tuple[int, int]
+
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Load every pair of springs with and without friction."""
@@ -36,24 +38,21 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     numbers = range(1, len(experiment.springs) + 1)
     pairs = list(itertools.combinations(numbers, 2))
     ordered = [order for pair in pairs for order in (pair, pair[::-1])]
-    alike = [(number, number) for number in numbers]
-    configurations = []
-    for done, pair in enumerate(ordered + alike):
-        progress(done, len(ordered + alike) + len(pairs))
-        configurations.append(_configuration(experiment, pair))
-    curves = []
-    for done, pair in enumerate(pairs):
-        progress(len(configurations) + done, len(configurations) + len(pairs))
-        curves.append(_curve(experiment, pair))
-    progress(len(configurations) + len(pairs), len(configurations) + len(pairs))
-    data: dict[str, Any] = {
-        "contact_springs": list(experiment.springs),
+    loaded = [*ordered, *((number, number) for number in numbers)]
+    jobs = [
+        *(partial(_configuration, experiment, pair) for pair in loaded),
+        *(partial(_curve, experiment, pair) for pair in pairs),
+    ]
+    found = [job() for job in told(progress, jobs)]
+    configurations, curves = found[: len(loaded)], found[len(loaded) :]
+    data = {
+        "contact_springs": experiment.springs,
         "preload_stiffness": experiment.preload_stiffness,
         "friction": experiment.friction,
         "configurations": configurations,
         "curves": curves,
-        "friction_axis": FRICTIONS.tolist(),
-        "preload_axis": SPRING_RANGE.tolist(),
+        "friction_axis": FRICTIONS,
+        "preload_axis": SPRING_RANGE,
         "preload_stiffness_at_printed_gain": _least_gain_is_printed(experiment, pairs),
         "not_tested": [
             "the measurements match the model within 5 %: they are printed in a picture only",
@@ -64,38 +63,36 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     return StudyResult("fig06", "two tiles sharing a load", data, claims)
 
 
-def _configuration(experiment: PalmExperiment, pair: tuple[int, int]) -> dict[str, Any]:
+def _configuration(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
     return {
-        "springs": list(pair),
+        "springs": pair,
         "load_without_friction": experiment.load(pair, 0.0),
         "load_with_friction": experiment.load(pair, experiment.friction),
         "gain": experiment.gain(pair),
     }
 
 
-def _curve(experiment: PalmExperiment, pair: tuple[int, int]) -> dict[str, Any]:
+def _curve(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
     """Return load over μ and gain over k_p of a pair, and where μ is best by Eq. 2."""
     k2, k1 = sorted(experiment.springs[number - 1] for number in pair)
     return {
-        "springs": list(pair),
+        "springs": pair,
         "best_friction": 2.0 * (k1 - k2) / (k1 + k2),
-        "load_over_friction": [experiment.load(pair, mu) for mu in FRICTIONS.tolist()],
-        "gain_over_preload_stiffness": [
-            experiment.with_preload(kp).gain(pair) for kp in SPRING_RANGE.tolist()
-        ],
+        "load_over_friction": np.array([experiment.load(pair, mu) for mu in FRICTIONS]),
+        "gain_over_preload_stiffness": np.array(
+            [experiment.with_preload(kp).gain(pair) for kp in SPRING_RANGE]
+        ),
     }
 
 
-def _least_gain_is_printed(
-    experiment: PalmExperiment, pairs: list[tuple[int, int]]
-) -> float | None:
+def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[Pair]) -> float | None:
     """Return the k_p at which the least gain of all pairs is the printed one [N/m], if any is."""
 
     def excess(stiffness: float) -> float:
         softer = experiment.with_preload(stiffness)
         return min(softer.gain(pair) for pair in pairs) - PRINTED_GAIN
 
-    softest, stiffest = float(SPRING_RANGE[0]), float(SPRING_RANGE[-1])
+    softest, stiffest = SPRING_RANGE[0], SPRING_RANGE[-1]
     if excess(softest) < 0.0 or excess(stiffest) > 0.0:
         return None
     return float(brentq(excess, softest, stiffest))
@@ -103,27 +100,26 @@ def _least_gain_is_printed(
 
 def _claims(
     experiment: PalmExperiment,
-    pairs: list[tuple[int, int]],
+    pairs: list[Pair],
     configurations: list[dict[str, Any]],
     curves: list[dict[str, Any]],
 ) -> tuple[Claim, ...]:
-    gains = {tuple(c["springs"]): c["gain"] for c in configurations}
-    least = min(gains[pair] for pair in pairs)
+    gains = {c["springs"]: c["gain"] for c in configurations}
     listed = ", ".join(f"{a}-{b} {100 * gains[a, b]:.1f} %" for a, b in pairs)
-    off_1 = max(_off_equation_1(experiment, pair) for pair in pairs)
-    off_3 = max(_off_equation_3(experiment, pair) for pair in pairs)
+    differences = np.array([_against_equations(experiment, pair) for pair in pairs])
+    (off_1, off_3, _), shifted = differences.max(axis=0), differences[:, 2].min()
     order = max(abs(gains[a, b] - gains[b, a]) for a, b in pairs)
-    shifted = min(_shift_to_the_stiffer(experiment, pair) for pair in pairs)
-    step = float(FRICTIONS[1] - FRICTIONS[0])
+    step = FRICTIONS[1] - FRICTIONS[0]
     off_2 = max(_off_equation_2(curve) for curve in curves)
-    share = 2.0 * (2.0 - 1.0) / (2.0 + 1.0)
-    matched = _share_at(share, experiment)
+    softer = experiment.springs[0]
+    matched = share_load([2.0 * softer, softer], experiment.preload_stiffness, 2.0 / 3.0)
+    shares = float(matched.tile_stiffness[0] / matched.tile_stiffness[1])
     return (
         Claim(
             "friction improves the maximum load by at least 14 % (Section 4.2)",
             ">= 14 %",
             listed,
-            least >= PRINTED_GAIN - EXACT,
+            min(gains[pair] for pair in pairs) >= PRINTED_GAIN - EXACT,
             role="calibration",
         ),
         Claim(
@@ -147,8 +143,8 @@ def _claims(
         Claim(
             "at force limits of 2:1, mu = 2/3 shares the load 2:1 (Section 4.1)",
             2.0,
-            matched,
-            abs(matched - 2.0) <= EXACT,
+            shares,
+            abs(shares - 2.0) <= EXACT,
         ),
         Claim(
             "friction shifts load to the stiffer contact (Section 4.1)",
@@ -165,102 +161,69 @@ def _claims(
     )
 
 
-def _stiffnesses(experiment: PalmExperiment, pair: tuple[int, int]) -> tuple[float, float]:
-    """Return k_1 ≥ k_2 of a pair."""
+def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, float, float]:
+    """Return how far a pair is off Eqs. 1 and 3, relatively, and what of its load friction shifts.
+
+    The load shifted is that which the stiffer contact carries more.
+    """
     k2, k1 = sorted(experiment.springs[number - 1] for number in pair)
-    return k1, k2
-
-
-def _off_equation_1(experiment: PalmExperiment, pair: tuple[int, int]) -> float:
-    (k1, k2), kp, mu = (
-        _stiffnesses(experiment, pair),
-        experiment.preload_stiffness,
-        experiment.friction,
-    )
+    kp, mu = experiment.preload_stiffness, experiment.friction
+    loads, without = (share_load([k1, k2], kp, friction).tile_stiffness for friction in (mu, 0.0))
     below = (2.0 - mu) * k1 + (2.0 + mu) * k2 + 4.0 * kp
-    expected = np.array(
+    by_1 = np.array(
         [
             2.0 * (2.0 + mu) * k1 * k2 + 4.0 * kp * k1,
             2.0 * (2.0 - mu) * k1 * k2 + 4.0 * kp * k2,
         ]
     )
-    loads = share_load([k1, k2], kp, mu).tile_stiffness
-    return float(np.abs(loads * below / expected - 1.0).max())
-
-
-def _off_equation_3(experiment: PalmExperiment, pair: tuple[int, int]) -> float:
-    (k1, k2), kp, mu = (
-        _stiffnesses(experiment, pair),
-        experiment.preload_stiffness,
-        experiment.friction,
+    by_3 = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
+    return (
+        float(np.abs(loads * below / by_1 - 1.0).max()),
+        abs(experiment.load(pair, mu) / by_3 - 1.0),
+        float(loads[0] / loads.sum() - without[0] / without.sum()),
     )
-    expected = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
-    return abs(experiment.load(pair, mu) / expected - 1.0)
 
 
 def _off_equation_2(curve: dict[str, Any]) -> float:
     """Return how far the first μ of the largest load is from Eq. 2."""
-    loads = np.array(curve["load_over_friction"])
-    first = int(np.argmax(loads >= loads.max() * (1.0 - EXACT)))
-    return abs(float(FRICTIONS[first]) - float(curve["best_friction"]))
+    loads = curve["load_over_friction"]
+    first = np.argmax(loads >= loads.max() * (1.0 - EXACT))
+    return float(abs(FRICTIONS[first] - curve["best_friction"]))
 
 
-def _share_at(friction: float, experiment: PalmExperiment) -> float:
-    """Return F_1/F_2 of two tiles with k_1 = 2 k_2."""
-    softer = experiment.springs[0]
-    sharing = share_load([2.0 * softer, softer], experiment.preload_stiffness, friction)
-    return float(sharing.tile_stiffness[0] / sharing.tile_stiffness[1])
-
-
-def _shift_to_the_stiffer(experiment: PalmExperiment, pair: tuple[int, int]) -> float:
-    shares = []
-    for mu in (0.0, experiment.friction):
-        stiffness = _stiffnesses(experiment, pair)
-        loads = share_load(stiffness, experiment.preload_stiffness, mu).tile_stiffness
-        shares.append(float(loads[0] / loads.sum()))
-    return shares[1] - shares[0]
-
-
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the paper's bars, and what the gain depends on."""
-    figure = Figure(figsize=(14.0, 4.6), layout="constrained")
-    bars, over_friction, over_springs = figure.subplots(1, 3, width_ratios=(1.2, 1.0, 1.0))
-    _draw_bars(bars, result.data)
+    data = result.data
+    figure, (bars, over_friction, over_springs) = panels(
+        1, 3, (14.0, 4.6), grid="y", width_ratios=(1.2, 1.0, 1.0)
+    )
+    _draw_bars(bars, data)
     # springs 1-3 and 2-3 gain alike: by Eq. 3 the gain depends on the stiffer one alone
-    for curve, style in zip(result.data["curves"], itertools.cycle(("-", "-", "--")), strict=False):
+    for curve, style in zip(data["curves"], itertools.cycle(("-", "-", "--")), strict=False):
         name = "-".join(map(str, curve["springs"]))
-        loads = np.array(curve["load_over_friction"])
-        (line,) = over_friction.plot(
-            result.data["friction_axis"], loads / loads[0], style, label=name
-        )
+        loads = curve["load_over_friction"]
+        (line,) = over_friction.plot(FRICTIONS, loads / loads[0], style, label=name)
         colour = line.get_color()
         over_friction.axvline(curve["best_friction"], color=colour, linestyle=":", linewidth=1.0)
-        over_springs.plot(
-            1e-3 * np.array(result.data["preload_axis"]),
-            100.0 * np.array(curve["gain_over_preload_stiffness"]),
-            style,
-            color=colour,
-            label=name,
-        )
+        gains = 100.0 * curve["gain_over_preload_stiffness"]
+        over_springs.plot(1e-3 * SPRING_RANGE, gains, style, color=colour, label=name)
     over_friction.set(
         xlabel="friction of a tile's pulley, μ [1]; dotted: Eq. 2",
         ylabel="maximum load over that without friction [1]",
         title="more friction than Eq. 2 adds nothing",
     )
-    over_friction.legend(title="springs")
     over_springs.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
-    used = 1e-3 * result.data["preload_stiffness"]
+    used = 1e-3 * data["preload_stiffness"]
     over_springs.axvline(used, color="0.4", linestyle="--", linewidth=1.0)
     over_springs.set(
         xlabel="preload springs, k_p [N/mm]; dashed: the hand's",
         ylabel="gain by friction [%]; red: printed",
-        title=f"gain at μ = {result.data['friction']:g}",
+        title=f"gain at μ = {data['friction']:g}",
         ylim=(0.0, None),
     )
-    over_springs.legend(title="springs")
-    for axes in (bars, over_friction, over_springs):
-        axes.grid(axis="y", alpha=0.3)
-    return [save_picture(figure, folder / "fig06.png")]
+    for axes in (over_friction, over_springs):
+        axes.legend(title="springs")
+    return {"fig06": figure}
 
 
 def _draw_bars(axes: Any, data: dict[str, Any]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, save_picture
+from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, told
 from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["plot", "run"]
@@ -29,8 +28,6 @@ SIGNIFICANT: Final = 0.05
 ALIKE: Final = 1e-9
 """Gains that differ by less are the same."""
 
-Sequence4 = tuple[int, ...]
-
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Load every sequence (mirror images once) with and without friction, for several k_p."""
@@ -38,24 +35,38 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     numbers = range(1, len(experiment.springs) + 1)
     sequences = [s for s in itertools.product(numbers, repeat=TILES) if s <= s[::-1]]
     tried = experiment_table().vector("load_sharing", "springs_tried")
-    steps = 1 + len(tried)
-    progress(0, steps)
-    configurations = [_configuration(experiment, sequence) for sequence in sequences]
-    sensitivity = []
-    for done, stiffness in enumerate(tried):
-        progress(1 + done, steps)
-        sensitivity.append(_sensitivity(experiment.with_preload(stiffness), sequences))
-    progress(steps, steps)
-    unlike = [c for c in configurations if len(set(c["springs"])) > 1]
+    configurations, *others = (
+        [_configuration(each, sequence) for sequence in sequences]
+        for each in told(progress, [experiment, *map(experiment.with_preload, tried)])
+    )
+    unlike = _unlike(configurations)
     data: dict[str, Any] = {
-        "contact_springs": list(experiment.springs),
+        "contact_springs": experiment.springs,
         "preload_stiffness": experiment.preload_stiffness,
         "friction": experiment.friction,
         "configurations": configurations,
-        "variants": {name: _summary(unlike, name) for name in VARIANTS},
-        "by_number_of_softest_tiles": _by_softest(unlike),
-        "eight_of_two_springs": _of_two_springs(unlike, len(experiment.springs)),
-        "sensitivity": sensitivity,
+        "variants": _gains(unlike),
+        "by_number_of_softest_tiles": [
+            {
+                "softest_tiles": count,
+                "variants": _gains(
+                    [c for c in unlike if c["springs"].count(min(c["springs"])) == count]
+                ),
+            }
+            for count in range(1, TILES)
+        ],
+        # of each pair of springs there are eight
+        "eight_of_two_springs": [
+            {
+                "springs": pair,
+                "variants": _gains([c for c in unlike if set(c["springs"]) == set(pair)]),
+            }
+            for pair in itertools.combinations(numbers, 2)
+        ],
+        "sensitivity": [
+            {"preload_stiffness": stiffness, "variants": _gains(_unlike(other))}
+            for stiffness, other in zip(tried, others, strict=True)
+        ],
         "not_tested": [
             "which eight configurations Fig. 7 has, and their loads: in the picture only",
         ],
@@ -65,57 +76,36 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     )
 
 
-def _configuration(experiment: PalmExperiment, sequence: Sequence4) -> dict[str, Any]:
+def _configuration(experiment: PalmExperiment, sequence: tuple[int, ...]) -> dict[str, Any]:
     mu = experiment.friction
     loads = {name: experiment.load(sequence, mu, mu * own) for name, own in VARIANTS.items()}
     without = experiment.load(sequence, 0.0)
     return {
-        "springs": list(sequence),
+        "springs": sequence,
         "load_without_friction": without,
         "load_with_friction": loads,
         "gain": {name: load / without - 1.0 for name, load in loads.items()},
     }
 
 
-def _sensitivity(experiment: PalmExperiment, sequences: list[Sequence4]) -> dict[str, Any]:
-    unlike = [_configuration(experiment, s) for s in sequences if len(set(s)) > 1]
-    return {
-        "preload_stiffness": experiment.preload_stiffness,
-        "variants": {name: _summary(unlike, name) for name in VARIANTS},
-    }
+def _unlike(configurations: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [c for c in configurations if len(set(c["springs"])) > 1]
 
 
-def _summary(configurations: list[dict[str, Any]], variant: str) -> dict[str, Any]:
+def _gains(configurations: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the range of gains, how many reach the printed one, and where friction hurts."""
-    gains = np.array([c["gain"][variant] for c in configurations])
-    return {
-        "configurations": len(gains),
-        "least": float(gains.min()),
-        "median": float(np.median(gains)),
-        "largest": float(gains.max()),
-        "reach_printed": int((gains >= PRINTED_GAIN).sum()),
-        "hurts": [c["springs"] for c in configurations if c["gain"][variant] < 0.0],
-    }
-
-
-def _by_softest(configurations: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the gains by how many of the tiles have the softest contact."""
-    groups = []
-    for count in range(1, TILES):
-        group = [c for c in configurations if c["springs"].count(min(c["springs"])) == count]
-        summaries = {name: _summary(group, name) for name in VARIANTS}
-        groups.append({"softest_tiles": count, "variants": summaries})
-    return groups
-
-
-def _of_two_springs(configurations: list[dict[str, Any]], springs: int) -> list[dict[str, Any]]:
-    """Return the gains of the sequences of just two springs: of each pair there are eight."""
-    sets = []
-    for pair in itertools.combinations(range(1, springs + 1), 2):
-        group = [c for c in configurations if set(c["springs"]) == set(pair)]
-        summaries = {name: _summary(group, name) for name in VARIANTS}
-        sets.append({"springs": list(pair), "variants": summaries})
-    return sets
+    summaries = {}
+    for name in VARIANTS:
+        gains = np.array([c["gain"][name] for c in configurations])
+        summaries[name] = {
+            "configurations": len(gains),
+            "least": gains.min(),
+            "median": np.median(gains),
+            "largest": gains.max(),
+            "reach_printed": int((gains >= PRINTED_GAIN).sum()),
+            "hurts": [c["springs"] for c in configurations if c["gain"][name] < 0.0],
+        }
+    return summaries
 
 
 def _claims(
@@ -166,35 +156,32 @@ def _discrepancy_correlations(
     Gains that are all alike, as those of pulleys without friction are, correlate with nothing.
     """
     gains = [c["gain"][variant] for c in configurations]
-    springs = np.array(experiment.springs)
-    stiffness = [springs[np.array(c["springs"]) - 1] for c in configurations]
+    k = np.array(experiment.springs)[np.array([c["springs"] for c in configurations]) - 1]
     measures = {
-        "mean/softest": [k.mean() / k.min() for k in stiffness],
-        "deviation/mean": [k.std() / k.mean() for k in stiffness],
+        "mean/softest": k.mean(axis=1) / k.min(axis=1),
+        "deviation/mean": k.std(axis=1) / k.mean(axis=1),
     }
     if np.ptp(gains) <= ALIKE:
         return dict.fromkeys(measures, (0.0, 1.0))
-    found = {}
-    for what, values in measures.items():
-        answer = spearmanr(values, gains)
-        found[what] = (float(answer.statistic), float(answer.pvalue))
-    return found
-
-
-def plot(result: StudyResult, folder: Path) -> list[Path]:
-    """Draw loads and gains of all sequences, and what the gains depend on."""
-    return [_plot_sequences(result, folder), _plot_dependence(result, folder)]
+    answers = {what: spearmanr(values, gains) for what, values in measures.items()}
+    return {what: (answer.statistic, answer.pvalue) for what, answer in answers.items()}
 
 
 COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
 
 
-def _plot_sequences(result: StudyResult, folder: Path) -> Path:
-    data = result.data
+def plot(result: StudyResult) -> dict[str, Figure]:
+    """Draw loads and gains of all sequences, and what the gains depend on."""
+    return {
+        "fig07": _draw_sequences(result.data),
+        "fig07-dependence": _draw_dependence(result.data),
+    }
+
+
+def _draw_sequences(data: dict[str, Any]) -> Figure:
     shown = sorted(data["configurations"], key=lambda c: float(c["gain"]["tiles"]))
     places = np.arange(len(shown))
-    figure = Figure(figsize=(14.0, 7.5), layout="constrained")
-    loads, gains = figure.subplots(2, 1, sharex=True)
+    figure, (loads, gains) = panels(2, 1, (14.0, 7.5), grid="y", sharex=True)
     without = [1e-3 * c["load_without_friction"] for c in shown]
     loads.bar(places - 0.28, without, 0.28, color="0.7", label="bearings everywhere, μ = 0")
     for shift, name in zip((0.0, 0.28), VARIANTS, strict=True):
@@ -221,15 +208,11 @@ def _plot_sequences(result: StudyResult, folder: Path) -> Path:
         xlim=(-0.8, len(shown) - 0.2),
     )
     gains.legend(loc="upper left")
-    for axes in (loads, gains):
-        axes.grid(axis="y", alpha=0.3)
-    return save_picture(figure, folder / "fig07.png")
+    return figure
 
 
-def _plot_dependence(result: StudyResult, folder: Path) -> Path:
-    data = result.data
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-    softest, springs = figure.subplots(1, 2, sharey=True)
+def _draw_dependence(data: dict[str, Any]) -> Figure:
+    figure, (softest, springs) = panels(1, 2, (11.0, 4.4), grid="y", sharey=True)
     for shift, name in zip((-0.1, 0.1), VARIANTS, strict=True):
         for axes, entries, key, scale, offset in (
             (softest, data["by_number_of_softest_tiles"], "softest_tiles", 1.0, shift),
@@ -237,11 +220,12 @@ def _plot_dependence(result: StudyResult, folder: Path) -> Path:
         ):
             x = np.array([scale * entry[key] + offset for entry in entries])
             ranges = [entry["variants"][name] for entry in entries]
-            middle = 100.0 * np.array([r["median"] for r in ranges])
-            low = middle - 100.0 * np.array([r["least"] for r in ranges])
-            high = 100.0 * np.array([r["largest"] for r in ranges]) - middle
+            low, middle, high = (
+                100.0 * np.array([r[key_of] for r in ranges])
+                for key_of in ("least", "median", "largest")
+            )
             bar = {"color": COLOURS[name], "capsize": 4.0, "label": f"rods at {name}"}
-            axes.errorbar(x, middle, (low, high), fmt="o", **bar)
+            axes.errorbar(x, middle, (middle - low, high - middle), fmt="o", **bar)
             for place, spot, r in zip(x, middle, ranges, strict=True):
                 text = f"{r['reach_printed']}/{r['configurations']}"
                 style = {"xytext": (6, 3), "textcoords": "offset points", "fontsize": 8}
@@ -261,6 +245,5 @@ def _plot_dependence(result: StudyResult, folder: Path) -> Path:
     for axes in (softest, springs):
         axes.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
         axes.axhline(0.0, color="black", linewidth=0.8)
-        axes.grid(axis="y", alpha=0.3)
     softest.legend(loc="upper right")
-    return save_picture(figure, folder / "fig07-dependence.png")
+    return figure

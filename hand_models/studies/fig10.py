@@ -11,19 +11,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from hand_models.base import Array, Progress
-from hand_models.experiments import Claim, StudyResult, save_picture
+from hand_models.experiments import Claim, StudyResult
 from hand_models.parameters import ParameterTable
 from hand_models.studies.fig10_picture import draw_curve, draw_surface, draw_table
 from hand_models.tile import (
     LEAST_SPINES,
-    LineFit,
     SpineArray,
     Surface,
     bounds_gap,
@@ -75,67 +74,55 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     steps = 4
     progress(0, steps)
     limit = surface.pull_off_angle
-    trials = _trials(array)
+    rng = np.random.default_rng(SEED)
+    trials = np.stack([array.simulate(rng, REPEATS, angle) for angle in ANGLES])
     drag = statistics(array.simulate_drag(np.random.default_rng(SEED + 1), TRIALS))
     spread = statistics(array.simulate(np.random.default_rng(SEED + 1), TRIALS, CURVE))
-    mean = float(drag.mean) * array.share(CURVE)
-    of_trials = fit_line(np.repeat(ANGLES, REPEATS), trials.ravel(), limit)
-    of_mean = fit_line(CURVE, mean, limit)
-    straight = _cartesian_line(CURVE, mean, limit)
+    mean = drag.mean * array.share(CURVE)
+    in_finger_plane = np.column_stack([np.cos(CURVE), -np.sin(CURVE), np.zeros(len(CURVE))])
     progress(1, steps)
     table = _table()
     progress(2, steps)
     gaps = _gaps(surface)
     progress(3, steps)
-    hull = hull_over_surface(surface)
-    lateral = fit_lateral(array, limit)
-    progress(4, steps)
     data: dict[str, Any] = {
         "surface": PRESET,
-        "trials": {"angle": ANGLES.tolist(), "strength": trials.tolist()},
+        "trials": {"angle": ANGLES, "strength": trials},
         "array": {
-            "angle": CURVE.tolist(),
-            "mean": mean.tolist(),
-            "deviation": spread.deviation.tolist(),
-            "quantiles_5_50_95": spread.quantiles.tolist(),
+            "angle": CURVE,
+            "mean": mean,
+            "deviation": spread.deviation,
+            "quantiles_5_50_95": spread.quantiles,
         },
         "planner": {
-            "law": surface.strength(CURVE).tolist(),
-            "half_plane": _half_plane_reach(surface, CURVE).tolist(),
+            "law": surface.strength(CURVE),
+            "half_plane": directional_strength(inner_half_planes(surface), in_finger_plane),
             "shear_limit": surface.shear_limit,
             "pull_off_limit": surface.pull_off_limit,
             "pull_off_angle": limit,
             "shear_scatter": surface.shear_scatter,
         },
-        "fit_of_trials": of_trials._asdict(),
-        "fit_of_mean": of_mean._asdict(),
-        "cartesian_line_of_mean": straight,
+        "fit_of_trials": fit_line(np.repeat(ANGLES, REPEATS), trials.ravel(), limit)._asdict(),
+        "fit_of_mean": fit_line(CURVE, mean, limit)._asdict(),
+        "cartesian_line_of_mean": _cartesian_line(CURVE, mean, limit),
         "tile_shear": table,
-        "lateral_fit": lateral._asdict(),
+        "lateral_fit": fit_lateral(array, limit)._asdict(),
         "bounds": gaps,
-        "hull_over_surface": hull,
+        "hull_over_surface": hull_over_surface(surface),
         "not_tested": [
             "the 70 trials of the paper match its model: both are printed in a picture only",
         ],
     }
-    claims = (
-        *_claims_of_the_curve(surface, array, data, of_trials, of_mean),
-        *_claims_of_the_table(table),
-        _claim_of_the_hull(hull),
+    progress(4, steps)
+    claims = (*_claims_of_the_curve(surface, array, data), *_claims_of_the_table(table))
+    hull = Claim(
+        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
+        "> 1",
+        data["hull_over_surface"],
+        data["hull_over_surface"] > 1.01,
     )
-    return StudyResult("fig10", "limit curve of a spine tile on 36-grit sandpaper", data, claims)
-
-
-def _trials(array: SpineArray) -> Array:
-    """Return what the tiles of the experiment hold, a row for each direction [N]."""
-    rng = np.random.default_rng(SEED)
-    return np.stack([array.simulate(rng, REPEATS, angle) for angle in ANGLES])
-
-
-def _half_plane_reach(surface: Surface, angles: Array) -> Array:
-    """Return how far the planner's half-planes let a load in the finger plane go [N]."""
-    directions = np.column_stack([np.cos(angles), -np.sin(angles), np.zeros(len(angles))])
-    return directional_strength(inner_half_planes(surface), directions)
+    title = "limit curve of a spine tile on 36-grit sandpaper"
+    return StudyResult("fig10", title, data, (*claims, hull))
 
 
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
@@ -165,14 +152,11 @@ def _table() -> list[dict[str, Any]]:
         for cell in measured_tile_shear(concrete):
             tile = replace(array, spines=cell.spines, backlash=cell.backlash)
             found = statistics(tile.simulate_drag(np.random.default_rng(SEED), TRIALS))
-            cells.append(
-                {
-                    "concrete": concrete,
-                    **cell._asdict(),
-                    "simulated_mean": float(found.mean),
-                    "simulated_deviation": float(found.deviation),
-                }
-            )
+            simulated = {
+                "simulated_mean": found.mean,
+                "simulated_deviation": found.deviation,
+            }
+            cells.append({"concrete": concrete, **cell._asdict(), **simulated})
     return cells
 
 
@@ -213,31 +197,27 @@ def hull_over_surface(surface: Surface) -> float:
 
 
 def _claims_of_the_curve(
-    surface: Surface,
-    array: SpineArray,
-    data: dict[str, Any],
-    of_trials: LineFit,
-    of_mean: LineFit,
+    surface: Surface, array: SpineArray, data: dict[str, Any]
 ) -> tuple[Claim, ...]:
     limit = surface.pull_off_angle
-    within = within_law(CURVE, limit)
     # what the mean of the measurements in one direction is known to
-    error = float(np.mean(np.array(data["array"]["deviation"])[within])) / math.sqrt(REPEATS)
-    line = data["cartesian_line_of_mean"]
+    error = np.mean(data["array"]["deviation"][within_law(CURVE, limit)]) / math.sqrt(REPEATS)
+    by_angle, line = data["fit_of_mean"], data["cartesian_line_of_mean"]
+    fitted = data["fit_of_trials"]["shear_limit"]
     pressed = CURVE[CURVE < 0.0]
     force = array.share(pressed)
-    gained = np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0]
+    gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
     ratio = surface.pull_off_limit / surface.shear_limit
     coarse = Surface.named("concrete-coarse").shear_limit / surface.shear_limit
     rock = Surface.named("rock").shear_limit / surface.shear_limit
-    beyond = float(array.share(BEYOND))
-    kept = surface.strength(BEYOND) / surface.shear_limit
+    at_limit, beyond = float(array.share(limit)), float(array.share(BEYOND))
+    kept = float(surface.strength(BEYOND) / surface.shear_limit)
     return (
         Claim(
             "attachment is approximately linear with the loading angle (Appendix 9.4)",
             f"off by less than five measurements can tell, {error:.1f} N",
-            f"off by up to {of_mean.worst:.1f} N, R² {of_mean.r_squared:.2f}",
-            of_mean.worst <= error,
+            f"off by up to {by_angle['worst']:.1f} N, R² {by_angle['r_squared']:.2f}",
+            by_angle["worst"] <= error,
         ),
         Claim(
             "the limit curve is nearly a straight line in Cartesian coordinates (Section 6.1)",
@@ -248,28 +228,28 @@ def _claims_of_the_curve(
         Claim(
             "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
             surface.shear_limit,
-            of_trials.shear_limit,
-            abs(of_trials.shear_limit - surface.shear_limit) <= error,
+            fitted,
+            abs(fitted - surface.shear_limit) <= error,
             role="calibration",
         ),
         Claim(
             "f_smin / f_smax at 45° is that of the fit to Fig. 13",
             ratio,
-            float(array.share(limit)),
-            abs(float(array.share(limit)) - ratio) <= 0.01 * ratio,
+            at_limit,
+            abs(at_limit - ratio) <= 0.01 * ratio,
             role="calibration",
         ),
         Claim(
             "beyond 45° (not published) the planner's constant f_smin: f_s / f_smax at 60°",
-            float(kept),
+            kept,
             beyond,
-            beyond >= float(kept),
+            beyond >= kept,
         ),
         Claim(
             "under positive normal forces conventional Coulomb friction applies (Section 6.1)",
             array.tile_friction,
-            float(gained),
-            abs(float(gained) - array.tile_friction) <= 1e-6,
+            gained,
+            abs(gained - array.tile_friction) <= 1e-6,
         ),
         Claim(
             "the force on rock is 2 to 5 times greater (Section 6): coarse concrete, as measured",
@@ -287,10 +267,11 @@ def _claims_of_the_curve(
     )
 
 
-def _claims_of_the_table(table: list[dict[str, Any]]) -> tuple[Claim, ...]:
+def _claims_of_the_table(table: list[dict[str, Any]]) -> list[Claim]:
     claims = []
-    for fitted, spines in ((True, "20, 40, 60"), (False, "5, 10")):
-        cells = [cell for cell in table if (cell["spines"] >= LEAST_SPINES) == fitted]
+    enough = [cell for cell in table if cell["spines"] >= LEAST_SPINES]
+    few = [cell for cell in table if cell["spines"] < LEAST_SPINES]
+    for cells, spines in ((enough, "20, 40, 60"), (few, "5, 10")):
         off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
         claims.append(
             Claim(
@@ -298,15 +279,11 @@ def _claims_of_the_table(table: list[dict[str, Any]]) -> tuple[Claim, ...]:
                 "within the bars",
                 f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less",
                 max(off) <= 1.0,
-                role="calibration" if fitted else "test",
+                role="calibration" if cells is enough else "test",
             )
         )
     for concrete in ("fine", "coarse"):
-        cells = [
-            cell
-            for cell in table
-            if cell["spines"] >= LEAST_SPINES and cell["concrete"] == concrete
-        ]
+        cells = [cell for cell in enough if cell["concrete"] == concrete]
         ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
         claims.append(
             Claim(
@@ -316,22 +293,13 @@ def _claims_of_the_table(table: list[dict[str, Any]]) -> tuple[Claim, ...]:
                 min(ratios) >= 0.5 and max(ratios) <= 1.5,
             )
         )
-    return tuple(claims)
+    return claims
 
 
-def _claim_of_the_hull(hull: float) -> Claim:
-    return Claim(
-        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
-        "> 1",
-        hull,
-        hull > 1.01,
-    )
-
-
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the limit curve, the table of strengths, and the surface seen from the pull."""
-    return [
-        save_picture(draw_curve(result.data, REPEATS), folder / "fig10.png"),
-        save_picture(draw_table(result.data), folder / "fig10_tile_shear.png"),
-        save_picture(draw_surface(PRESET), folder / "fig10_surface.png"),
-    ]
+    return {
+        "fig10": draw_curve(result.data, REPEATS),
+        "fig10_tile_shear": draw_table(result.data),
+        "fig10_surface": draw_surface(PRESET),
+    }

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models.base import Array
+from hand_models.experiments import panels
 from hand_models.tile import SpineArray, Surface, directional_strength, inner_half_planes
 
 __all__ = ["draw_curve", "draw_surface", "draw_table"]
@@ -21,21 +22,19 @@ def draw_curve(data: dict[str, Any], repeats: int) -> Figure:
 
     ``repeats``: trials in each direction.
     """
-    figure = Figure(figsize=(13.0, 5.0), layout="constrained")
-    polar, cartesian = figure.subplots(1, 2)
-    angles = np.array(data["array"]["angle"])
+    figure, (polar, cartesian) = panels(1, 2, (13.0, 5.0))
+    angles = data["array"]["angle"]
     curves = (
-        (np.array(data["array"]["mean"]), "tab:blue", "-", "spine array, mean"),
-        (np.array(data["planner"]["law"]), "k", "-", "planner, Eq. 21"),
-        (np.array(data["planner"]["half_plane"]), "k", ":", "planner, half-planes"),
+        (data["array"]["mean"], "tab:blue", "-", "spine array, mean"),
+        (data["planner"]["law"], "k", "-", "planner, Eq. 21"),
+        (data["planner"]["half_plane"], "k", ":", "planner, half-planes"),
     )
     fit, limit = data["fit_of_trials"], data["planner"]["pull_off_angle"]
     fitted = np.linspace(0.0, limit, 46)
     line = fit["shear_limit"] + (fit["pull_off_limit"] - fit["shear_limit"]) * fitted / limit
-    low, _, high = np.array(data["array"]["quantiles_5_50_95"])
+    low, _, high = data["array"]["quantiles_5_50_95"]
     of_trials = np.repeat(data["trials"]["angle"], repeats)
-    strengths = np.array(data["trials"]["strength"]).ravel()
-
+    strengths = data["trials"]["strength"].ravel()
     polar.axvspan(-30.0, 0.0, color="0.9")
     polar.fill_between(np.degrees(angles), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
     polar.plot(np.degrees(of_trials), strengths, ".", color="tab:blue", alpha=0.6)
@@ -69,16 +68,14 @@ def draw_curve(data: dict[str, Any], repeats: int) -> Figure:
     )
     polar.legend()
     cartesian.legend()
-    for axes in (polar, cartesian):
-        axes.grid(alpha=0.3)
     return figure
 
 
 def draw_table(data: dict[str, Any]) -> Figure:
     """Draw the measured and the simulated strengths over the number of spines."""
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    figure, both = panels(1, 2, (11.0, 4.4), sharey=True)
     highest = 1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"])
-    for axes, concrete in zip(figure.subplots(1, 2, sharey=True), ("fine", "coarse"), strict=True):
+    for axes, concrete in zip(both, ("fine", "coarse"), strict=True):
         cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
         ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
         for (backlash, group), colour in zip(ordered, ("tab:blue", "tab:orange"), strict=True):
@@ -96,19 +93,17 @@ def draw_table(data: dict[str, Any]) -> Figure:
                 spines, simulated - deviation, simulated + deviation, color=colour, alpha=0.15
             )
         axes.set(xlabel="spines of a tile [1]", title=f"{concrete} concrete", ylim=(0.0, highest))
-        axes.grid(alpha=0.3)
         axes.legend(loc="upper left")
-    figure.axes[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
+    both[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
     return figure
 
 
 def draw_surface(preset: str) -> Figure:
     """Draw the strength over the azimuth at three loading angles."""
     surface, array = Surface.named(preset), SpineArray.named(preset)
-    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
+    figure, shown = panels(1, 3, (13.0, 4.6))
     azimuth = np.radians(np.linspace(-90.0, 90.0, 181))
-    share = (0.0, 0.5, 1.0)
-    for axes, part in zip(figure.subplots(1, 3), share, strict=True):
+    for axes, part in zip(shown, (0.0, 0.5, 1.0), strict=True):
         angle = part * surface.pull_off_angle
         along, aside = np.cos(angle) * np.cos(azimuth), np.cos(angle) * np.sin(azimuth)
         directions = np.column_stack([along, np.full(len(along), -math.sin(angle)), aside])
@@ -130,7 +125,6 @@ def draw_surface(preset: str) -> Figure:
             title=f"pulled at φ = {math.degrees(angle):g}°",
             aspect="equal",
         )
-        axes.grid(alpha=0.3)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
+    handles, labels = shown[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

@@ -7,8 +7,7 @@ straight direction reaches before a tile lets go, since the set itself is not co
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -29,8 +28,8 @@ from hand_models.experiments import (
     extents,
     in_paper_signs,
     label_solid,
+    part,
     pull,
-    save_picture,
     section,
     unloaded,
     vertices,
@@ -79,42 +78,41 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     diameter, tension = table.scalar("fig13", "diameter"), table.scalar("fig13", "tension")
     gripper = Gripper(diameter, tension, table=gripper_table(hand))
     unloaded(gripper)
-    found = search(gripper, PER_AXIS, lambda i, n: progress(SEARCHED * i // n, STEPS))
+    found = search(gripper, PER_AXIS, part(progress, 0, SEARCHED, STEPS))
     whole = in_paper_signs(found.wrenches)
     full, shown = vertices(whole), clipped_vertices(whole)
     size = np.abs(shown).max(axis=0)
-    held = whole[whole[:, 1] <= 0.0]
     directions = even_pulls(DIRECTIONS, size)
-    pulled = pull(gripper, directions, _told(progress))
+    pulled = pull(gripper, directions, part(progress, SEARCHED, PULLED, STEPS))
     over = np.linalg.norm(pulled.wrenches * UNITS, axis=1)
     filled = distance_along(full, pulled.wrenches / over[:, None]) / over
-    force_x, moment = np.linspace(-1.0, 1.0, GRID) * size[0], np.linspace(-1.0, 1.0, GRID) * size[2]
+    force_x, moment = (np.linspace(-1.0, 1.0, GRID) * size[i] for i in (0, 2))
     data: dict[str, Any] = {
         "diameter": diameter,
         "tension": tension,
         "poses_tried": found.tried,
         "poses_held": found.held,
-        "hull_vertices": shown.tolist(),
-        "full_hull_vertices": full.tolist(),
+        "hull_vertices": shown,
+        "full_hull_vertices": full,
         "extents": extents(shown)._asdict(),
-        "extents_of_wrenches": extents(held)._asdict(),
+        "extents_of_wrenches": extents(whole[whole[:, 1] <= 0.0])._asdict(),
         "extents_of_pulls": extents(pulled.wrenches)._asdict(),
         "pulls": {
-            "wrenches": pulled.wrenches.tolist(),
-            "poses": pulled.poses.tolist(),
-            "phalanx": list(pulled.phalanx),
-            "way": list(pulled.way),
+            "wrenches": pulled.wrenches,
+            "poses": pulled.poses,
+            "phalanx": pulled.phalanx,
+            "way": pulled.way,
             "hull_over_pull": _spread(filled),
         },
         "asymmetry": _asymmetry(shown, size),
         "pull_off": {
-            "force_x": force_x.tolist(),
-            "moment": moment.tolist(),
+            "force_x": force_x,
+            "moment": moment,
             "force_z": _pull_off(full, force_x, moment),
         },
         "positive_moment": _positive_moment(full, force_x),
         "linearised": _linearised(gripper, full, size),
-        "linear_pieces": _linear_pieces(gripper, full, size, progress),
+        "linear_pieces": _linear_pieces(gripper, full, size, part(progress, PULLED, LISTED, STEPS)),
         "not_tested": [
             "the 17 measured wrenches (dots) are printed in a picture only, so neither is the "
             "prediction error of 10 % on average",
@@ -122,21 +120,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         ],
     }
     progress(STEPS, STEPS)
-    claims = (*_claims_of_extents(data, table), *_claims_of_shape(data))
-    return StudyResult("fig13", "wrench space of the gripper on 300 mm", data, claims)
-
-
-def _told(progress: Progress) -> Callable[[Array], None]:
-    """Return what tells of pulls that are done."""
-
-    def tell(done: Array) -> None:
-        progress(SEARCHED + int((PULLED - SEARCHED) * done.mean()), STEPS)
-
-    return tell
+    return StudyResult(
+        "fig13", "wrench space of the gripper on 300 mm", data, tuple(_claims(data, table))
+    )
 
 
 def _spread(values: Array) -> dict[str, float]:
-    return {"mean": float(values.mean()), "least": float(values.min()), "most": float(values.max())}
+    return {"mean": values.mean(), "least": values.min(), "most": values.max()}
 
 
 def _asymmetry(points: Array, size: Array) -> float:
@@ -153,32 +143,27 @@ def _sphere(count: int) -> Array:
     return np.vstack([half, -half])
 
 
-def _pull_off(points: Array, force_x: Array, moment: Array) -> list[list[float | None]]:
-    """Return the least F_z of a hull over (F_x, M_y), a row for each M_y; None outside."""
+def _pull_off(points: Array, force_x: Array, moment: Array) -> Array:
+    """Return the least F_z of a hull over (F_x, M_y), a row for each M_y; no number outside."""
     x, m = np.meshgrid(force_x, moment)
     start = np.column_stack([x.ravel(), 0.0 * x.ravel(), m.ravel()])
     down = np.tile([0.0, -1.0, 0.0], (len(start), 1))
-    least = -distance_along(points, down, start).reshape(x.shape)
-    return [[None if np.isnan(value) else float(value) for value in row] for row in least]
+    return -distance_along(points, down, start).reshape(x.shape)
 
 
-def _positive_moment(points: Array, force_x: Array) -> dict[str, list[Any]]:
+def _positive_moment(points: Array, force_x: Array) -> dict[str, Array]:
     """Return, for each F_x > 0, the best M_y for pulling off, the strength there and at M_y = 0."""
-    found: dict[str, list[Any]] = {
-        name: [] for name in ("force_x", "best_moment", "strength", "strength_without")
-    }
+    found = []
     for force in force_x[force_x > 0.0]:
         at = np.array([force, 0.0, 0.0])
         slice_ = section(points - at, (1.0, 0.0, 0.0))
         if not len(slice_) or slice_[:, 1].min() >= 0.0:
             break
-        best = slice_[slice_[:, 1].argmin()]
-        without = float(distance_along(points, np.array([[0.0, -1.0, 0.0]]), at)[0])
-        found["force_x"].append(float(force))
-        found["best_moment"].append(float(best[2]))
-        found["strength"].append(float(-best[1]))
-        found["strength_without"].append(None if np.isnan(without) else without)
-    return found
+        _, least, best = slice_[slice_[:, 1].argmin()]
+        without = distance_along(points, np.array([[0.0, -1.0, 0.0]]), at)[0]
+        found.append((force, best, -least, without))
+    names = ("force_x", "best_moment", "strength", "strength_without")
+    return dict(zip(names, np.reshape(found, (-1, len(names))).T, strict=True))
 
 
 def _linear_pieces(
@@ -192,21 +177,17 @@ def _linear_pieces(
     ways = _sphere(PIECE_DIRECTIONS) / size
     directions = np.zeros((len(ways), 6))
     directions[:, PLANAR] = ways * (1.0, 1.0, -1.0)
-    found = pieces(
-        gripper,
-        directions[::2],
-        progress=lambda i, n: progress(PULLED + (LISTED - PULLED) * i // n, STEPS),
-    )
+    found = pieces(gripper, directions[::2], progress=progress)
     rest = gripper.evaluate(np.zeros((1, len(PLANAR)))).wrenches[0]
     reached = [max(linear_extreme(piece.space, d)[1] for piece in found.pieces) for d in directions]
     exact = (full @ ways.T).max(axis=0)
     off = (np.array(reached) - directions @ rest) / (exact - directions @ rest) - 1.0
     return {
-        "poses": [piece.twist.tolist() for piece in found.pieces],
-        "within": [piece.within.tolist() for piece in found.pieces],
-        "worst_looked_at": float(np.abs(off[::2]).max()),
-        "worst_elsewhere": float(np.abs(off[1::2]).max()),
-        "mean": float(off.mean()),
+        "poses": [piece.twist for piece in found.pieces],
+        "within": [piece.within for piece in found.pieces],
+        "worst_looked_at": np.abs(off[::2]).max(),
+        "worst_elsewhere": np.abs(off[1::2]).max(),
+        "mean": off.mean(),
     }
 
 
@@ -221,16 +202,15 @@ def _linearised(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
         error = (points @ directions.T).max(axis=0) / support - 1.0
         result[name] = {
             "error": _spread(error),
-            "mean_size_of_error": float(np.abs(error).mean()),
+            "mean_size_of_error": np.abs(error).mean(),
             "error_pulling": _spread(error[pulling]),
-            "mean_size_of_error_pulling": float(np.abs(error[pulling]).mean()),
+            "mean_size_of_error_pulling": np.abs(error[pulling]).mean(),
             "extents": extents(clipped_vertices(points))._asdict(),
         }
     return result
 
 
-def _claims_of_extents(data: dict[str, Any], table: ParameterTable) -> list[Claim]:
-    claims = []
+def _claims(data: dict[str, Any], table: ParameterTable) -> Iterator[Claim]:
     for name, words, unit, near in zip(
         Extents._fields,
         ("largest F_x", "least F_z", "largest M_y"),
@@ -240,53 +220,41 @@ def _claims_of_extents(data: dict[str, Any], table: ParameterTable) -> list[Clai
     ):
         read, got = table.scalar("fig13", name), data["extents"][name]
         held, pulled = data["extents_of_wrenches"][name], data["extents_of_pulls"][name]
-        claims.append(
-            Claim(
-                f"{words} of the hull's part F_z ≤ 0, within {100 * near:g} % (Fig. 13)",
-                f"{read:g} {unit}",
-                f"{got:.3g} {unit} ({100 * (got / read - 1):+.0f} %); "
-                f"of wrenches with F_z ≤ 0 {held:.3g}, of straight pulls {pulled:.3g}",
-                abs(got / read - 1.0) <= near,
-                role="calibration",
-            )
+        yield Claim(
+            f"{words} of the hull's part F_z ≤ 0, within {100 * near:g} % (Fig. 13)",
+            f"{read:g} {unit}",
+            f"{got:.3g} {unit} ({100 * (got / read - 1):+.0f} %); "
+            f"of wrenches with F_z ≤ 0 {held:.3g}, of straight pulls {pulled:.3g}",
+            abs(got / read - 1.0) <= near,
+            role="calibration",
         )
-    return claims
-
-
-def _claims_of_shape(data: dict[str, Any]) -> list[Claim]:
+    yield Claim(
+        "the wrench space is skew symmetric (Section 7): off its image (−F_x, F_z, −M_y)",
+        "nothing",
+        f"{data['asymmetry']:.1g} of its extents",
+        data["asymmetry"] <= SYMMETRIC,
+    )
     moments = data["positive_moment"]
-    best, forces = np.array(moments["best_moment"]), np.array(moments["force_x"])
+    best, forces = moments["best_moment"], moments["force_x"]
     share = float((best > 0.0).sum() / max(len(best), 1))
     middle = len(forces) // 2
-    gain = "strength at half of that from {:.1f} to {:.1f} N".format(
-        moments["strength_without"][middle] or 0.0, moments["strength"][middle]
+    without = np.nan_to_num(moments["strength_without"][middle])
+    yield Claim(
+        "with shear F_x > 0, a positive moment raises the pull-out strength (Section 6.3)",
+        "for every F_x",
+        f"for {100 * share:.0f} % of F_x up to {forces.max(initial=0.0):.1f} N; strength at half "
+        f"of that from {without:.1f} to {moments['strength'][middle]:.1f} N",
+        share == 1.0,
     )
-    furthest = float(forces.max(initial=0.0))
-    return [
-        Claim(
-            "the wrench space is skew symmetric (Section 7): off its image (−F_x, F_z, −M_y)",
-            "nothing",
-            f"{data['asymmetry']:.1g} of its extents",
-            data["asymmetry"] <= SYMMETRIC,
-        ),
-        Claim(
-            "with shear F_x > 0, a positive moment raises the pull-out strength (Section 6.3)",
-            "for every F_x",
-            f"for {100 * share:.0f} % of F_x up to {furthest:.1f} N; {gain}",
-            share == 1.0,
-        ),
-    ]
 
 
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the hull from aside, from above and along F_x, and the map of pull-off strengths."""
     data = result.data
     figure = Figure(figsize=(14.0, 10.0), layout="constrained")
-    points = np.array(data["hull_vertices"])
-    solid = figure.add_subplot(2, 2, 1, projection="3d")
-    _draw_solid(solid, points)
+    points, pulled = data["hull_vertices"], data["pulls"]["wrenches"]
+    _draw_solid(figure.add_subplot(2, 2, 1, projection="3d"), points)
     top, side, strength = (figure.add_subplot(2, 2, k) for k in (2, 3, 4))
-    pulled = np.array(data["pulls"]["wrenches"])
     for axes, first, second, labels, title in (
         (top, 0, 2, ("F_x [N]", "M_y [N·m]"), "from above"),
         (side, 0, 1, ("F_x [N]", "F_z [N]"), "from aside"),
@@ -297,7 +265,7 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
         axes.set(xlabel=labels[0], ylabel=labels[1], title=f"{title}; dots: straight pulls")
         axes.grid(alpha=0.3)
     _draw_strength(strength, data)
-    return [save_picture(figure, folder / "fig13.png")]
+    return {"fig13": figure}
 
 
 def _draw_solid(axes: Any, points: Array) -> None:
@@ -328,7 +296,7 @@ def _subdivided(faces: Array) -> Array:
 
 def _draw_strength(axes: Any, data: dict[str, Any]) -> None:
     field = data["pull_off"]
-    values = -np.array(field["force_z"], dtype=float)
+    values = -field["force_z"]
     filled = axes.contourf(
         field["force_x"], field["moment"], np.maximum(values, 0.0), levels=12, cmap="viridis"
     )

@@ -10,8 +10,7 @@ M_y = a F_x.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -23,15 +22,15 @@ from hand_models.experiments import (
     DRAGGED,
     UNBALANCED,
     Claim,
-    Pulled,
     StudyResult,
     clipped_vertices,
     even_pulls,
     extents,
     in_paper_signs,
     label_solid,
+    panels,
+    part,
     pull,
-    save_picture,
     section,
     unloaded,
     volume,
@@ -52,7 +51,8 @@ PLANES: Final = 181
 """Planes of loading that are looked at."""
 
 STEPS: Final = 1000
-"""Of the progress told."""
+SEARCHED: Final = 100
+"""Of the progress told, and of each surface's when the search ends."""
 
 ABOUT: Final = 0.25
 """A figure printed as "about" is met within this share of it."""
@@ -73,72 +73,54 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     surfaces = []
     for done, (diameter, held) in enumerate(cases):
         gripper = Gripper(diameter, held, table=gripper_table(hand))
-        surfaces.append(
-            {
-                "diameter": diameter,
-                "tension": held,
-                **_surface(gripper, _part(progress, done, len(cases))),
-            }
-        )
+        start, end = (STEPS * i // len(cases) for i in (done, done + 1))
+        found = _surface(gripper, part(progress, start, end, STEPS))
+        surfaces.append({"diameter": diameter, "tension": held, **found})
     progress(STEPS, STEPS)
-    data: dict[str, Any] = {
-        "phalanges": list(PHALANGES),
+    data = {
+        "phalanges": PHALANGES,
         "surfaces": surfaces,
         "not_tested": [
             "that failures in experiments were those predicted: they are not published",
         ],
     }
     claims = (
-        *_claims_of_failures(surfaces),
-        *_claims_of_planes(surfaces, table),
-        *_claims_of_size(surfaces),
+        *_claims_of_failures(*surfaces[:2]),
+        *_claims_of_planes(surfaces[:2], table),
+        *_claims_of_size(*surfaces),
     )
     return StudyResult("fig14", "failure modes and planes of loading", data, claims)
 
 
-def _part(progress: Progress, done: int, total: int) -> Callable[[float], None]:
-    """Return what tells the progress of one of several cases, from 0 to 1."""
-
-    def tell(share: float) -> None:
-        progress(int(STEPS * (done + min(share, 1.0)) / total), STEPS)
-
-    return tell
-
-
-def _surface(gripper: Gripper, tell: Callable[[float], None]) -> dict[str, Any]:
+def _surface(gripper: Gripper, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
-    tell(0.0)
+    progress(0, STEPS)
     unloaded(gripper)
     found = search(gripper, PER_AXIS)
-    tell(0.1)
     shown = clipped_vertices(in_paper_signs(found.wrenches))
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
     directions = even_pulls(DIRECTIONS, np.abs(shown).max(axis=0))
-    pulled = pull(gripper, directions, lambda done: tell(0.1 + 0.9 * float(done.mean())))
+    pulled = pull(gripper, directions, part(progress, SEARCHED, STEPS, STEPS))
+    # in how many of the directions each phalanx fails in each way
+    counts = Counter(zip(pulled.phalanx, pulled.way, strict=True))
     return {
-        "hull_vertices": shown.tolist(),
+        "hull_vertices": shown,
         "extents": extents(shown)._asdict(),
         "volume": volume(shown),
         "pulls": {
-            "wrenches": pulled.wrenches.tolist(),
-            "side": list(pulled.side),
-            "phalanx": list(pulled.phalanx),
-            "way": list(pulled.way),
+            "wrenches": pulled.wrenches,
+            "side": pulled.side,
+            "phalanx": pulled.phalanx,
+            "way": pulled.way,
         },
-        "shares": _shares(pulled),
+        "shares": [
+            {"phalanx": phalanx, "way": way, "share": count / len(directions)}
+            for (phalanx, way), count in counts.most_common()
+        ],
         "planes": loading_planes(shown),
         "best_pulls": _best(pulled.wrenches),
     }
-
-
-def _shares(pulled: Pulled) -> list[dict[str, Any]]:
-    """Return the share of the directions in which each phalanx fails in each way."""
-    counts = Counter(zip(pulled.phalanx, pulled.way, strict=True))
-    return [
-        {"phalanx": phalanx, "way": way, "share": count / len(pulled.way)}
-        for (phalanx, way), count in counts.most_common()
-    ]
 
 
 def loading_planes(points: Array) -> dict[str, Any]:
@@ -154,50 +136,37 @@ def loading_planes(points: Array) -> dict[str, Any]:
     size = np.abs(points).max(axis=0)
     turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, PLANES)[1:-1]
     arms = np.tan(turns) * size[2] / size[0]
-    forces, moments = [], []
-    for arm in arms:
-        slice_ = section(points, (arm, 0.0, -1.0))
-        forces.append(float(np.hypot(slice_[:, 0], slice_[:, 1]).max(initial=0.0)))
-        moments.append(float(np.abs(slice_[:, 2]).max(initial=0.0)))
-    planes: dict[str, Any] = {"arm": arms.tolist(), "force": forces, "moment": moments}
+    slices = [_strengths(section(points, (arm, 0.0, -1.0))) for arm in arms]
+    planes: dict[str, Any] = {"arm": arms}
+    for name in ("force", "moment"):
+        planes[name] = np.array([strengths[name].max(initial=0.0) for strengths in slices])
     for name, best in _best(points).items():
-        good = arms[np.array(planes[name]) >= (1.0 - FLAT) * best[name]]
-        alike = [float(good.min()), float(good.max())] if len(good) else None
+        good = arms[planes[name] >= (1.0 - FLAT) * best[name]]
+        alike = [good.min(), good.max()] if len(good) else None
         planes[f"best_for_{name}"] = {**best, "arms_as_good": alike}
     return planes
+
+
+def _strengths(points: Array) -> dict[str, Array]:
+    """Return what wrenches count for, by force and by moment."""
+    return {"force": np.hypot(points[:, 0], points[:, 1]), "moment": np.abs(points[:, 2])}
 
 
 def _best(points: Array) -> dict[str, dict[str, Any]]:
     """Return the wrenches of the greatest force and of the greatest moment, and their planes."""
     found = {}
-    for name, strengths in (
-        ("force", np.hypot(points[:, 0], points[:, 1])),
-        ("moment", np.abs(points[:, 2])),
-    ):
+    for name, strengths in _strengths(points).items():
         # of a wrench and its mirror image, which are as strong, that to the right
         most = strengths.max()
         alike = points[strengths >= (1.0 - TOLERANCE) * most]
         best = alike[alike[:, 0].argmax()]
         found[name] = {
-            "wrench": best.tolist(),
-            name: float(most),
-            "arm": float(best[2] / best[0]),
-            "ratio": float(best[0] / best[2]),
+            "wrench": best,
+            name: most,
+            "arm": best[2] / best[0],
+            "ratio": best[0] / best[2],
         }
     return found
-
-
-def _total(surface: dict[str, Any], phalanx: str) -> float:
-    """Return the share of the directions in which a phalanx fails first, in whatever way."""
-    phalanges = surface["pulls"]["phalanx"]
-    return float(phalanges.count(phalanx) / len(phalanges))
-
-
-def _letting_go(surface: dict[str, Any], phalanx: str) -> float:
-    """Return the share of a phalanx in failures at a tile's limit, none dragged backwards."""
-    limits = [entry for entry in surface["shares"] if entry["way"] not in (DRAGGED, UNBALANCED)]
-    mine = sum(entry["share"] for entry in limits if entry["phalanx"] == phalanx)
-    return float(mine / sum(entry["share"] for entry in limits) if limits else 0.0)
 
 
 def _listed(surface: dict[str, Any]) -> str:
@@ -208,115 +177,97 @@ def _listed(surface: dict[str, Any]) -> str:
     )
 
 
-def _claims_of_failures(surfaces: list[dict[str, Any]]) -> list[Claim]:
-    near, far = surfaces[:2]
-    wrenches = np.array(near["pulls"]["wrenches"])
+def _claims_of_failures(near: dict[str, Any], far: dict[str, Any]) -> Iterator[Claim]:
+    yield Claim(
+        "on 300 mm most failures start from the proximal phalanx (Section 7)",
+        "> 50 % of directions",
+        _listed(near),
+        near["pulls"]["phalanx"].count("proximal") > 0.5 * len(near["pulls"]["phalanx"]),
+    )
+    wrenches = near["pulls"]["wrenches"]
     arms = np.abs(wrenches[:, 2] / wrenches[:, 0])
-    distal = np.array([phalanx == "distal" for phalanx in near["pulls"]["phalanx"]])
+    distal = np.array(near["pulls"]["phalanx"]) == "distal"
+    told, small = "no distal failure", False
     if distal.any():
-        here, others = float(np.median(arms[distal])), float(np.median(arms[~distal]))
+        here, others = np.median(arms[distal]), np.median(arms[~distal])
         told = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
-        small = here < others
-    else:
-        told, small = "no distal failure", False
-    return [
-        Claim(
-            "on 300 mm most failures start from the proximal phalanx (Section 7)",
-            "> 50 % of directions",
-            _listed(near),
-            _total(near, "proximal") > 0.5,
-        ),
-        Claim(
-            "on 300 mm the distal phalanx fails where M_y is small against F_x (Section 7)",
-            "M_y : F_x less than where others fail",
-            told,
-            small,
-        ),
-        Claim(
-            "on 700 mm the entire wrench space is dominated by proximal failure (Section 7)",
-            "proximal in all directions",
-            f"{_listed(far)}; of tiles that let go {100 * _letting_go(far, 'proximal'):.1f} %",
-            _total(far, "proximal") == 1.0,
-        ),
-    ]
+        small = bool(here < others)
+    yield Claim(
+        "on 300 mm the distal phalanx fails where M_y is small against F_x (Section 7)",
+        "M_y : F_x less than where others fail",
+        told,
+        small,
+    )
+    limits = [entry for entry in far["shares"] if entry["way"] not in (DRAGGED, UNBALANCED)]
+    mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
+    letting_go = mine / sum(entry["share"] for entry in limits) if limits else 0.0
+    yield Claim(
+        "on 700 mm the entire wrench space is dominated by proximal failure (Section 7)",
+        "proximal in all directions",
+        f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %",
+        set(far["pulls"]["phalanx"]) == {"proximal"},
+    )
 
 
-def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> list[Claim]:
-    claims = []
-    for surface in surfaces[:2]:
+def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> Iterator[Claim]:
+    for surface in surfaces:
         where = f"on {1e3 * surface['diameter']:g} mm"
         planes = surface["planes"]
         for name, words in (("force", "point force"), ("moment", "moment")):
             best, printed = planes[f"best_for_{name}"], table.scalar("fig14", f"{name}_ratio")
-            there = float(np.interp(1.0 / printed, planes["arm"], planes[name])) / best[name]
-            claims.append(
-                Claim(
-                    f"{where} the best F_x : M_y for {words} is about {printed:g} : 1 (Section 7)",
-                    f"{printed:g} within {100 * ABOUT:g} %",
-                    f"{best['ratio']:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at "
-                    f"{printed:g} : 1 {100 * there:.1f} % of the best; best of straight pulls "
-                    f"{surface['best_pulls'][name]['ratio']:.3g} : 1",
-                    abs(best["ratio"] - printed) <= ABOUT * printed,
-                )
+            there = np.interp(1.0 / printed, planes["arm"], planes[name]) / best[name]
+            yield Claim(
+                f"{where} the best F_x : M_y for {words} is about {printed:g} : 1 (Section 7)",
+                f"{printed:g} within {100 * ABOUT:g} %",
+                f"{best['ratio']:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at "
+                f"{printed:g} : 1 {100 * there:.1f} % of the best; best of straight pulls "
+                f"{surface['best_pulls'][name]['ratio']:.3g} : 1",
+                bool(abs(best["ratio"] - printed) <= ABOUT * printed),
             )
         force, moment = (planes[f"best_for_{name}"]["ratio"] for name in ("force", "moment"))
-        claims.append(
-            Claim(
-                f"{where} a higher F_x : M_y is better for force, a lower for moment (Section 7)",
-                "higher for force",
-                f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment",
-                0.0 < moment < force,
-            )
+        yield Claim(
+            f"{where} a higher F_x : M_y is better for force, a lower for moment (Section 7)",
+            "higher for force",
+            f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment",
+            bool(0.0 < moment < force),
         )
     anchor, best = table.scalar("fig14", "anchor"), surfaces[0]["planes"]["best_for_force"]
-    claims.append(
-        Claim(
-            "on 300 mm a cable is best anchored 1.1 cm behind the palm (Section 7)",
-            f"{100 * anchor:.1f} cm within {100 * ABOUT:g} %",
-            f"{100 * best['arm']:.2f} cm; within 1 % of the best {_span(best['arms_as_good'])}",
-            abs(best["arm"] - anchor) <= ABOUT * anchor,
-        )
+    span = "nowhere else"
+    if best["arms_as_good"]:
+        span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
+    yield Claim(
+        "on 300 mm a cable is best anchored 1.1 cm behind the palm (Section 7)",
+        f"{100 * anchor:.1f} cm within {100 * ABOUT:g} %",
+        f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}",
+        bool(abs(best["arm"] - anchor) <= ABOUT * anchor),
     )
-    return claims
 
 
-def _span(arms: list[float] | None) -> str:
-    return f"from {100 * arms[0]:.2f} to {100 * arms[1]:.2f} cm" if arms else "nowhere else"
-
-
-def _claims_of_size(surfaces: list[dict[str, Any]]) -> list[Claim]:
-    near = surfaces[0]
-    claims = []
-    for surface in surfaces[1:]:
+def _claims_of_size(near: dict[str, Any], *others: dict[str, Any]) -> Iterator[Claim]:
+    for surface in others:
         of = {name: surface["extents"][name] / near["extents"][name] for name in near["extents"]}
         shares = ", ".join(
-            f"{name} {100 * of[key]:.0f} %"
-            for key, name in (("force_x", "F_x"), ("force_z", "F_z"), ("moment", "M_y"))
+            f"{words} {100 * share:.0f} %"
+            for words, share in zip(("F_x", "F_z", "M_y"), of.values(), strict=True)
         )
         size = surface["volume"] / near["volume"]
-        claims.append(
-            Claim(
-                f"the limit surface on 700 mm at {surface['tension']:g} N is smaller than on "
-                f"300 mm at {near['tension']:g} N (Sections 6.3 and 7)",
-                "every extent smaller",
-                f"{shares}, volume {100 * size:.0f} % of that on 300 mm",
-                all(value < 1.0 for value in (*of.values(), size)),
-            )
+        yield Claim(
+            f"the limit surface on 700 mm at {surface['tension']:g} N is smaller than on "
+            f"300 mm at {near['tension']:g} N (Sections 6.3 and 7)",
+            "every extent smaller",
+            f"{shares}, volume {100 * size:.0f} % of that on 300 mm",
+            all(value < 1.0 for value in (*of.values(), size)),
         )
-    return claims
 
 
 COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
 """Of failures; the paper's are red and blue, too."""
 
 
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the failures over the wrench spaces, and what planes of loading hold."""
     surfaces = result.data["surfaces"]
-    return [
-        save_picture(_draw_failures(surfaces[:2]), folder / "fig14.png"),
-        save_picture(_draw_planes(surfaces), folder / "fig14_planes.png"),
-    ]
+    return {"fig14": _draw_failures(surfaces[:2]), "fig14_planes": _draw_planes(surfaces)}
 
 
 def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
@@ -325,9 +276,9 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
         name = f"{1e3 * surface['diameter']:g} mm, {surface['tension']:g} N"
         solid: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="3d")
         top, side = (figure.add_subplot(2, 3, 3 * row + k) for k in (2, 3))
-        wrenches = np.array(surface["pulls"]["wrenches"])
-        fails = np.array([phalanx or "" for phalanx in surface["pulls"]["phalanx"]])
-        dragged = np.array([way == DRAGGED for way in surface["pulls"]["way"]])
+        wrenches = surface["pulls"]["wrenches"]
+        fails = np.array(surface["pulls"]["phalanx"])
+        dragged = np.array(surface["pulls"]["way"]) == DRAGGED
         for phalanx, colour in COLOURS.items():
             for mark, those, words in (
                 (".", ~dragged, "lets go"),
@@ -360,9 +311,9 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
 
 
 def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
+    figure, both = panels(1, 2, (12.0, 4.4))
     for axes, key, label in zip(
-        figure.subplots(1, 2),
+        both,
         ("force", "moment"),
         ("largest √(F_x² + F_z²) [N]", "largest M_y [N·m]"),
         strict=True,
@@ -370,8 +321,7 @@ def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
         for surface in surfaces:
             planes = surface["planes"]
             name = f"{1e3 * surface['diameter']:g} mm, {surface['tension']:g} N"
-            arms = 1e3 * np.array(planes["arm"])
-            (line,) = axes.plot(arms, planes[key], label=name)
+            (line,) = axes.plot(1e3 * planes["arm"], planes[key], label=name)
             best = planes[f"best_for_{key}"]
             axes.plot(1e3 * best["arm"], best[key], "o", color=line.get_color())
         axes.set(
@@ -380,6 +330,5 @@ def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
             xlim=(-60.0, 90.0),
             ylim=(0.0, None),
         )
-        axes.grid(alpha=0.3)
         axes.legend()
     return figure

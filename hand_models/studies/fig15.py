@@ -8,7 +8,8 @@ wrench it has one without F_x and M_y that pulls as hard.
 
 from __future__ import annotations
 
-from pathlib import Path
+import itertools
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -27,9 +28,10 @@ from hand_models.experiments import (
     clipped_vertices,
     distance_along,
     limit,
+    panels,
     rest_state,
-    save_picture,
     sharpened,
+    told,
     volume,
 )
 from hand_models.parameters import ParameterTable, experiment_table
@@ -40,11 +42,15 @@ TENSIONS: Final = 29
 """How many are tried."""
 
 RAYS: Final = 2000
+CUTS: Final = 12
 STARTS: Final = 4
 """Of each hull, before its limits are looked for; and of each search for them."""
 
 FORCES: Final = ("shear", "normal")
 COLOURS: Final = ("tab:blue", "tab:red")
+VALUES: Final = ("shear", "pure_shear", "normal", "volume", "pressed_share")
+"""What is found at each tension; not a number where nothing holds."""
+
 CLOSE: Final = 0.1
 """Newtons to which the tension is found at which closing alone fails."""
 
@@ -53,17 +59,8 @@ SLACK: Final = 0.02
 by local search."""
 
 
-def run(
-    progress: Progress, hand: ParameterTable, tensions: int = TENSIONS, rays: int = RAYS
-) -> StudyResult:
+def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Compute the limits at evenly spaced tensions.
-
-    Parameters
-    ----------
-    progress : Progress
-    hand : ParameterTable
-    tensions, rays : int, optional
-        How many tensions, and rays of each first hull.
 
     Raises
     ------
@@ -73,54 +70,50 @@ def run(
     table = gripper_table(hand)
     settings = experiment_table()
     least, most = settings.vector("fig15", "tensions")
-    tried = np.linspace(least, most, tensions)
+    tried = np.linspace(least, most, TENSIONS)
     diameters = settings.vector(PARAMETER_STUDIES, "diameters")
-    total = len(diameters) * len(tried)
+    each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
+    found = [_at(conditions.gripper(table)) for conditions in told(progress, each)]
     curves = []
-    for number, diameter in enumerate(diameters):
-        rows = []
-        for i, tension in enumerate(tried):
-            progress(number * len(tried) + i, total)
-            conditions = Conditions(diameter, float(tension))
-            rows.append(_at(conditions.gripper(table), rays))
+    for i, diameter in enumerate(diameters):
+        rows = found[i * TENSIONS : (i + 1) * TENSIONS]
+        columns = {key: [row[key] for row in rows] for key in rows[0]}
         curves.append(
             {
                 "diameter": diameter,
-                **{key: [row[key] for row in rows] for key in rows[0]},
+                **columns,
+                **{key: np.array(columns[key]) for key in VALUES},
                 "closing_alone_fails_at": _closing_limit(table, diameter, tried),
             }
         )
-    progress(total, total)
     data: dict[str, Any] = {
-        "surface": Conditions(diameters[0], float(tried[0])).surface,
+        "surface": each[0].surface,
         "force_to_moment": settings.scalar(PARAMETER_STUDIES, "force_to_moment"),
-        "tension": tried.tolist(),
+        "tension": tried,
         "curves": curves,
         "not_tested": ["how high the printed lines are: the figure has no numbers here"],
     }
     title = "force limits over the tension of the tendons"
-    return StudyResult("fig15", title, data, _claims(tried, curves))
+    return StudyResult("fig15", title, data, tuple(_claims(tried, curves)))
 
 
-def _at(grasp: Gripper, rays: int) -> dict[str, Any]:
-    """Return the limits of a gripper, and what is behind them; null where nothing holds."""
+def _at(grasp: Gripper) -> dict[str, Any]:
+    """Return the limits of a gripper, and what is behind them."""
     state = rest_state(grasp)
     try:
-        points = HullPoints.explored(grasp, rays)
-        points, _ = sharpened(grasp, points, "shear", starts=STARTS)
-        points, normal = sharpened(grasp, points, "normal", starts=STARTS)
+        points = HullPoints.explored(grasp, RAYS)
+        points, _ = sharpened(grasp, points, "shear", CUTS, STARTS)
+        points, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
         # the points added for one limit may raise the other
         shear = limit(points.wrenches, "shear")
     except EmptySetError:
-        keys = ("shear", "pure_shear", "normal", "volume", "pressed_share")
         nobody: dict[str, list[str]] = {f"{force}_phalanges": [] for force in FORCES}
-        return {"state": state, **dict.fromkeys(keys), **nobody}
+        return {"state": state, **dict.fromkeys(VALUES, np.nan), **nobody}
     ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
-    pure = float(distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0])
     return {
         "state": state,
         "shear": shear.value,
-        "pure_shear": pure if np.isfinite(pure) else None,
+        "pure_shear": distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0],
         "normal": normal.value,
         "volume": volume(clipped_vertices(points.wrenches)),
         "pressed_share": _pressed_share(grasp, points, shear),
@@ -161,150 +154,113 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
     return float(bisect(excess, tried[first - 1], tried[first], xtol=CLOSE))
 
 
-def _claims(tried: Array, curves: list[dict[str, Any]]) -> tuple[Claim, ...]:
+def _claims(tried: Array, curves: list[dict[str, Any]]) -> Iterator[Claim]:
     """Hold the sentences of Section 7.1 against the curves, as far as closing alone holds."""
-    strong, weak = (_Curve(tried, curve) for curve in curves)
+    strong, weak = (_Curve(curve) for curve in curves)
     both = strong.holds & weak.holds
     if not both.any():
         raise InvalidInputError("closes at none of the tensions without failing", field="hand")
-    claims = []
     for curve in (strong, weak):
         best, moderate = curve.best("volume"), curve.last // 2
-        widened = float(curve.volume[moderate] / curve.volume[0])
-        claims += [
-            Claim(
-                "moderate finger tendon forces help expand the wrench space (Section 7.1): its "
-                f"volume half way to the most tension at which closing alone holds, {curve.name}",
-                "more than at the least tension",
-                f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N",
-                widened > 1.0,
-            ),
-            Claim(
-                f"more than large ones do: the tension of most volume, {curve.name}",
-                "between the least and the most at which closing alone holds",
-                f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N",
-                0 < best < curve.last,
-            ),
-        ]
-    claims.append(
-        Claim(
-            "large tendon actuation may help obtain better normal attachment on lower curvature "
-            f"surfaces: normal limit, {weak.name}",
-            "more at the most tension than at that of most shear",
-            f"{weak.normal[weak.last]:.1f} N at {tried[weak.last]:g} N, "
-            f"{weak.normal[weak.best('shear')]:.1f} N at {tried[weak.best('shear')]:g} N",
-            bool(weak.normal[weak.last] > weak.normal[weak.best("shear")]),
+        widened = curve["volume"][moderate] / curve["volume"][0]
+        yield Claim(
+            "moderate finger tendon forces help expand the wrench space (Section 7.1): its "
+            f"volume half way to the most tension at which closing alone holds, {curve.name}",
+            "more than at the least tension",
+            f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N",
+            bool(widened > 1.0),
         )
+        yield Claim(
+            f"more than large ones do: the tension of most volume, {curve.name}",
+            "between the least and the most at which closing alone holds",
+            f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N",
+            0 < best < curve.last,
+        )
+    most, sheared = weak["normal"][weak.last], weak["normal"][weak.best("shear")]
+    yield Claim(
+        "large tendon actuation may help obtain better normal attachment on lower curvature "
+        f"surfaces: normal limit, {weak.name}",
+        "more at the most tension than at that of most shear",
+        f"{most:.1f} N at {tried[weak.last]:g} N, "
+        f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N",
+        bool(most > sheared),
     )
-    claims += [_claim_of_lost_shear(tried, curve) for curve in (weak, strong)]
+    for curve in (weak, strong):
+        best = curve.best("shear")
+        after = curve["shear"][best : curve.last + 1]
+        falls = bool((np.diff(after) <= SLACK * after[0]).all())
+        yield Claim(
+            f"but large tendon actuation gradually reduces shear loading capability: {curve.name}",
+            "less and less from some tension on",
+            f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
+            f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily"),
+            len(after) > 1 and falls and bool(after[-1] < (1.0 - SLACK) * after[0]),
+        )
     for force in FORCES:
-        high, low = getattr(strong, force)[both], getattr(weak, force)[both]
-        claims.append(
-            Claim(
-                f"the wrench space for a low curvature surface is lower: {force} limit",
-                "lower at every tension",
-                f"{np.min(low / high):.2f} to {np.max(low / high):.2f} times that on {strong.name}",
-                bool((low < high).all()),
-            )
+        high, low = strong[force][both], weak[force][both]
+        yield Claim(
+            f"the wrench space for a low curvature surface is lower: {force} limit",
+            "lower at every tension",
+            f"{np.min(low / high):.2f} to {np.max(low / high):.2f} times that on {strong.name}",
+            bool((low < high).all()),
         )
-        high_span, low_span = np.ptp(high), np.ptp(low)
-        claims.append(
-            Claim(
-                f"and less sensitive to tendon force variations: {force} limit",
-                "varies by less",
-                f"by {low_span:.1f} N, on {strong.name} by {high_span:.1f} N, over the tensions at "
-                "which both hold",
-                bool(low_span < high_span),
-            )
+        yield Claim(
+            f"and less sensitive to tendon force variations: {force} limit",
+            "varies by less",
+            f"by {np.ptp(low):.1f} N, on {strong.name} by {np.ptp(high):.1f} N, over the tensions "
+            "at which both hold",
+            bool(np.ptp(low) < np.ptp(high)),
         )
-    shares = [float(np.mean(curve.pressed_share[both])) for curve in (strong, weak)]
-    claims.append(
-        Claim(
-            "on more curved surfaces the normal force component of the contacts contributes "
-            "substantially to attachment: its share of F_x at the shear limit",
-            f"more on {strong.name} than on {weak.name}",
-            f"{shares[0]:.0%}, {shares[1]:.0%}; mean over the tensions at which both hold",
-            shares[0] > shares[1],
-        )
+    curved, flat = (float(np.mean(curve["pressed_share"][both])) for curve in (strong, weak))
+    yield Claim(
+        "on more curved surfaces the normal force component of the contacts contributes "
+        "substantially to attachment: its share of F_x at the shear limit",
+        f"more on {strong.name} than on {weak.name}",
+        f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold",
+        curved > flat,
     )
     beyond = [
-        tuple(found)
+        strong[f"{force}_phalanges"][i]
         for i in range(strong.best("shear"), strong.last + 1)
-        for found in strong.phalanges[i]
+        for force in FORCES
     ]
-    others = sorted({p for found in beyond for p in found if p not in ("proximal", "distal")})
-    ends = [any(p in ("proximal", "distal") for p in found) for found in beyond]
-    claims.append(
-        Claim(
-            "it can lead to premature failure at the distal or proximal phalanx: who fails at the "
-            f"limits, {strong.name}, from the tension of most shear on",
-            "proximal or distal, at most of the limits",
-            f"at {sum(ends)} of {len(ends)} limits; also: {', '.join(others) or 'nobody'}",
-            2 * sum(ends) > len(ends),
-        )
-    )
-    return tuple(claims)
-
-
-def _claim_of_lost_shear(tried: Array, curve: _Curve) -> Claim:
-    """Return the claim that beyond its best tension a surface loses shear, and ever more."""
-    best = curve.best("shear")
-    after = curve.shear[best : curve.last + 1]
-    falls = bool((np.diff(after) <= SLACK * after[0]).all())
-    return Claim(
-        f"but large tendon actuation gradually reduces shear loading capability: {curve.name}",
-        "less and less from some tension on",
-        f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
-        f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily"),
-        len(after) > 1 and falls and bool(after[-1] < (1.0 - SLACK) * after[0]),
+    others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
+    ends = sum("proximal" in found or "distal" in found for found in beyond)
+    yield Claim(
+        "it can lead to premature failure at the distal or proximal phalanx: who fails at the "
+        f"limits, {strong.name}, from the tension of most shear on",
+        "proximal or distal, at most of the limits",
+        f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}",
+        2 * ends > len(beyond),
     )
 
 
 class _Curve:
-    """The limits on a surface, over the tensions at which closing alone holds."""
+    """The limits on a surface, and where closing alone holds."""
 
-    def __init__(self, tried: Array, curve: dict[str, Any]) -> None:
+    def __init__(self, curve: dict[str, Any]) -> None:
         self.name = f"{1e3 * curve['diameter']:g} mm"
-        values = {
-            key: np.array(curve[key], dtype=float)
-            for key in ("shear", "normal", "volume", "pressed_share")
-        }
-        held = [state == "holds" for state in curve["state"]]
-        self.holds = np.array(held) & np.isfinite(values["shear"])
+        self.holds = (np.array(curve["state"]) == "holds") & np.isfinite(curve["shear"])
         self.last = int(np.flatnonzero(self.holds)[-1]) if self.holds.any() else 0
-        self.values = values
-        self.phalanges = list(zip(curve["shear_phalanges"], curve["normal_phalanges"], strict=True))
+        self.curve = curve
 
-    @property
-    def shear(self) -> Array:
-        return self.values["shear"]
-
-    @property
-    def normal(self) -> Array:
-        return self.values["normal"]
-
-    @property
-    def volume(self) -> Array:
-        return self.values["volume"]
-
-    @property
-    def pressed_share(self) -> Array:
-        return self.values["pressed_share"]
+    def __getitem__(self, key: str) -> Any:
+        return self.curve[key]
 
     def best(self, key: str) -> int:
         """Return at which of the tensions that hold a value is largest."""
-        return int(np.where(self.holds, self.values[key], -np.inf).argmax())
+        return int(np.where(self.holds, self.curve[key], -np.inf).argmax())
 
 
-def plot(result: StudyResult, folder: Path) -> list[Path]:
+def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the limits over the tension, dotted where closing alone fails."""
     data = result.data
-    tension = np.array(data["tension"])
-    figure = Figure(figsize=(12.0, 4.8), layout="constrained")
-    for axes, force in zip(figure.subplots(1, 2), FORCES, strict=True):
+    tension = data["tension"]
+    figure, (shear, normal) = panels(1, 2, (12.0, 4.8))
+    for axes, force in zip((shear, normal), FORCES, strict=True):
         for curve, colour in zip(data["curves"], COLOURS, strict=True):
-            values = np.array(curve[force], dtype=float)
-            holds = np.array([state == "holds" for state in curve["state"]])
+            values = curve[force]
+            holds = np.array(curve["state"]) == "holds"
             name = f"{1e3 * curve['diameter']:g} mm"
             axes.plot(tension, values, ":", color=colour)
             axes.plot(tension, np.where(holds, values, np.nan), color=colour, label=name)
@@ -326,13 +282,11 @@ def plot(result: StudyResult, folder: Path) -> list[Path]:
             xlim=(0.0, tension[-1]),
             ylim=(0.0, None),
         )
-        axes.grid(alpha=0.3)
         axes.legend(title="diameter")
-    shear, normal = figure.axes
     shear.set_title(
         f"largest $F_x$ with $F_z \\leq 0$ at $F_x = "
         f"{data['force_to_moment']:g}\\,\\mathrm{{m^{{-1}}}}\\ M_y$"
     )
     normal.set_title("largest $-F_z$")
     figure.suptitle(data["surface"])
-    return [save_picture(figure, folder / "fig15.png")]
+    return {"fig15": figure}

@@ -1,7 +1,7 @@
 """The paper's experiments, run again: figures, data, and every claim of the text held against them.
 
 A study is a module of this package with ``run(progress, hand) -> StudyResult`` and
-``plot(result, folder) -> list[Path]``; ``hand`` is the whole table of the hand, the bundled one or
+``plot(result) -> dict[str, Figure]``; ``hand`` is the whole table of the hand, the bundled one or
 one with entries of the caller's. What the model misses stays among the claims as missed.
 """
 
@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 import msgspec
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 from hand_models.base import InvalidInputError, Progress, whole_file
 from hand_models.experiments import StudyResult
@@ -47,8 +51,8 @@ class Study(Protocol):
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
         """Compute everything, for a hand."""
 
-    def plot(self, result: StudyResult, folder: Path) -> list[Path]:
-        """Write the pictures, and return where they are."""
+    def plot(self, result: StudyResult) -> dict[str, Figure]:
+        """Draw the pictures, by their files' names."""
 
 
 def load_study(name: str) -> Study:
@@ -65,8 +69,13 @@ def load_study(name: str) -> Study:
 
 
 def as_json(result: StudyResult) -> dict[str, Any]:
-    """Return the content of ``result.json``."""
-    return {"v": 1, **asdict(result)}
+    """Return the content of ``result.json``: lists for arrays, null for what is no number there."""
+    return {"v": 1, **msgspec.to_builtins(result, enc_hook=_plain)}
+
+
+def _plain(value: Any) -> Any:
+    array = np.asarray(value)
+    return np.ma.masked_where(array != array, array).tolist()
 
 
 def run_study(
@@ -87,6 +96,7 @@ def run_study(
     Returns
     -------
     result : StudyResult
+        Its data as in ``result.json``.
     files : list of Path
         ``result.json`` first.
 
@@ -102,8 +112,12 @@ def run_study(
     hand = hand or hand_table()
     changed = hand.difference(hand_table()).sections
     result = replace(study.run(progress, hand), hand=msgspec.to_builtins(changed))
-    file = folder / "result.json"
     text = json.dumps(as_json(result), indent=2, ensure_ascii=False, allow_nan=False)
-    with whole_file(file) as part:
+    files = [folder / "result.json"]
+    with whole_file(files[0]) as part:
         part.write_text(text + "\n", encoding="utf-8")
-    return result, [file, *study.plot(result, folder)]
+    for picture, figure in study.plot(result).items():
+        files.append(folder / f"{picture}.png")
+        with whole_file(files[-1]) as part:
+            figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
+    return replace(result, data=json.loads(text)["data"]), files

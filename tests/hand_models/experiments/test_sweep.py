@@ -10,16 +10,16 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     Axis,
     Conditions,
+    HullPoints,
     Sweep,
-    failing,
     radius_axes,
     rest_state,
+    sharpened,
     sweep_cell,
-    sweep_grid,
+    sweep_map,
 )
-from hand_models.experiments.force_limits import force_limits
+from hand_models.experiments.pictures import entry_name
 from hand_models.experiments.sweep import CUTS, RAYS, STARTS
-from hand_models.experiments.sweep_picture import entry_name
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from service.commands.cli import run
 
@@ -82,28 +82,32 @@ def test_a_cell_is_what_the_gripper_holds(table):
     grasp = CONDITIONS.gripper(table)
     cell = sweep_cell(table, CONDITIONS, ["shear", "normal"])
     assert cell.state == rest_state(grasp)
-    assert cell.limits == force_limits(grasp, RAYS, ["shear", "normal"], CUTS, STARTS)
+    points, shear = sharpened(grasp, HullPoints.explored(grasp, RAYS), "shear", CUTS, STARTS)
+    _, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
+    assert cell.limits == {"shear": shear.value, "normal": normal.value}
 
 
 def test_the_rows_of_a_grid_are_those_of_y(table):
     x = Axis.parse("gripper.pull_off_slope=1:4:2", table, FINE)
     y = Axis.parse("finger.pulley_radii[2]=0.002:0.0055:2", table, FINE)
     told = []
-    rows = sweep_grid(table, x, y, CONDITIONS, ["normal"], lambda *step: told.append(step))
+    found = sweep_map(table, x, y, CONDITIONS, ["normal"], lambda *step: told.append(step))
     assert [done for done, _ in told] == [0, 1, 2, 3, 4]
     # a distal pulley as large as the proximal one ejects the gripper, whatever it holds
-    assert [cell.state for cell in rows[0]] == ["holds", "holds"]
-    assert "holds" not in [cell.state for cell in rows[1]]
-    assert failing(rows) == 0.5
+    assert found["state"][0].tolist() == ["holds", "holds"]
+    assert "holds" not in found["state"][1]
+    assert found["failing"] == 0.5
     # a steeper loss under pull-off leaves less
-    assert rows[0][0].limits["normal"] > rows[0][1].limits["normal"]
+    limits = found["limits"]["normal"]
+    assert limits[0, 0] > limits[0, 1]
+    assert np.isnan(limits[1]).all()
 
 
 def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
     bases = Axis.parse("gripper.base_half_spacing=0.03:0.5:2", table, FINE)
     slope = Axis.parse("gripper.pull_off_slope=3:4:2", table, FINE)
-    rows = sweep_grid(table, bases, slope, CONDITIONS, ["normal"], quiet)
-    assert [[cell.state for cell in row] for row in rows] == [["holds", "no grasp"]] * 2
+    found = sweep_map(table, bases, slope, CONDITIONS, ["normal"], quiet)
+    assert found["state"].tolist() == [["holds", "no grasp"]] * 2
     with pytest.raises(InvalidInputError, match="too far"):
         Sweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
             quiet, hand_table()

@@ -55,7 +55,7 @@ def test_a_box_is_loaded_best_in_its_diagonals():
     assert found["best_for_force"]["force"] == pytest.approx(np.hypot(40.0, 20.0))
     assert abs(found["best_for_force"]["arm"]) == pytest.approx(1.0 / 40.0)
     # of four diagonals that are as good, those to the right
-    assert found["best_for_force"]["wrench"][:2] == [40.0, -20.0]
+    assert found["best_for_force"]["wrench"][:2].tolist() == [40.0, -20.0]
     assert found["best_for_moment"]["moment"] == 1.0
     low, high = found["best_for_force"]["arms_as_good"]
     assert -0.0255 < low < -0.0245

@@ -1,6 +1,7 @@
 """Figs. 15 and 16: what must hold of them however the gripper is calibrated."""
 
 import json
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,38 +14,22 @@ from hand_models.studies import as_json, fig15, fig16, load_study, run_study
 PROXIMAL, DISTAL = 0, 2
 
 
-class Coarse:
-    """A study at coarse settings."""
-
-    def __init__(self, module, *settings):
-        self.module, self.settings, self.told = module, settings, []
-
-    def run(self, progress, hand):
-        def tell(done, total):
-            self.told.append((done, total))
-            progress(done, total)
-
-        return self.module.run(tell, hand, *self.settings)
-
-    def plot(self, result, folder):
-        return self.module.plot(result, folder)
-
-
-def coarse(module, folder, *settings):
+def coarse(module, folder, **settings):
     """Run a study coarsely; return its result, its files and what it told."""
-    study = Coarse(module, *settings)
-    result, files = run_study(study, folder, lambda done, total: None)
-    return result, files, study.told
+    told = []
+    with patch.multiple(module, **settings):
+        result, files = run_study(module, folder, lambda done, total: told.append((done, total)))
+    return result, files, told
 
 
 @pytest.fixture(scope="module")
 def tensions(tmp_path_factory):
-    return coarse(fig15, tmp_path_factory.mktemp("fig15"), 3, 100)
+    return coarse(fig15, tmp_path_factory.mktemp("fig15"), TENSIONS=3, RAYS=100)
 
 
 @pytest.fixture(scope="module")
 def radii(tmp_path_factory):
-    return coarse(fig16, tmp_path_factory.mktemp("fig16"), 3, 2)
+    return coarse(fig16, tmp_path_factory.mktemp("fig16"), POINTS=3, COARSE_POINTS=2)
 
 
 @pytest.mark.parametrize("name", ["tensions", pytest.param("radii", marks=pytest.mark.slow)])

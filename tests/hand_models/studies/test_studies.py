@@ -98,7 +98,7 @@ def test_the_claims_of_figure_7_are_those_of_its_data(results):
 
 def test_friction_hurts_only_where_three_weak_tiles_meet_one_strong(results):
     variants = results["fig07"].data["variants"]
-    assert variants["tiles"]["hurts"] == [[1, 1, 1, 3], [1, 1, 3, 1]]
+    assert variants["tiles"]["hurts"] == [(1, 1, 1, 3), (1, 1, 3, 1)]
     assert variants["tiles and palm"]["hurts"] == []
     one_weak = results["fig07"].data["by_number_of_softest_tiles"][0]
     assert one_weak["softest_tiles"] == 1

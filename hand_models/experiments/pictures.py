@@ -1,9 +1,9 @@
-"""A sweep's map as a picture."""
+"""What the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +11,20 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from hand_models.experiments.force_limits import MEASURES, Measure
 from hand_models.finger import PHALANGES
 
-__all__ = ["NO_GRASP", "conditions_title", "draw_map", "entry_name", "legend"]
+__all__ = [
+    "NO_GRASP",
+    "conditions_title",
+    "draw_map",
+    "entry_name",
+    "label_solid",
+    "legend",
+    "panels",
+]
 
 NO_GRASP: Final = "no grasp"
 STATES: Final = {
@@ -33,6 +42,47 @@ SINGULAR: Final = {"pulley_radii": "pulley radius"}
 
 SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
 """By SI unit, the scale and the unit that pictures have instead."""
+
+
+LABEL_GAP: Final = 8.0
+"""Between numbers and labels of three-dimensional axes [pt]."""
+
+CORNER: Final = 0.1
+"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
+
+
+def panels(
+    rows: int,
+    columns: int,
+    size: tuple[float, float],
+    grid: Literal["x", "y", "both"] = "both",
+    **options: Any,
+) -> tuple[Figure, list[Any]]:
+    """Return a figure of some inches, and its axes row by row, with lines across them.
+
+    ``options`` are matplotlib's for subplots.
+    """
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+    for each in axes:
+        each.grid(axis=grid, alpha=0.3)
+    return figure, axes
+
+
+def label_solid(axes: Any, title: str) -> None:
+    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
+    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(5))
+        axis.labelpad = LABEL_GAP
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        corner = CORNER * (high - low)
+        ticks = MaxNLocator(4).tick_values(low, high)
+        axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
+    axes.invert_zaxis()
+    axes.set_box_aspect(None, zoom=0.85)
+    axes.view_init(elev=25.0, azim=-50.0)
 
 
 def conditions_title(conditions: dict[str, Any]) -> str:
@@ -59,11 +109,10 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
     ----------
     axes : Axes
     data : dict
-        From `map_data`.
+        From `sweep_map`.
     measure : str
     """
-    states = np.array(data["state"])
-    values = np.array(data["limits"][measure], dtype=float)
+    states, values = data["state"], data["limits"][measure]
     sides, labels = [], []
     for side in (data["x"], data["y"]):
         scale, unit = SHOWN.get(side["unit"], (1.0, side["unit"]))
@@ -86,7 +135,7 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
 
 def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
     """Tell below the maps of a figure what their colours and the diamond mean."""
-    met = {state for data in maps for row in data["state"] for state in row}
+    met = {state for data in maps for state in data["state"].flat}
     handles: list[Any] = [
         Patch(color=colour, label=text) for state, (colour, text) in STATES.items() if state in met
     ]
