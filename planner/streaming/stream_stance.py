@@ -13,17 +13,15 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, UnsupportedError
-from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
-from planner.prepare import HandBatch
 from planner.programs import WRENCH_UNIT, Outcome
 from planner.question import Question
-from planner.result import LoadRecovery, Plan
+from planner.result import LoadRecovery, Plan, PlanArrays
 from planner.solving import KnownStance, is_least, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
-from planner.verification import LoadsCheck
+from planner.verification import Check, LoadsCheck
 
 __all__ = ["LoadEffects", "Solved", "StreamStance", "SupportBound"]
 
@@ -106,11 +104,11 @@ class StreamStance:
         self.columns = tuple(space.columns for space in spaces)
         sizes = [len(names) for names in self.columns]
         self.shape = len(spaces), max(sizes)
-        self.check = LoadsCheck(
-            prepared.question, prepared.batch.hands, self.columns, prepared.where
-        )
+        reader = LoadRecovery(prepared.batch, spaces)
+        check = Check(prepared.question, prepared.batch, prepared.where)
+        self.check = LoadsCheck(check, reader, self.columns)
         self.drive = prepared.batch.hands[0].hand.drive
-        self.winches = _winches(prepared.batch, spaces)
+        self.winches = _winches(reader, spaces)
         self._least = np.zeros(self.shape)
         limits = max(len(space.s) for space in spaces)
         self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
@@ -168,17 +166,7 @@ class StreamStance:
 
     def loads_of(self, plan: Plan) -> Array:
         """Return the loads (hands, m) of a plan."""
-        loads = np.zeros(self.shape)
-        for row, names, hand in zip(loads, self.columns, plan.hands or (), strict=True):
-            fingers = [tile.finger for tile in hand.tiles]
-            by_name = {PALM_SHEAR: -hand.palm.force[0], PALM_PRESSING: hand.palm.force[2]}
-            for i, finger in enumerate(FINGERS):
-                own = [t for t, name in enumerate(fingers) if name == finger]
-                by_name[f"{finger}/tension"] = hand.tensions[i]
-                by_name[f"{finger}/lateral"] = hand.loads[own, 2].sum()
-                by_name[f"{finger}/{NAIL}"] = hand.loads[own[-1], 0]
-            row[: len(names)] = [by_name[name] for name in names]
-        return loads
+        return self.check.loads_of(PlanArrays.of(plan.hands or ()))
 
     def _scaled(self, body_wrench: Array) -> Array:
         whole = self._data.wrench.copy()
@@ -193,9 +181,9 @@ class StreamStance:
         return np.maximum(whole, self._least)
 
 
-def _winches(batch: HandBatch, spaces: Sequence[WrenchSpace]) -> Array:
+def _winches(reader: LoadRecovery, spaces: Sequence[WrenchSpace]) -> Array:
     """Return the winches' angles without tension and per newton, which no other load changes."""
-    reader, tendons = LoadRecovery(batch, spaces), len(FINGERS)
+    tendons = len(FINGERS)
     loads = [np.zeros(len(space.columns)) for space in spaces]
     at_zero = reader.read(loads).arrays.drives[-1]
     for y in loads:

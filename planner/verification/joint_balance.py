@@ -1,8 +1,8 @@
 """Whether forces on the rock balance joints and tendons (Eqs. 4–8), for the check of plans.
 
-Nothing is solved here: what a plan tells is put into the balance. About joint i, of angle q_i to
-the phalanx before it, the forces F_j on the rock of its own phalanx and those beyond turn as much
-as what the tendon leaves of its spring,
+What a plan tells is put into the balance. About joint i, of angle q_i to the phalanx before it, the
+forces F_j on the rock of its own phalanx and those beyond turn as much as what the tendon leaves of
+its spring,
 
     Σ_{j ≥ i} (p_j − p_i) × F_j = M_i r_i f − k_i q_i − τ_i,
 
@@ -10,7 +10,8 @@ and a tile carries the shear φ_t M_t (g f + (e_t − g) f_c), with the closing 
 its spines engaged and the share φ_t of them that did. Moments are taken about the joints' axes in
 H, of the forces where the plan has them, each axis a row (a × p, −a) that is multiplied by a wrench
 (F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for a joint
-at (x, z) of its plane.
+at (x, z) of its plane. Nothing here is shared with the way settled hands find their affine maps
+(Eq. 14); only where something is off, the balance is solved for what would be right.
 """
 
 from __future__ import annotations
@@ -21,12 +22,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array
+from hand_models.base import SKEW, Array
+from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
-from planner.prepare import KEPT, NONE, NOTHING, HandBatch
-from planner.verification.equilibrium import JOINTS, SIDES, tendons_of
+from planner.prepare import KEPT, NONE, NOTHING, HandBatch, TileIndex
 
-__all__ = ["LEVER", "JointBalance"]
+__all__ = ["CROSS", "LEVER", "JointBalance", "TendonEffects", "tendons_of", "wrenches_of"]
+
+JOINTS: Final = len(PHALANGES)
+
+SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in STOPS])
+"""Which way a joint presses on the limit at which it stands, by code of `STOPS`."""
 
 LEVER: Final = 5e-4
 """Loads whose balance is off by no more than a force at this lever are off by no more than it [m].
@@ -40,6 +46,74 @@ NOWHERE: Final = np.zeros(0)
 
 OUTWARD: Final = np.tri(JOINTS).T
 """Of each joint, the phalanges that it turns."""
+
+CROSS: Final = SKEW.transpose(0, 2, 1).reshape(9, 3)
+"""From p ⊗ F to the moment p × F."""
+
+
+def wrenches_of(points: Array, forces: Array) -> Array:
+    """Return the wrenches (n, 6) of forces at some places, both (n, 3)."""
+    moments = (points[:, :, None] * forces[:, None]).reshape(-1, len(CROSS)) @ CROSS
+    return np.concatenate((forces, moments), axis=1)
+
+
+class TendonEffects(NamedTuple):
+    """What the fingers' tendons do at their joints and tiles, all of which touch.
+
+    Attributes
+    ----------
+    stiffness, preload : ndarray, shape (3,)
+        Of the joints' springs [N·m/rad], [N·m].
+    radii : ndarray, shape (3,)
+        Of the pulleys [m].
+    travel : float
+        How much tendon a tile draws in per newton of its spring [m/N].
+    drawn : ndarray, shape (F,)
+        How much tiles without shear draw in per newton of tension [m/N].
+    pull : ndarray, shape (F, 3)
+        M r of the joints [m].
+    gain, engaged : ndarray, shape (T,)
+        Shear of each tile per newton of tension, and at zero tension per newton of closing tension;
+        of nails zero.
+    """
+
+    stiffness: Array
+    preload: Array
+    radii: Array
+    travel: float
+    drawn: Array
+    pull: Array
+    gain: Array
+    engaged: Array
+
+
+@lru_cache(maxsize=KEPT)
+def tendons_of(places: TileIndex, hand: HandModel) -> TendonEffects:
+    """Return what the tendons of hands do, all of one model."""
+    model, drive = hand.finger, hand.drive
+    loss = 1.0 - model.friction
+    # what is left of the tension at each phalanx's tile; a base tile comes first
+    local: Array = np.full((len(places.phalanges), JOINTS), loss) ** np.arange(JOINTS)
+    local[places.base_fingers] *= loss
+    radii = np.array(model.pulley_radii)
+    gain, engaged = np.zeros((2, len(places.hand)))
+    gain[places.phalanges] = local * model.shear_gain
+    gain[places.bases] = model.shear_gain
+    engaged[places.phalanges] = local * (np.array(model.engagement) - model.shear_gain)
+    engaged[places.bases] = model.base_engagement - model.shear_gain
+    travel = drive.pulley_ratio / drive.tile_stiffness
+    strands = local.sum(axis=1)
+    strands[places.base_fingers] += 1.0
+    return TendonEffects(
+        stiffness=np.array(model.joint_stiffness),
+        preload=np.array(model.joint_preload),
+        radii=radii,
+        travel=travel,
+        drawn=travel * drive.pulley_ratio * strands,
+        pull=local * radii,
+        gain=gain,
+        engaged=engaged,
+    )
 
 
 class JointBalance:
@@ -59,7 +133,7 @@ class JointBalance:
 
     def __init__(self, known: HandBatch) -> None:
         hands, places, touch = known.hands, known.places, known.touch
-        self._places, body = places, hands[0].hand
+        self._known, body = known, hands[0].hand
         self._tendons = tendons = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
         self._shear = tendons.engaged * closing.take(places.hand) * known.engagement
@@ -75,8 +149,8 @@ class JointBalance:
         self.held: NDArray[np.bool_] | None = None
         self.stop_fingers = self.stop_joints = NONE
         if len(touch.touching) < len(places.hand):
-            bears = touch.contacts[places.phalanges] != NOTHING
-            alone = ~bears.any(axis=1, keepdims=True)
+            self._bears = touch.contacts[places.phalanges] != NOTHING
+            alone = ~self._bears.any(axis=1, keepdims=True)
             self.held = (known.stops > 0) | alone
             sides = SIDES[known.stops] * ~alone
             self.stop_fingers, self.stop_joints = sides.nonzero()
@@ -84,7 +158,7 @@ class JointBalance:
 
     def shears(self, tensions: Array) -> Array:
         """Return the shear of each tile at tensions (F,) of the tendons, shape (T,); of nails 0."""
-        found = tensions.take(self._places.finger)
+        found = tensions.take(self._known.places.finger)
         found *= self._gain
         found += self._shear
         return found
@@ -98,7 +172,7 @@ class JointBalance:
         wrenches : ndarray, shape (T + …, 6)
             Of each tile on the rock about the origin of H, first those of the tiles.
         """
-        outward = OUTWARD @ wrenches.take(self._places.phalanges, 0)
+        outward = OUTWARD @ wrenches.take(self._known.places.phalanges, 0)
         found = self._tendons.pull * tensions[:, None]
         found += self._rest
         found -= np.add.reduce(self._axes * outward, axis=2)
@@ -109,6 +183,40 @@ class JointBalance:
         if not len(self.stop_fingers):
             return NOWHERE
         return np.asarray(left[self.stop_fingers, self.stop_joints] * self._sides)
+
+    def solved(self, tensions: Array) -> tuple[Array, Array, Array]:
+        """Solve the balance of the joints that are free for the normals.
+
+        Returns
+        -------
+        shear, normal : ndarray, shape (T,)
+            Of each tile [N]; of nails zero.
+        left : ndarray, shape (F, 3)
+            As of `left`.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If contacts do not hold the joints that are free.
+        """
+        known, places = self._known, self._known.places
+        shear, normal = self.shears(tensions), np.zeros(len(places.hand))
+        points, axes = known.points[: len(shear)], known.axes
+        along, into = wrenches_of(points, axes[:, 0]), wrenches_of(points, axes[:, 1])
+        left = self.left(tensions, along * shear[:, None])
+        turns = self._axes @ into[places.phalanges].transpose(0, 2, 1) * OUTWARD
+        A, b = turns.copy(), left.copy()
+        if self.held is not None:
+            which, held = self.held.nonzero()
+            idle, phalanx = (~self._bears).nonzero()
+            if not np.array_equal(which, idle):
+                raise np.linalg.LinAlgError("contacts do not hold the joints that are free")
+            # in place of the balance of a joint that is held, the normal of what bears nothing is 0
+            A[which, held], b[which, held] = 0.0, 0.0
+            A[which, held, phalanx] = 1.0
+        normals = np.linalg.solve(A, b[:, :, None])
+        normal[places.phalanges] = normals[:, :, 0]
+        return shear, normal, left - (turns @ normals)[:, :, 0]
 
 
 class _Planes(NamedTuple):

@@ -7,7 +7,7 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,7 +18,10 @@ from planner.prepare import BALL, Posture
 from planner.question import HandOnHold, Question
 from planner.robots import LimbTorques, LinkTree
 
-__all__ = ["LimbUse", "check_asked", "check_limbs", "force_use"]
+__all__ = ["check_asked", "check_limbs", "force_use"]
+
+NOTHING: Final = np.zeros(0)
+"""Of a hand without a cap."""
 
 TORQUE: Final = 1e-6
 """Largest disagreement of a joint's torque, relative to the largest of its limb or 1 N·m."""
@@ -36,29 +39,14 @@ BEYOND: Final = 1e-6
 """How far an angle may be beyond its joint's limit [rad]."""
 
 
-class LimbUse(NamedTuple):
-    """How much of their joints' torques limbs use.
-
-    Attributes
-    ----------
-    utilisation : dict of str to float
-        By limb: the largest of |torque| over limit.
-    effort : dict of str to float
-        By limb: the sum of (torque / limit)².
-    """
-
-    utilisation: dict[str, float]
-    effort: dict[str, float]
-
-
 def check_limbs(
     found: list[str],
     question: Question,
     wrenches: Mapping[str, Array],
     body_wrench: Array,
     where: Posture | None,
-) -> LimbUse:
-    """Check joints and the robot's own weight; return how much all limbs use of their joints.
+) -> dict[str, Array]:
+    """Check joints and the robot's own weight; return the torques of all limbs over their limits.
 
     Parameters
     ----------
@@ -71,11 +59,11 @@ def check_limbs(
         The one planned for, in B.
     where : Posture or None
     """
-    use = LimbUse({}, {})
+    shares: dict[str, Array] = {}
     if (where is None) != (question.stance.joints is None):
         found.append("the joints are not what the question says of them")
     if where is None:
-        return use
+        return shares
     robot = question.stance.robot
     own = _hold_up(question, wrenches, where)
     _check_places(found, question, where, own)
@@ -91,10 +79,8 @@ def check_limbs(
         for name, torque, claim in zip(said.names, torques, claimed, strict=True):
             if not abs(torque - claim) <= allowed:
                 found.append(f"{limb}: joint {name} bears {torque:.6g} N·m, not {claim:.6g}")
-        shares = np.abs(torques) / _limits(question, limb)
-        use.utilisation[limb] = float(shares.max())
-        use.effort[limb] = float(np.sum(shares**2))
-    return use
+        shares[limb] = torques / _limits(question, limb)
+    return shares
 
 
 def _limits(question: Question, limb: str) -> Array:
@@ -147,36 +133,39 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
 
 def force_use(
     found: list[str], question: Question, place: HandOnHold, wrench: Array, allowed: float
-) -> float:
-    """Check the cap on a hand's force, by its wrench; return its utilisation.
+) -> tuple[Array, Array]:
+    """Check the cap on a hand's force, by its wrench.
 
-    Without a direction, that of its rows must be no less than that of the force itself.
+    Without a direction, the utilisation of its rows must be no less than that of the force itself.
+
+    Returns
+    -------
+    used : ndarray
+        Utilisation along each direction that is capped.
+    none : ndarray
+        The force along each direction in which there may be none [N].
     """
     cap = question.limits.per_hand.get(place.limb)
     if cap is None:
-        return 0.0
+        return NOTHING, NOTHING
     force = wrench[:3]
     if not isinstance(cap.largest_force, tuple):
-        used = float((BALL @ force).max()) / cap.largest_force
-        size = float(np.linalg.norm(force))
-        if not size <= used * cap.largest_force + allowed:
+        along, size = BALL @ force, float(np.linalg.norm(force))
+        if not size <= along.max() + allowed:
             found.append(f"{place.limb}: the hand exerts {size:.6g} N, more than its rows say")
-        return used
+        return along / cap.largest_force, NOTHING
     if cap.frame != "hand":
         force = place.pose.rotation @ force
     if cap.frame == "body":
         force = question.stance.body.rotation.T @ force
-    used = 0.0
-    for axis, along, (low, high) in zip("xyz", force, cap.largest_force, strict=True):
-        end = high if along > 0.0 else low
-        if end == 0.0:
-            if not abs(along) <= allowed:
-                found.append(
-                    f"{place.limb}: {along:.6g} N along {axis} of the {cap.frame}, of none"
-                )
-        else:
-            used = max(used, float(along / end))
-    return used
+    ends = np.array(cap.largest_force)
+    both, barred = np.column_stack([force, force]), ends == 0.0
+    none = both * [-1.0, 1.0]
+    for axis in (barred & ~(none <= allowed)).any(axis=1).nonzero()[0].tolist():
+        found.append(
+            f"{place.limb}: {force[axis]:.6g} N along {'xyz'[axis]} of the {cap.frame}, of none"
+        )
+    return both[~barred] / ends[~barred], none[barred]
 
 
 def check_asked(

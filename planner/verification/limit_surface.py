@@ -1,4 +1,4 @@
-"""The limit surface of tiles (Eq. 21 and what stands beside it), load by load, for the check.
+"""The limits of tiles, for the check: the plan's half-planes, and Eq. 21 itself, load by load.
 
 The same surface as `Surface.strength`, written in the load itself instead of its direction: with a
 the load in the tile's plane and r its size, cos φ = a / r and cos θ = T / a, so that
@@ -10,18 +10,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.tile import Surface
-from planner.prepare import KEPT_NAMES
+from hand_models.tile import HalfPlane, Surface
+from planner.prepare import KEPT, TileIndex
 
-__all__ = ["LimitCurves"]
+__all__ = ["LimitCurves", "planes_of"]
 
 SMALL: Final = 1e-300
 """In place of a load that is zero, where something is divided by it [N]."""
+
+
+@lru_cache(maxsize=KEPT)
+def planes_of(pieces: tuple[tuple[HalfPlane, ...], ...], places: TileIndex) -> Array:
+    """Return hands' half-planes over their capacities, of each tile if all its spines hold.
+
+    Shape (T, 2 p, 3), for lateral loads of either sign; zero where a hand has fewer than others.
+    """
+    most = max(map(len, pieces))
+    tables = [
+        [
+            (p.a_shear / p.capacity, p.a_normal / p.capacity, side * p.a_lateral / p.capacity)
+            for side in (1.0, -1.0)
+            for p in own
+        ]
+        + [(0.0, 0.0, 0.0)] * 2 * (most - len(own))
+        for own in pieces
+    ]
+    return np.array(tables).take(places.hand, 0)
 
 
 class LimitCurves:
@@ -33,21 +52,16 @@ class LimitCurves:
         Some of them, in any order.
     of_tile : ndarray of int, shape (n,)
         Which of them each tile has.
-    shares : ndarray, shape (n,), optional
-        Part of each tile's spines that are on the rock: that of a whole tile's strength; by default
-        all.
+    shares : ndarray, shape (n,) or ()
+        Part of each tile's spines that are on the rock: that of a whole tile's strength.
     """
 
-    def __init__(
-        self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array | None = None
-    ) -> None:
-        flat, loss, per_radian, gain = (
-            numbers.take(of_tile, -1) for numbers in _numbers(tuple(surfaces))
-        )
-        if shares is not None:
-            flat[0] *= shares
-            loss[0] *= shares
-        self._numbers = _Numbers(flat, loss, per_radian, gain)
+    def __init__(self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array) -> None:
+        numbers = [_numbers(surface) for surface in surfaces]
+        of_each = np.array(numbers).T.take(of_tile, 1)
+        of_each[[0, 2]] *= shares
+        # f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max; −1 / φ_max; γ
+        self._flat, self._loss, (self._per_radian, self._gain) = np.split(of_each, [2, 4])
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
         """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
@@ -64,49 +78,24 @@ class LimitCurves:
         ndarray, shape (n,)
             Negative inside.
         """
-        flat, loss, per_radian, gain = self._numbers
         along = np.hypot(shear, lateral)
         pull = np.minimum(normal, 0.0)
         # pressed, a tile holds what it does in its own plane, and more by the gain
         size = np.hypot(along, pull)
-        ratio = np.minimum(np.arctan2(pull, along) * per_radian, 1.0)
-        straight, aside = flat - loss * ratio
+        ratio = np.minimum(np.arctan2(pull, along) * self._per_radian, 1.0)
+        straight, aside = self._flat - self._loss * ratio
         strength = straight * (1.0 - aside * ((along - shear) / (size + SMALL)))
-        return np.asarray(size - gain * (normal - pull) - (1.0 + relative) * strength)
+        return np.asarray(size - self._gain * (normal - pull) - (1.0 + relative) * strength)
 
 
-class _Numbers(NamedTuple):
-    """The numbers of some surfaces.
-
-    Attributes
-    ----------
-    flat, loss : ndarray, shape (2, n)
-        f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max.
-    per_radian : ndarray, shape (n,)
-        −1 / φ_max.
-    gain : ndarray, shape (n,)
-        γ.
-    """
-
-    flat: Array
-    loss: Array
-    per_radian: Array
-    gain: Array
-
-
-@lru_cache(maxsize=KEPT_NAMES)
-def _numbers(surfaces: tuple[Surface, ...]) -> _Numbers:
-    flat, loss = np.zeros((2, 2, len(surfaces)))
-    for i, surface in enumerate(surfaces):
-        share = surface.lateral_limit / surface.shear_limit
-        flat[:, i] = surface.shear_limit, 1.0 - share
-        loss[:, i] = (
-            surface.shear_limit - surface.pull_off_limit,
-            share * (surface.lateral_pull_off_ratio - 1.0),
-        )
-    return _Numbers(
-        flat,
-        loss,
-        np.array([-1.0 / surface.pull_off_angle for surface in surfaces]),
-        np.array([surface.compression_gain for surface in surfaces]),
+def _numbers(surface: Surface) -> tuple[float, ...]:
+    """Return f_s and 1 − λ at φ = 0, what they lose up to φ_max, −1 / φ_max, γ."""
+    share = surface.lateral_limit / surface.shear_limit
+    return (
+        surface.shear_limit,
+        1.0 - share,
+        surface.shear_limit - surface.pull_off_limit,
+        share * (surface.lateral_pull_off_ratio - 1.0),
+        -1.0 / surface.pull_off_angle,
+        surface.compression_gain,
     )

@@ -1,35 +1,36 @@
 """The check of one stance's plans, for one body wrench after the other: `check`, prepared.
 
 Every load of a hand with a fixed wrist is affine in what its plan chooses: tensions, lateral
-reactions, nails' pulls, the palm's loads. For a stance that stays, the check's own way from these
-to tiles, wrenches, limits and joints is worked out once (`planner.verification.hand_check`). A plan
-is then checked by one matrix, and by what is not affine: Eq. 21's curve, and the force that a hand
-holds.
+reactions, nails' pulls, the palm's loads. For a stance that stays, the check's own numbers are
+worked out once, without loads and for each newton of one: what must be zero, and is so for these,
+is zero for all loads. A plan is then checked by one matrix, and by what is not affine: Eq. 21's
+curve, and the force that a hand holds.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
 from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, skew
-from hand_models.hand import SettledHand
-from planner.prepare import BALL, Posture, torque_limits
-from planner.question import HandOnHold, Question
-from planner.robots import LinkTree
-from planner.verification.arrays import LOAD, UTILISATION
-from planner.verification.check import BALANCE
-from planner.verification.hand_check import HandCheck, JointUse, hand_check
-from planner.verification.limbs import check_limbs
+from hand_models.base import Array, Indices
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
+from hand_models.hand import FINGERS, NAIL
+from planner.prepare import BALL
+from planner.result import LoadRecovery, PlanArrays
+from planner.verification.check import BALANCE, Check
+from planner.verification.limbs import force_use
 from planner.verification.limit_surface import LimitCurves
 from planner.verification.recomputation import PULLING
+from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
 
 __all__ = ["LoadsCheck"]
 
-NOTHING: Final = np.zeros(6)
+FILL: Final = {6: np.inf, 7: np.inf, 8: -np.inf, 9: -np.inf}
+"""Numbers, by their place among all, of which a hand that has fewer has none that are wrong."""
 
 most = np.maximum.reduce
 
@@ -39,95 +40,149 @@ class LoadsCheck:
 
     Parameters
     ----------
-    question : Question
-        With fixed wrists alone and a body wrench, so that nothing accelerates; without present
-        tensions.
-    settled : sequence of SettledHand
-        The hands on their holds.
+    check : Check
+        Of plans of the stance, with fixed wrists alone and a body wrench, so that nothing
+        accelerates; without present tensions.
+    reader : LoadRecovery
+        Reads the loads of its hands.
     columns : sequence of tuple of str
         Names of each hand's loads y.
-    where : Posture or None
-        The joints.
 
     Attributes
     ----------
     wrong : list of str
-        What is wrong with the stance's joints, whatever its loads.
+        What is wrong with the stance, whatever its loads.
     idle : float
         Of their joints' torques, what limbs without a hand use.
     """
 
     def __init__(
-        self,
-        question: Question,
-        settled: Sequence[SettledHand],
-        columns: Sequence[tuple[str, ...]],
-        where: Posture | None,
+        self, check: Check, reader: LoadRecovery, columns: Sequence[tuple[str, ...]]
     ) -> None:
-        places = question.stance.hands
+        known, question = check.known, check.question
+        self._check, self._reader, self._columns = check, reader, columns
         self.wrong: list[str] = []
-        assert question.body_wrench is not None
-        check_limbs(self.wrong, question, {}, question.body_wrench, where)
-        joints = _joints(question, where)
-        limbs = [place.limb for place in places]
-        idle = [float(np.abs(use.rest).max()) for limb, use in joints.items() if limb not in limbs]
-        self.idle = max(idle, default=0.0)
+        self.idle = 0.0
+        places = question.stance.hands
         self._given = [
             (i, j, value)
             for i, place in enumerate(places)
             for j, value in enumerate(place.wrench or ())
             if value is not None
         ]
-        caps = [question.limits.per_hand.get(limb) for limb in limbs]
+        caps = [question.limits.per_hand.get(place.limb) for place in places]
         self._capped = [
             i
             for i, cap in enumerate(caps)
             if cap is not None and not isinstance(cap.largest_force, tuple)
         ]
-        hands = [
-            hand_check(question, place, hand, names, joints.get(place.limb))
-            for place, hand, names in zip(places, settled, columns, strict=True)
-        ]
-        self._stack(hands)
-        carries = np.array([_carry(question, place) for place in places])
-        self._body = np.hstack(list(carries @ self._matrix[:, self._wrench]))
-        self._from_rest = np.einsum("hij,hj->i", carries, self._constant[:, self._wrench])
-        self._planes = [hand.planes for hand in hands]
-        shares = np.ones((len(hands), max(len(hand.planes) for hand in hands)))
-        for own, hand in zip(shares, hands, strict=True):
-            own[: len(hand.engagement)] = hand.engagement
-        of_tile = np.repeat(np.arange(len(hands)), shares.shape[1])
-        self._curves = LimitCurves([hand.surface for hand in settled], of_tile, shares.ravel())
+        size = max(map(len, columns))
+        self._stack([self._numbers(y) for y in np.eye(size + 1, size, k=-1)])
+        units = np.eye(6 * len(places)).reshape(-1, len(places), 6)
+        carry = np.array([check.reaction(unit) for unit in units]).T
+        wrenches = self._matrix[:, self._wrench]
+        by_hand = zip(np.split(carry, len(places), axis=1), wrenches, strict=True)
+        self._body = np.hstack([own @ of_loads for own, of_loads in by_hand])
+        self._from_rest = carry @ self._constant[:, self._wrench].ravel()
+        touching = known.touch.touching
+        shares = self._by_hand(known.engagement[touching, None], known.places.hand[touching], 1.0)
+        of_tile = np.repeat(np.arange(len(places)), shares.shape[1])
+        self._curves = LimitCurves([hand.surface for hand in known.hands], of_tile, shares.ravel())
 
-    def _stack(self, hands: Sequence[HandCheck]) -> None:
-        """Put each hand's rows into a matrix, filled up with rows that are never wrong."""
-        parts = [
-            *(([hand.tiles[k] for hand in hands], 0.0) for k in range(3)),
-            ([hand.palm for hand in hands], 0.0),
-            ([hand.wrench for hand in hands], 0.0),
-            ([hand.held for hand in hands], 0.0),
-            ([hand.hard for hand in hands], np.inf),
-            ([hand.used for hand in hands], -np.inf),
+    # Rows ---------------------------------------------------------------------------------------
+
+    def _numbers(self, y: Array) -> list[tuple[Array, Indices]]:
+        """Return the check's numbers of loads, the same y of each hand, and whose each is.
+
+        Shear, normal and lateral load of each tile on rock; loads of palms; wrenches on the rock;
+        what hands hold along `HELD`; what may not be below zero; what presses on joints' stops;
+        what is used of half-planes, and of all other limits.
+        """
+        check, known, question = self._check, self._check.known, self._check.question
+        arrays = self._reader.read([y[: len(names)] for names in self._columns]).arrays
+        assert question.body_wrench is not None
+        joints = check.joints(self.wrong, arrays.wrenches, question.body_wrench)
+        again = check.again.of([], arrays, check.asked_for([], arrays, joints))
+        named = np.array([y * (np.arange(len(y)) < len(names)) for names in self._columns])
+        if not (again.error <= NEAR and np.abs(self.loads_of(arrays) - named).max() <= LOAD):
+            self.wrong.append("what loads do to the hands")
+
+        fingers, tiles, palms = again.shares
+        touching, owners = known.touch.touching, again.owners()
+        each, on_rock = owners["hands"], known.places.hand[touching]
+        kinds = zip(again.signed(), SIGNED, strict=True)
+        signs = [(values, owners[whose]) for values, (_, whose) in kinds]
+        stops = signs.pop(STOPS)
+        used = [
+            (fingers, owners["fingers"]),
+            (palms, each),
+            (again.along / known.hands[0].hand.structure.hand_load, each),
+            (again.nails.used, owners["nails"]),
         ]
-        counts = [max(len(own) for own in rows) for rows, _ in parts]
-        columns = max(hand.wrench.shape[1] for hand in hands)
-        self._matrix = np.zeros((len(hands), sum(counts), columns - 1))
-        self._constant = np.zeros((len(hands), sum(counts)))
-        slices, at = [], 0
-        for (rows, missing), count in zip(parts, counts, strict=True):
-            self._constant[:, at : at + count] = missing
-            for i, own in enumerate(rows):
-                self._matrix[i, at : at + len(own), : own.shape[1] - 1] = own[:, :-1]
-                self._constant[i, at : at + len(own)] = own[:, -1]
-            slices.append(slice(at, at + count))
-            at += count
+        for h, place in enumerate(question.stance.hands):
+            capped, none = force_use([], question, place, again.wrenches[h], math.inf)
+            torques = joints.pop(place.limb, capped[:0])
+            used.append((np.concatenate((capped, torques, -torques))[None], each[[h]]))
+            signs.append((-none[None], each[[h]]))
+        self.idle = max((float(np.abs(torques).max()) for torques in joints.values()), default=0.0)
+        return [
+            *((own, on_rock) for own in arrays.loads[touching].T),
+            _flat((arrays.palms[:, ::2], each)),
+            _flat((again.wrenches, each)),
+            _flat((again.along, each)),
+            _flat(*signs),
+            stops,
+            _flat((tiles[touching] / known.engagement[touching, None], on_rock)),
+            _flat(*used),
+        ]
+
+    def _stack(self, numbers: Sequence[Sequence[tuple[Array, Indices]]]) -> None:
+        """Put the numbers without loads, and per newton, into a matrix of each hand.
+
+        It is filled up with rows that are never wrong.
+        """
+        parts = []
+        for i, (rest, hand) in enumerate(numbers[0]):
+            slopes = [loaded[i][0] - rest for loaded in numbers[1:]]
+            parts.append(self._by_hand(np.column_stack([rest, *slopes]), hand, FILL.get(i, 0.0)))
+        rows = np.concatenate(parts, axis=1)
+        self._constant, self._matrix = rows[:, :, 0].copy(), rows[:, :, 1:].copy()
+        ends = accumulate((part.shape[1] for part in parts), initial=0)
+        slices = [slice(*pair) for pair in pairwise(ends)]
         self._shear, self._normal, self._lateral, palm, self._wrench, self._held = slices[:6]
-        self._hard, self._used = slices[6:]
-        self._carried = slice(0, palm.stop)
-        self._least, self._growing = np.zeros((2, len(hands), counts[6]))
-        for i, hand in enumerate(hands):
-            self._least[i, : len(hand.slack)] = -hand.slack[:, 0]
-            self._growing[i, : len(hand.slack)] = hand.slack[:, 1]
+        self._signs, self._stops, self._planes, others = slices[6:]
+        self._carried, self._used = slice(0, palm.stop), slice(self._planes.start, others.stop)
+
+    def _by_hand(self, rows: Array, hand: Indices, missing: float) -> Array:
+        """Return rows (n, k) as those of each hand, shape (hands, most, k), filled up."""
+        counts = np.bincount(hand, minlength=len(self._columns))
+        found = np.zeros((len(counts), counts.max(), rows.shape[1]))
+        found[:, :, 0] = missing
+        for h, count in enumerate(counts):
+            found[h, :count] = rows[hand == h]
+        return found
+
+    def loads_of(self, arrays: PlanArrays) -> Array:
+        """Return the loads (hands, m) of a plan's numbers, by their names."""
+        places = self._check.known.places
+        first, ends = places.first_of_finger, [*places.first_of_finger[1:], len(arrays.loads)]
+        kinds = {
+            "tension": arrays.tensions,
+            "lateral": np.add.reduceat(arrays.loads[:, 2], first),
+            NAIL: arrays.loads[np.array(ends) - 1, 0],
+        }
+        found = np.zeros((len(self._columns), max(map(len, self._columns))))
+        for h, (row, names, palm) in enumerate(
+            zip(found, self._columns, arrays.palms, strict=True)
+        ):
+            by_name = {PALM_SHEAR: -palm[0], PALM_PRESSING: palm[2]}
+            for kind, values in kinds.items():
+                own = values[len(FINGERS) * h :]
+                by_name |= {f"{name}/{kind}": own[i] for i, name in enumerate(FINGERS)}
+            row[: len(names)] = [by_name[name] for name in names]
+        return found
+
+    # Checking -----------------------------------------------------------------------------------
 
     def fault(
         self, loads: Array, wrenches: Array, utilisation: float, body_wrench: Array
@@ -155,14 +210,15 @@ class LoadsCheck:
         off += self._from_rest
         off -= body_wrench
         again = max(float(most(used, axis=None)), 0.0, self.idle)
-        hard = largest * self._growing
-        hard += found[:, self._hard]
+        if self.wrong:
+            return self.wrong[0]
         # each in terms that are false where a number is not finite
         if not math.sqrt(float(off @ off)) <= BALANCE * max(size, 1.0):
             return "the balance"
         if not float(most(np.abs(own - wrenches), axis=None)) <= allowed:
             return "a hand's wrench"
-        if not (hard >= self._least).all():
+        signs, stops = found[:, self._signs], found[:, self._stops]
+        if not ((signs >= -allowed).all() and (stops >= -STOP).all()):
             return "a load of the wrong sign"
         if not abs(again - utilisation) <= UTILISATION * max(1.0, again):
             return "the utilisation"
@@ -174,7 +230,7 @@ class LoadsCheck:
         for h in self._capped:
             if not np.linalg.norm(own[h, :3]) <= (BALL @ own[h, :3]).max() + allowed:
                 return "a force that is capped"
-        return self._outside(found, used, allowed)
+        return self._outside(found, allowed)
 
     def _holds(self, wrenches: Array, along: Array, allowed: float) -> bool:
         """Whether each hand holds no more, across the rock and away from it, than its rows say."""
@@ -182,49 +238,21 @@ class LoadsCheck:
         held = np.sqrt(np.einsum("hx,hx->h", forces, forces))
         return bool((held <= most(along, axis=1) + allowed).all())
 
-    def _outside(self, found: Array, used: Array, allowed: float) -> str | None:
+    def _outside(self, found: Array, allowed: float) -> str | None:
         """Say whether a tile is outside Eq. 21's surface, though within its half-planes."""
         shear, normal = found[:, self._shear].ravel(), found[:, self._normal].ravel()
         lateral = found[:, self._lateral].ravel()
         inside = self._curves.excess(shear, normal, lateral, UTILISATION) <= allowed
         if not inside.all():
             # beyond its half-planes a tile may be outside the surface, too
-            for h, k in np.argwhere(~inside.reshape(len(found), -1)):
-                if used[h, self._planes[h][k]].max() <= 1.0:
-                    return "a tile's limit curve"
+            used = most(found[:, self._planes].reshape(len(inside), -1), axis=1)
+            if (used[~inside] <= 1.0).any():
+                return "a tile's limit curve"
         return None
 
 
-def _carry(question: Question, place: HandOnHold) -> Array:
-    """Return what carries a hand's wrench on the rock to the rock's reaction in B, (6, 6)."""
-    body = question.stance.body
-    turn = body.rotation.T @ place.pose.rotation
-    lever = body.rotation.T @ (place.pose.position - body.position)
-    carry = np.zeros((6, 6))
-    carry[:3, :3] = carry[3:, 3:] = -turn
-    carry[3:, :3] = -skew(lever) @ turn
-    return carry
-
-
-def _joints(question: Question, where: Posture | None) -> Mapping[str, JointUse]:
-    """Return what every limb's joints use, from the robot's links; nothing without joints."""
-    if where is None:
-        return {}
-    robot, stance = question.stance.robot, question.stance
-    model, limits = robot.model, torque_limits(question)
-    tree = LinkTree(model.urdf, model.body, model.mounts, model.hand_mass)
-    names = {limb: where.joints[limb].names for limb in robot.limbs}
-    gravity = stance.body.rotation.T @ stance.gravity
-    rest, *pushed = (
-        tree.hold_up(
-            names, where.angles, dict.fromkeys(robot.limbs, wrench), gravity, NOTHING
-        ).torques
-        for wrench in (NOTHING, *np.eye(6))
-    )
-    return {
-        limb: JointUse(
-            rest[limb] / limits[limb],
-            np.column_stack([one[limb] - rest[limb] for one in pushed]) / limits[limb][:, None],
-        )
-        for limb in robot.limbs
-    }
+def _flat(*parts: tuple[Array, Indices]) -> tuple[Array, Indices]:
+    """Return numbers (n, …) of hands (n,) one after another, and whose each is."""
+    values = [own.ravel() for own, _ in parts]
+    hands = [hand.repeat(own.size // max(len(own), 1)) for own, hand in parts]
+    return np.concatenate(values), np.concatenate(hands)

@@ -1,7 +1,8 @@
-"""What the check of a plan says of numbers that are off, each in a sentence."""
+"""What a plan's numbers are held against, kind by kind, and what is said of those that are off."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
@@ -11,11 +12,81 @@ from hand_models.base import Array, Indices
 from hand_models.hand import FINGERS, NAIL
 from planner.prepare import HandBatch
 from planner.result import PlanArrays
+from planner.verification.joint_balance import LEVER
+from planner.verification.nails import NailLoads
 
-__all__ = ["DRIVES", "Recomputed"]
+__all__ = [
+    "COUNT",
+    "LOAD",
+    "NEAR",
+    "PALM_SIGNS",
+    "SIGNED",
+    "STOP",
+    "STOPS",
+    "UTILISATION",
+    "Claim",
+    "Recomputed",
+]
+
+LOAD: Final = 1e-6
+"""Largest disagreement of a tile's load, relative to the largest load of its hand."""
+
+UTILISATION: Final = 1e-6
+"""How far a utilisation may be from what the plan says."""
+
+DRIVE: Final = 1e-9
+"""How far a motor's torque, current or winch angle may be from what the plan says, relative."""
+
+STOP: Final = 1e-6
+"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
+
+NEAR: Final = LOAD * LEVER
+"""Error of balances [N, N·m], drives and utilisations below which nothing can be off."""
 
 DRIVES: Final = ("motor torque", "motor current", "winch angle")
 """Rows of `PlanArrays.drives`."""
+
+COUNT: Final = len(FINGERS)
+
+PALM_SIGNS: Final = np.array([-1.0, 1.0])
+"""Which way a palm shears and presses along x and z."""
+
+
+EQUAL: Final = (
+    ("load", "tiles"),
+    ("load", "tiles"),
+    ("force", "tiles"),
+    ("wrench", "hands"),
+    ("unbalanced", "nails"),
+)
+"""What says what is wrong with each kind of `Recomputed.zero`, and whose numbers they are."""
+
+SIGNED: Final = (
+    ("tension", "fingers"),
+    ("backwards", "tiles"),
+    ("pulled_off", "tiles"),
+    ("palm", "hands"),
+    ("slack", "drawing"),
+    ("closes", "nails"),
+    ("drags", "nails"),
+    ("stop", "stops"),
+)
+"""The same of `Recomputed.signed`."""
+
+STOPS: Final = len(SIGNED) - 1
+"""Of these, the one that may be off by `STOP`, whatever the loads."""
+
+BOUNDED: Final = (("curve", "tiles"), ("holds", "hands"), ("slips", "nails"))
+"""The same of `Recomputed.bounded`."""
+
+
+class Claim(NamedTuple):
+    """Drives or utilisations of one kind: what they are, what the plan says, and their names."""
+
+    used: Array
+    told: Array
+    relative: float
+    name: Callable[[int], str]
 
 
 class Recomputed(NamedTuple):
@@ -27,85 +98,175 @@ class Recomputed(NamedTuple):
     known : HandBatch
     arrays : PlanArrays
         The plan's numbers.
+    floats : bool
+        Whether a wrist does.
     shear, normal : ndarray, shape (T,)
         Of each tile [N]; of nails zero.
     left : ndarray, shape (F, 3)
-        What is left of each joint's balance [N·m].
+        What is left of each free joint's balance [N·m].
     stops : ndarray, shape (k,)
         Torque on each joint's stop [N·m].
     stop_fingers : ndarray of int, shape (k,)
         Whose they are.
+    drawing : ndarray of int
+        Fingers whose tendon draws a tile or a nail along rock, and friction would hold it.
+    slackened : ndarray
+        Tensions of these, less the closing tension [N].
+    nails : NailLoads
+        Of those that hook.
     curves : ndarray, shape (T,)
         By how much each tile is beyond its limit curve [N].
-    forces, wrenches : ndarray, shapes (T, 3), (H, 6)
-        By how much each tile's force is not that of its loads, and each hand's wrench not the sum
-        of forces.
+    forces : ndarray, shape (T, 3)
+        By how much each tile's force is not that of its loads [N].
+    wrenches : ndarray, shape (H, 6)
+        The sums of the forces of each hand's tiles and palm.
     held, by_rows : ndarray, shape (H,)
         What each hand holds, and what its rows say of that [N].
+    along : ndarray, shape (H, 17)
+        The rows: what it holds along `HELD`.
     drives : ndarray, shape (3, F)
         Torque and current of each motor, angle of each winch.
     tiles, palms, hands : ndarray, shapes (T,), (H,), (H,)
         Utilisations.
+    shares : tuple of ndarray, shapes (F, 5), (T, 2 p), (H, 2)
+        What these are the largest of: of tendons, motors and fingers; of half-planes, if all spines
+        held; of palms.
     """
 
     limbs: tuple[str, ...]
     known: HandBatch
     arrays: PlanArrays
+    floats: bool
     shear: Array
     normal: Array
     left: Array
     stops: Array
     stop_fingers: Indices
+    drawing: Indices
+    slackened: Array
+    nails: NailLoads
     curves: Array
     forces: Array
     wrenches: Array
     held: Array
     by_rows: Array
+    along: Array
     drives: Array
     tiles: Array
     palms: Array
     hands: Array
+    shares: tuple[Array, Array, Array]
 
-    # Numbers ------------------------------------------------------------------------------------
+    # Kinds --------------------------------------------------------------------------------------
 
-    @property
-    def used(self) -> Array:
-        """Drives and utilisations, one kind after another, shape (3 F + T + 2 H,)."""
-        return np.concatenate((self.drives.ravel(), self.tiles, self.palms, self.hands))
+    def zero(self) -> tuple[Array, ...]:
+        """Return what must be zero: what the plan says of loads, less what they are."""
+        arrays, nails = self.arrays, self.known.places.nails
+        shear, normal = arrays.loads[:, 0] - self.shear, arrays.loads[:, 1] - self.normal
+        if len(nails):
+            shear[nails] = normal[nails] = 0.0
+        wrenches = self.wrenches - arrays.wrenches
+        return shear, normal, self.forces, wrenches, self.nails.turning
 
-    @property
-    def told(self) -> Array:
-        """What the plan says of them."""
-        arrays = self.arrays
-        used = (
-            arrays.tile_utilisations,
-            arrays.palm_utilisations,
-            arrays.utilisations,
+    def signed(self) -> tuple[Array, ...]:
+        """Return what may not be below zero, and is affine in the loads."""
+        f, palms, nails = self.arrays.tensions, self.arrays.palms[:, ::2], self.nails
+        # NaN, and so off, where a tension is infinite
+        tensions, framed = f + 0.0 * f, self.normal * self.known.touch.framed
+        return (
+            tensions,
+            self.shear,
+            framed,
+            palms * PALM_SIGNS,
+            self.slackened,
+            nails.opening,
+            nails.grips,
+            self.stops,
         )
-        return np.concatenate((arrays.drives.ravel(), *used))
+
+    def bounded(self) -> tuple[Array, ...]:
+        """Return what may not be below zero, and is not affine in the loads."""
+        return -self.curves, self.by_rows - self.held, self.nails.within
+
+    def claims(self) -> tuple[Claim, ...]:
+        """Return what the plan says of drives and utilisations, and what they are."""
+        told = self.arrays
+        return (
+            Claim(self.drives, told.drives, DRIVE, self.drive),
+            Claim(self.tiles, told.tile_utilisations, UTILISATION, self.tile_share),
+            Claim(self.palms, told.palm_utilisations, UTILISATION, self.palm_share),
+            Claim(self.hands, told.utilisations, UTILISATION, self.share),
+        )
+
+    def owners(self) -> dict[str, Indices]:
+        """Return whose hand each number is."""
+        places, each = self.known.places, np.arange(len(self.limbs))
+        return {
+            "tiles": places.hand,
+            "hands": each,
+            "fingers": each.repeat(COUNT),
+            "drawing": self.drawing // COUNT,
+            "nails": self.nails.fingers // COUNT,
+            "stops": self.stop_fingers // COUNT,
+        }
+
+    # Verdicts -----------------------------------------------------------------------------------
 
     @property
-    def off(self) -> Array:
-        """By how much loads are off, as of `loads_off` [N]."""
-        arrays, touch = self.arrays, self.known.touch
-        f, palm = arrays.tensions, arrays.palms
-        apart = np.abs(arrays.loads[:, :2].T - (self.shear, self.normal))
-        apart[:, self.known.places.nails] = 0.0
-        return np.concatenate(
-            (
-                # NaN, and so off, where a tension is infinite
-                0.5 * (np.abs(f) - f),
-                apart.ravel(),
-                -self.shear,
-                -self.normal * touch.framed,
-                np.abs(self.forces).ravel(),
-                self.curves,
-                palm[:, 0],
-                -palm[:, 2],
-                np.abs(self.wrenches).ravel(),
-                self.held - self.by_rows,
-            )
+    def error(self) -> float:
+        """The Euclidean norm of all that is zero; none of it exceeds that. Of fixed hands."""
+        told = self.arrays
+        parts = (
+            self.left,
+            self.normal.take(self.known.places.bases),
+            *self.zero(),
+            self.drives - told.drives,
+            self.tiles - told.tile_utilisations,
+            self.palms - told.palm_utilisations,
+            self.hands - told.utilisations,
         )
+        off = np.concatenate(parts, axis=None)
+        return math.sqrt(off.dot(off))
+
+    def near(self) -> bool:
+        """Whether all numbers of fixed hands are so near that none can be off by what it may.
+
+        Numbers that are not finite are not near, nor are those of a plan that has tiles elsewhere
+        than the hands, or turned.
+        """
+        arrays, known = self.arrays, self.known
+        if self.floats or not self.error <= NEAR:
+            return False
+        signed = np.concatenate((*self.signed(), *self.bounded()), axis=None)
+        pairs = (arrays.points, known.points), (arrays.axes, known.axes)
+        return bool(
+            np.minimum.reduce(signed) >= -NEAR
+            and all(told is own or np.array_equal(told, own) for told, own in pairs)
+            and not any(self.contacts())
+        )
+
+    def off(self, allowed: Array) -> Iterator[str]:
+        """Yield what is off by more than it may be.
+
+        Parameters
+        ----------
+        allowed : ndarray, shape (H,)
+            Error that loads of each hand may have [N].
+        """
+        owners, equal = self.owners(), [-np.abs(values) for values in self.zero()]
+        kinds = zip(
+            (*equal, *self.signed(), *self.bounded()), EQUAL + SIGNED + BOUNDED, strict=True
+        )
+        for values, (say, whose) in kinds:
+            most = STOP if whose == "stops" else allowed.take(owners[whose])
+            # numbers that are not finite are off, too
+            wrong = ~((values.T + most).T >= 0.0)
+            yield from map(getattr(self, say), np.flatnonzero(wrong).tolist())
+        for used, told, relative, name in self.claims():
+            right = np.abs(used - told) <= relative * np.maximum(np.abs(used), 1.0)
+            for i in np.flatnonzero(~right).tolist():
+                yield f"{name(i)} is {used.flat[i]:.8g}, not {told.flat[i]:.8g}"
+        yield from self.contacts()
 
     # Names --------------------------------------------------------------------------------------
 
@@ -119,8 +280,24 @@ class Recomputed(NamedTuple):
 
     def of_finger(self, kind: str, finger: int) -> str:
         """Return the name of something of a finger: ``front_left: tendon of inner_right``."""
-        h, i = divmod(finger, len(FINGERS))
+        h, i = divmod(finger, COUNT)
         return f"{self.limbs[h]}: {kind} of {FINGERS[i]}"
+
+    def nail(self, k: int) -> str:
+        return self.of_finger(NAIL, int(self.nails.fingers[k]))
+
+    def drive(self, i: int) -> str:
+        kind, finger = divmod(i, COUNT * len(self.limbs))
+        return self.of_finger(DRIVES[kind], finger)
+
+    def tile_share(self, t: int) -> str:
+        return f"{self.tile(t)}: utilisation"
+
+    def palm_share(self, h: int) -> str:
+        return f"{self.limbs[h]}: palm: utilisation"
+
+    def share(self, h: int) -> str:
+        return f"{self.limbs[h]}: utilisation"
 
     # Sentences ----------------------------------------------------------------------------------
 
@@ -143,9 +320,9 @@ class Recomputed(NamedTuple):
     def curve(self, t: int) -> str:
         return f"{self.tile(t)} is beyond its limit curve"
 
-    def palm(self, h: int) -> str:
-        force = self.arrays.palms[h].tolist()
-        return f"{self.limbs[h]}: the palm cannot exert {force} N"
+    def palm(self, i: int) -> str:
+        force = self.arrays.palms[i // 2].tolist()
+        return f"{self.limbs[i // 2]}: the palm cannot exert {force} N"
 
     def wrench(self, i: int) -> str:
         return f"{self.limbs[i // 6]}: the wrench is not the sum of its tiles' and palm's forces"
@@ -153,88 +330,58 @@ class Recomputed(NamedTuple):
     def holds(self, h: int) -> str:
         return f"{self.limbs[h]}: the hand holds {self.held[h]:.6g} N, more than its rows say"
 
-    def slack(self, finger: int) -> str:
-        hand = self.known.hands[finger // len(FINGERS)]
-        slack = hand.closing_tension - self.arrays.tensions[finger]
-        return f"{self.of_finger('tendon', finger)} would stick, slackened {slack:.3g} N"
+    def slack(self, i: int) -> str:
+        tendon = self.of_finger("tendon", int(self.drawing[i]))
+        return f"{tendon} would stick, slackened {-self.slackened[i]:.3g} N"
 
     def stop(self, i: int) -> str:
         return f"{self.of_finger('a joint', int(self.stop_fingers[i]))} would leave its stop"
 
-    def use(self, i: int, used: float, told: float) -> str:
-        """Say what a drive or a utilisation is, by its index in ``used``."""
-        value, said = f"{used:.8g}", f"{told:.8g}"
-        tiles, fingers, hands = self.known.places.shape
-        if i < len(DRIVES) * fingers:
-            kind, finger = divmod(i, fingers)
-            return f"{self.of_finger(DRIVES[kind], finger)} is {value}, not {said}"
-        i -= len(DRIVES) * fingers
-        if i < tiles:
-            name = self.tile(i)
-        else:
-            h = (i - tiles) % hands
-            name = f"{self.limbs[h]}: palm" if i - tiles < hands else self.limbs[h]
-        return f"{name}: utilisation is {value}, not {said}"
+    def closes(self, i: int) -> str:
+        k, joint = divmod(i, len(self.nails.far))
+        closing = -self.nails.opening[k, joint] * self.nails.far[joint]
+        return f"{self.nail(k)} lets joint {joint + 1} of its finger close, by {closing:.3g} N·m"
 
-    def idle(self) -> Iterator[str]:
-        """Yield what carries a load that cannot."""
-        arrays = self.arrays
-        for t in self.known.touch.idle.tolist():
+    def unbalanced(self, k: int) -> str:
+        turning = self.nails.turning[k] * self.nails.reach[k]
+        return f"{self.nail(k)} is out of balance by {turning:.3g} N·m"
+
+    def drags(self, i: int) -> str:
+        return self.slips(i // 3)
+
+    def slips(self, k: int) -> str:
+        dragged, pressed = self.nails.dragged[k], self.nails.pressed[k]
+        name = self.nail(k)
+        return f"{name} would slip: {dragged:.3g} N along rock pressed with {pressed:.3g} N"
+
+    def contacts(self) -> Iterator[str]:
+        """Yield what carries a load that cannot, and contacts that are not as the plan says."""
+        known, arrays, palms = self.known, self.arrays, self.arrays.palms
+        for t in known.touch.idle.tolist():
             if arrays.forces[t].any():
                 yield f"{self.tile(t)} carries a load but touches nothing"
-        for h, hand in enumerate(self.known.hands):
-            if arrays.palms[h, 1] != 0.0:
-                yield self.palm(h)
-            if not hand.palm.engaged and arrays.palms[h].any():
+        for h in np.flatnonzero(palms[:, 1]).tolist():
+            yield self.palm(2 * h)
+        shares = known.engagement, arrays.engagement
+        if shares[0] is not shares[1]:
+            for t in np.flatnonzero(shares[0] != shares[1]).tolist():
+                share, told = shares[0][t], shares[1][t]
+                yield f"{self.tile(t)}: {share:.6g} of its spines hold, not {told:.6g}"
+        for h, hand in enumerate(known.hands):
+            engaged, told_engaged = hand.palm.engaged, arrays.engaged[h]
+            if not (engaged and told_engaged) and palms[h].any():
                 yield f"{self.limbs[h]}: the palm carries a load but touches nothing"
+            if engaged != told_engaged:
+                told = list(told_engaged)
+                yield f"{self.limbs[h]}: the palm touches with tiles {list(engaged)}, not {told}"
+            if hand.tiles != arrays.tiles[h]:
+                yield from self.tiles_told(h)
 
-    def contacts_told(self, h: int) -> Iterator[str]:
-        """Yield what the plan says of the contacts of a hand that is not so."""
-        hand, arrays = self.known.hands[h], self.arrays
-        first = int(self.known.places.first[h])
-        for t, (tile, said) in enumerate(zip(hand.tiles, arrays.tiles[h], strict=True)):
+    def tiles_told(self, h: int) -> Iterator[str]:
+        """Yield what the plan says of the contacts of a hand's tiles that is not so."""
+        first, tiles = int(self.known.places.first[h]), self.known.hands[h].tiles
+        for t, (tile, said) in enumerate(zip(tiles, self.arrays.tiles[h], strict=True), first):
             if tile != said:
-                name = self.tile(first + t)
-                if said.contact == "none" and arrays.forces[first + t].any():
-                    yield f"{name} carries a load but touches nothing"
-                yield f"{name} touches with {tile.contact}; the plan has {' '.join(said)}"
-        own = slice(first, first + len(hand.tiles))
-        shares = zip(hand.engagement.tolist(), arrays.engagement[own].tolist(), strict=True)
-        for t, (share, told_share) in enumerate(shares, first):
-            if share != told_share:
-                yield f"{self.tile(t)}: {share:.6g} of its spines hold, not {told_share:.6g}"
-        true, told = list(hand.palm.engaged), list(arrays.engaged[h])
-        if true != told:
-            if not told and arrays.palms[h].any():
-                yield f"{self.limbs[h]}: the palm carries a load but touches nothing"
-            yield f"{self.limbs[h]}: the palm touches with tiles {true}, not {told}"
-
-    def loads_off(self, which: Indices, ends: Indices) -> Iterator[str]:
-        """Yield what is off of loads, by index.
-
-        One kind after another: tensions, shears, normals, drags backwards and pulls on bare frames
-        of tiles; components of their forces; their limit curves; shear and pressing of palms;
-        components of wrenches; what hands hold.
-
-        Parameters
-        ----------
-        which : ndarray of int
-        ends : ndarray of int
-            Where each kind ends.
-        """
-        words: tuple[Callable[[int], str], ...] = (
-            self.tension,
-            self.load,
-            self.load,
-            self.backwards,
-            self.pulled_off,
-            self.force,
-            self.curve,
-            self.palm,
-            self.palm,
-            self.wrench,
-            self.holds,
-        )
-        for i in which.tolist():
-            kind = int(np.searchsorted(ends, i, side="right"))
-            yield words[kind](i - (int(ends[kind - 1]) if kind else 0))
+                if said.contact == "none" and self.arrays.forces[t].any():
+                    yield f"{self.tile(t)} carries a load but touches nothing"
+                yield f"{self.tile(t)} touches with {tile.contact}; the plan has {' '.join(said)}"

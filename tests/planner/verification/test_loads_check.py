@@ -9,11 +9,10 @@ import pytest
 from hand_models.base import wrench_transport
 from planner.prepare import settle_hand
 from planner.question import Stance
-from planner.result import Plan
+from planner.result import LoadRecovery, Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
-from planner.verification import loads_check
-from planner.verification.hand_check import hand_check
+from planner.verification import loads_check, recomputation
 from planner.verification.limit_surface import LimitCurves
 from tests.suite.helpers.fingernails import STRONG, hung, one_hand
 from tests.suite.helpers.hands import changed_hand
@@ -22,6 +21,9 @@ from tests.suite.helpers.stances import ask, on_wall
 from tests.suite.helpers.streams import streamable
 
 WALL = ask(on_wall())
+
+SWAPPED = [1, 0, *range(2, 10)]
+"""A hand's loads, two tensions the one for the other."""
 
 
 @cache
@@ -156,14 +158,34 @@ def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes(monkeyp
 
 
 def test_a_hand_holds_no_more_than_its_rows_say(monkeypatch):
-    def less(*asked):
-        rows = hand_check(*asked)
-        return replace(rows, held=0.9 * rows.held)
-
     loads, _ = honest()
-    monkeypatch.setattr(loads_check, "hand_check", less)
+    monkeypatch.setattr(recomputation, "HELD", 0.9 * recomputation.HELD)
     known = StreamStance(WALL)
     assert fault(known, loads, known.first) == "what a hand holds"
+
+
+def test_sets_that_do_not_balance_the_joints_are_found(monkeypatch):
+    loads, _ = honest()
+    honestly = LoadRecovery.read
+
+    def wrongly(reader, y):
+        found = honestly(reader, y)
+        return found._replace(arrays=found.arrays._replace(loads=1.001 * found.arrays.loads))
+
+    monkeypatch.setattr(LoadRecovery, "read", wrongly)
+    known = StreamStance(WALL)
+    assert fault(known, loads, known.first) == "what loads do to the hands"
+
+
+def test_loads_have_the_names_of_what_they_are(monkeypatch):
+    """Two tendons, the one for the other."""
+    loads, _ = honest()
+    honestly = LoadRecovery.read
+    monkeypatch.setattr(
+        LoadRecovery, "read", lambda reader, y: honestly(reader, [own[SWAPPED] for own in y])
+    )
+    known = StreamStance(WALL)
+    assert fault(known, loads[:, SWAPPED], known.first) == "what loads do to the hands"
 
 
 def test_a_wrench_that_is_given_is_kept():
