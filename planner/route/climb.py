@@ -228,41 +228,35 @@ def evaluate(
     if workers is None:
         workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
-
-    def done(stage: RouteStage, answer: Plan | OutOfReach) -> None:
-        plans[stage.index] = answer
+    for i, answer in _answers(todo, min(workers, len(todo)) - 1):
+        if isinstance(answer, InvalidInputError):
+            raise answer
+        plans[i] = answer
         if progress is not None:
             progress(len(plans), len(todo))
-
-    others = min(workers, len(todo)) - 1
-    if others > 0:
-        with Workers(partial(_planning, todo), others) as processes:
-            for i, answer in processes.each(range(len(todo)), _planning(todo)):
-                if isinstance(answer, InvalidInputError):
-                    raise answer
-                # a stage that has cost a process is planned here
-                done(todo[i], _plan_stage(todo[i]) if isinstance(answer, Lost) else answer)
-    for stage in todo:
-        if stage.index not in plans:
-            done(stage, _plan_stage(stage))
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 
-def _planning(
-    todo: Sequence[RouteStage],
-) -> Callable[[int], Plan | OutOfReach | InvalidInputError]:
+Answer = Plan | OutOfReach | InvalidInputError
+
+
+def _answers(todo: Sequence[RouteStage], others: int) -> Iterator[tuple[int, Answer]]:
+    """Yield each stage's index and answer, as they come from here and so many other processes."""
+    if others < 1:
+        yield from ((stage.index, _plan_stage(stage)) for stage in todo)
+        return
+    with Workers(partial(_planning, todo), others) as processes:
+        for i, answer in processes.each(range(len(todo)), _planning(todo)):
+            # a stage that has cost a process is planned here
+            yield i, _plan_stage(todo[i]) if isinstance(answer, Lost) else answer
+
+
+def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
     """Return what plans a stage, in each process."""
-
-    def answer(index: int) -> Plan | OutOfReach | InvalidInputError:
-        try:
-            return _plan_stage(todo[index])
-        except InvalidInputError as error:
-            return error
-
-    return answer
+    return lambda index: _plan_stage(todo[index])
 
 
-def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:
+def _plan_stage(stage: RouteStage) -> Answer:
     try:
         if stage.phase == "place":
             _must_touch(stage)
@@ -270,8 +264,9 @@ def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:
     except UnreachableError as error:
         return OutOfReach(error.message)
     except InvalidInputError as error:
-        place = "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
-        raise error.within(place) from None
+        return error.within(
+            "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
+        )
 
 
 def _must_touch(stage: RouteStage) -> None:

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from planner import programs
-from planner.explanation import InfeasibleStance, certify, certify_idle
-from planner.programs import SLACK
+from planner.explanation import certify, certify_idle
+from planner.programs import SLACK, Outcome
 from planner.result import Certificate
 from planner.solving.answer import Answer
 from planner.solving.effort import settle_effort
@@ -29,9 +29,7 @@ def look_again(answer: Answer) -> None:
     if not nearest.solved or nearest.value > far:
         given = len(answer.data.wrench) > len(answer.wrench)
         if not answer.held_floating:
-            answer.certificate = certify(
-                _hindered(answer, None), None if given else nearest, answer.outcome
-            )
+            answer.certificate = _certify(answer, None, None if given else nearest)
         if answer.certificate is not None:
             answer.mind_explained(answer.certificate)
             answer.outcome = replace(answer.outcome, solved=False)
@@ -43,10 +41,13 @@ def look_again(answer: Answer) -> None:
         settle_effort(answer)
 
 
-def _hindered(answer: Answer, cap: float | None) -> InfeasibleStance:
-    """Return what a proof is made of: at any utilisation, or within a cap."""
+def _certify(
+    answer: Answer, cap: float | None, nearest: Outcome | None = None
+) -> Certificate | None:
+    """Return the proof that there is no plan: at any utilisation, or within a cap."""
     held, limits = answer.parts.held, answer.question.limits
-    return InfeasibleStance(answer.data, answer.limbs, answer.spaces, held, cap, limits)
+    stance = answer.data, answer.limbs, answer.spaces, held, limits
+    return certify(*stance, cap, nearest=nearest, known=answer.outcome)
 
 
 def overload(answer: Answer) -> Certificate | None:
@@ -64,6 +65,6 @@ def overload(answer: Answer) -> Certificate | None:
         return certify_idle(most, cap, alone)
     if answer.unproven:
         return None
-    proof = certify(_hindered(answer, cap), known=answer.outcome)
+    proof = _certify(answer, cap)
     # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
     return replace(proof, sufficient=()) if proof is not None and beyond else proof

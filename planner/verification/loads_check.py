@@ -211,14 +211,10 @@ def _joints(question: Question, where: Posture | None) -> Mapping[str, JointUse]
     if where is None:
         return {}
     robot, stance = question.stance.robot, question.stance
-    model, limits = robot.model, torque_limits(question)
-    tree = LinkTree(model.urdf, model.body, model.mounts, model.hand_mass)
-    names = {limb: where.joints[limb].names for limb in robot.limbs}
+    tree, limits = LinkTree(robot), torque_limits(question)
     gravity = stance.body.rotation.T @ stance.gravity
     rest, *pushed = (
-        tree.hold_up(
-            names, where.angles, dict.fromkeys(robot.limbs, wrench), gravity, NOTHING
-        ).torques
+        tree.hold_up(where.angles, dict.fromkeys(robot.limbs, wrench), gravity, NOTHING).torques
         for wrench in (NOTHING, *np.eye(6))
     )
     return {
