@@ -89,7 +89,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             "pull": -slip.wrenches[0, 1],
             "phalanx": slip.phalanx[0],
             "way": slip.way[0],
-            "utilisation": gripper.evaluate(slip.poses).verdict.utilisation[0],
+            "utilisation": gripper.evaluate(slip.poses).utilisation[0],
             "utilisation_by_phalanx": np.max(used, axis=0),
             "shear": at_slip.shears[0],
             "normal": at_slip.normals[0],

@@ -8,7 +8,6 @@ from .active_limits import (
     unit_of as unit_of,
 )
 from .certificate import (
-    InfeasibleStance as InfeasibleStance,
     certify as certify,
     certify_idle as certify_idle,
 )

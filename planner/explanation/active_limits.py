@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import accumulate, chain
 from typing import Final, NamedTuple
@@ -23,7 +22,6 @@ __all__ = [
     "close_to",
     "joint_name",
     "limit_name",
-    "limit_uses",
     "unit_of",
 ]
 
@@ -68,28 +66,6 @@ class LimitUse(NamedTuple):
         return self.load / self.capacity
 
 
-def limit_uses(
-    limbs: Sequence[str], spaces: Sequence[WrenchSpace], used: Array, least: float
-) -> Iterator[LimitUse]:
-    """Yield how much is used of every limit row of which that is at least so much.
-
-    Parameters
-    ----------
-    limbs : sequence of str
-    spaces : sequence of WrenchSpace
-    used : ndarray, shape (sum of nl,)
-        Utilisation of every limit row, hand by hand.
-    least : float
-    """
-    first = 0
-    for limb, space in zip(limbs, spaces, strict=True):
-        mine = used[first : first + len(space.s)]
-        first += len(space.s)
-        for i in np.flatnonzero(mine >= least).tolist():
-            capacity = float(space.s[i])
-            yield LimitUse(limit_name(limb, space.rows[i]), float(mine[i]) * capacity, capacity)
-
-
 def close_to(utilisation: float) -> float:
     """Return from which utilisation on a limit ties with those of which most is used."""
     return utilisation - 2.0 * SLACK * max(1.0, utilisation)
@@ -115,7 +91,7 @@ class ActiveLimits:
         spaces: Sequence[WrenchSpace],
         multipliers: Sequence[Array],
     ) -> None:
-        self._spaces = spaces
+        self._capacities = concatenated([space.s for space in spaces])
         self._named = named = _named(tuple([space.rows for space in spaces]), tuple(limbs))
         duals = concatenated(multipliers)
         self._weights = duals * (duals > BINDING)
@@ -140,9 +116,9 @@ class ActiveLimits:
         utilisation : float
             At which the rows stand.
         """
-        names, capacities = self._named.names, concatenated([space.s for space in self._spaces])
+        names = self._named.names
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
-        each = self._weights * utilisation / capacities
+        each = self._weights * utilisation / self._capacities
         price = np.bincount(self._named.of_row, each, len(names)).tolist()
         return tuple(Price.of(names[i], price[i], unit_of(names[i].limit)) for i in dear)
 
@@ -178,8 +154,7 @@ class ActiveLimits:
         if most is not None and worth[best] == 0.0 and most.utilisation > shares[best]:
             return most
         found = int(rows[best])
-        h = bisect_right(named.first_row, found) - 1
-        capacity = float(self._spaces[h].s[found - named.first_row[h]])
+        capacity = float(self._capacities[found])
         return LimitUse(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
 
 
@@ -191,13 +166,10 @@ class _Named(NamedTuple):
     names : tuple of LimitName
     of_row : ndarray of int, shape (sum of nl,)
         Which of them each limit row is.
-    first_row : tuple of int
-        Each hand's first row.
     """
 
     names: tuple[LimitName, ...]
     of_row: Indices
-    first_row: tuple[int, ...]
 
 
 @lru_cache(maxsize=KEPT_NAMES)
@@ -208,7 +180,6 @@ def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> _Named:
     return _Named(
         tuple(chain.from_iterable(hand.names for hand in hands)),
         concatenated([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
-        tuple(accumulate((len(hand.of_row) for hand in hands[:-1]), initial=0)),
     )
 
 
@@ -217,4 +188,4 @@ def _named_alone(rows: tuple[Row, ...], limb: str) -> _Named:
     names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
     index = {name: i for i, name in enumerate(dict.fromkeys(names))}
     of_row = np.array([index[name] for name in names], dtype=np.intp)
-    return _Named(tuple(index), of_row, (0,))
+    return _Named(tuple(index), of_row)

@@ -8,23 +8,30 @@ body: whatever the body needs, there are no loads.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
 from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline, programs
-from planner.explanation.active_limits import LimitUse
-from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem, ranked, vertex
+from planner.explanation.active_limits import LimitUse, limit_name
+from planner.explanation.infeasibility import (
+    BODY,
+    HELD_WRENCH,
+    HardRowSystem,
+    ranked,
+    vertex,
+)
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.prepare import FORCE_CAP, TENSION_CHANGE
 from planner.programs import JOINT_TORQUE, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Limits
 from planner.result import Certificate, LimitName
 
-__all__ = ["InfeasibleStance", "certify", "certify_idle"]
+__all__ = ["certify", "certify_idle"]
 
 BLOCKING: Final = 1e-6
 """A direction shorter than this, in the body's six components, is none."""
@@ -39,34 +46,16 @@ DISTANT: Final = 1e-9
 """Distance to the nearest body wrench below which there is nothing to prove."""
 
 
-class InfeasibleStance(NamedTuple):
-    """A stance whose loads do not balance.
-
-    Attributes
-    ----------
-    data : StanceData
-    limbs : sequence of str
-        Of the hands.
-    spaces : sequence of WrenchSpace
-        Their sets, for the rows' names.
-    held : sequence of ndarray, shape (nb − 6, 6)
-        What the further rows of the balance take of each hand's wrench.
-    utilisation : float or None
-        The cap within which they do not; None: at any utilisation.
-    limits : Limits
-        The caller's.
-    """
-
-    data: StanceData
-    limbs: Sequence[str]
-    spaces: Sequence[WrenchSpace]
-    held: Sequence[Array]
-    utilisation: float | None = None
-    limits: Limits = Limits()
-
-
 def certify(
-    stance: InfeasibleStance, nearest: Outcome | None = None, known: Outcome | None = None
+    data: StanceData,
+    limbs: Sequence[str],
+    spaces: Sequence[WrenchSpace],
+    held: Sequence[Array],
+    limits: Limits,
+    cap: float | None = None,
+    *,
+    nearest: Outcome | None = None,
+    known: Outcome | None = None,
 ) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
@@ -75,7 +64,16 @@ def certify(
 
     Parameters
     ----------
-    stance : InfeasibleStance
+    data : StanceData
+        Whose loads do not balance.
+    limbs, spaces : sequence of str, sequence of WrenchSpace
+        Of the hands, for the rows' names.
+    held : sequence of ndarray, shape (nb − 6, 6)
+        What the further rows of the balance take of each hand's wrench.
+    limits : Limits
+        The caller's.
+    cap : float, optional
+        On the utilisation, within which they do not balance; by default at any utilisation.
     nearest : Outcome, optional
         The loads that come nearest to the body wrench, with given wrenches of hands as they are
         given; found here by default.
@@ -87,14 +85,15 @@ def certify(
     Certificate or None
         None if the bound proves nothing.
     """
-    data, limbs, spaces, held, cap, limits = stance
-    system = HardRowSystem.of(data, limbs, spaces, held, cap)
+    # limit rows at a cap count as hard rows; without one they do not count
+    rows = data if cap is None else data.capped(cap)
+    system = _system(rows, limbs, spaces, held, capped=cap is not None)
     if nearest is None:
-        nearest = programs.nearest_body(data if cap is None else data.capped(cap))
+        nearest = programs.nearest_body(rows)
     missing: Array | None = None
     if nearest.solved:
         missing = data.wrench - programs.body_wrench(data, nearest.loads)
-        missing[6:] = 0.0
+        missing[BODY:] = 0.0
         found: tuple[Array, Array] | None = _polished(system, missing)
     else:
         found = _contradiction(system, limbs)
@@ -111,22 +110,51 @@ def certify(
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,
-        direction=direction[:6] / WRENCH_UNIT,
+        direction=direction[:BODY] / WRENCH_UNIT,
         held={
-            limb: mine.T @ direction[6:] / WRENCH_UNIT
+            limb: mine.T @ direction[BODY:] / WRENCH_UNIT
             for limb, mine in zip(limbs, held, strict=True)
             if mine.any()
         },
         supremum=system.bound(direction, multipliers),
         needed=float(direction @ data.wrench),
-        shortfall=None if missing is None else missing[:6] * WRENCH_UNIT,
-        nearest=None if missing is None else (data.wrench - missing)[:6] * WRENCH_UNIT,
+        shortfall=None if missing is None else missing[:BODY] * WRENCH_UNIT,
+        nearest=None if missing is None else (data.wrench - missing)[:BODY] * WRENCH_UNIT,
         blocking=_in_order(
             (name for name in ranked(weights) if name.limit != HELD_WRENCH), limits, spaces
         ),
         irreducible=irreducible,
         sufficient=sufficient_alone(system, irreducible),
         spaces=dict(zip(limbs, spaces, strict=True)),
+    )
+
+
+def _system(
+    data: StanceData,
+    limbs: Sequence[str],
+    spaces: Sequence[WrenchSpace],
+    held: Sequence[Array],
+    *,
+    capped: bool,
+) -> HardRowSystem:
+    """Stack the hands' rows, with their names."""
+    owners = {
+        int(row): limb
+        for limb, mine in zip(limbs, held, strict=True)
+        for row in np.flatnonzero(np.abs(mine).any(axis=1))
+    }
+    return HardRowSystem(
+        G=np.hstack([hand.G for hand in data.hands]),
+        g=np.asarray(sum(hand.g for hand in data.hands)),
+        wrench=data.wrench,
+        H=block_diag(*(hand.H for hand in data.hands)),
+        h=np.concatenate([hand.h for hand in data.hands]),
+        names=tuple(
+            limit_name(limb, row)
+            for limb, space in zip(limbs, spaces, strict=True)
+            for row in space.rows[0 if capped else len(space.s) :]
+        ),
+        given=tuple(LimitName(owners[row], None, None, HELD_WRENCH) for row in range(len(owners))),
     )
 
 

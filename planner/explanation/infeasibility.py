@@ -18,14 +18,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 from scipy.optimize import OptimizeResult, linprog
 
 from hand_models.base import Array
-from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline
-from planner.explanation.active_limits import limit_name
-from planner.programs import UNLIMITED, StanceData
+from planner.explanation.active_limits import ALIKE
+from planner.programs import UNLIMITED
 from planner.result import LimitName
 
 __all__ = [
@@ -48,9 +46,6 @@ BODY: Final = 6
 WEIGHS: Final = 1e-6
 """Multipliers below this, of which all add up to about one, do not count."""
 
-ALIKE: Final = 5
-"""Decimals by which multipliers are ranked; where these are alike, rows' order counts."""
-
 EXACT: Final = 1e-10
 """Tolerance of the linear programs."""
 
@@ -62,14 +57,11 @@ class Violation(NamedTuple):
     ----------
     size : float
         t, in the program's units.
-    loads : ndarray, shape (M,)
-        z of all hands that break them by so much.
     direction, multipliers : ndarray, shapes (nb,), (n,)
         d of the balance and λ ≥ 0 of the rows, Σ|d| + Σλ = 1 where t is above zero.
     """
 
     size: float
-    loads: Array
     direction: Array
     multipliers: Array
 
@@ -99,55 +91,15 @@ class HardRowSystem:
     names: tuple[LimitName, ...]
     given: tuple[LimitName, ...]
 
-    @classmethod
-    def of(
-        cls,
-        data: StanceData,
-        limbs: Sequence[str],
-        spaces: Sequence[WrenchSpace],
-        held: Sequence[Array],
-        utilisation: float | None = None,
-    ) -> HardRowSystem:
-        """Stack the hands' rows.
-
-        Parameters
-        ----------
-        data : StanceData
-        limbs : sequence of str
-            Of the hands.
-        spaces : sequence of WrenchSpace
-            Their sets, for the rows' names.
-        held : sequence of ndarray, shape (nb − 6, 6)
-            What the further rows of the balance take of each hand's wrench.
-        utilisation : float, optional
-            At which limit rows count as hard rows; by default they do not count.
-        """
-        hands = (data if utilisation is None else data.capped(utilisation)).hands
-        owners = {
-            int(row): limb
-            for limb, mine in zip(limbs, held, strict=True)
-            for row in np.flatnonzero(np.abs(mine).any(axis=1))
-        }
-        return cls(
-            G=np.hstack([hand.G for hand in hands]),
-            g=np.asarray(sum(hand.g for hand in hands)),
-            wrench=data.wrench,
-            H=block_diag(*(hand.H for hand in hands)),
-            h=np.concatenate([hand.h for hand in hands]),
-            names=tuple(
-                limit_name(limb, row)
-                for limb, space in zip(limbs, spaces, strict=True)
-                for row in space.rows[len(space.s) if utilisation is None else 0 :]
-            ),
-            given=tuple(
-                LimitName(owners[row], None, None, HELD_WRENCH) for row in range(len(owners))
-            ),
-        )
-
     @property
     def goal(self) -> Array:
         """What G z is to be, shape (nb,)."""
         return np.asarray(self.wrench - self.g)
+
+    @property
+    def balance(self) -> tuple[LimitName | None, ...]:
+        """Names of the balance's rows, length nb; None of the body's own."""
+        return (None,) * BODY + self.given
 
     @property
     def constraints(self) -> tuple[LimitName, ...]:
@@ -192,11 +144,9 @@ class HardRowSystem:
         Violation or None
             None if the solver does not say, or the time is over.
         """
-        chosen = frozenset(constraints)
+        chosen = {*constraints, *([None] if balance else [])}
         rows = np.flatnonzero(among(self.names, chosen))
-        tied = np.flatnonzero(among(self.given, chosen)) + BODY
-        if balance:
-            tied = np.concatenate([np.arange(BODY), tied])
+        tied = np.flatnonzero(among(self.balance, chosen))
         G, goal, H, h = self.G[tied], self.goal[tied], self.H[rows], self.h[rows]
         size, count = self.G.shape[1], len(tied)
         ends = np.append(np.full(size, UNLIMITED), np.inf)
@@ -212,7 +162,7 @@ class HardRowSystem:
         direction, multipliers = np.zeros(len(self.wrench)), np.zeros(len(self.h))
         direction[tied] = shares[count : 2 * count] - shares[:count]
         multipliers[rows] = shares[2 * count :]
-        return Violation(float(result.x[-1]), result.x[:-1], direction, multipliers)
+        return Violation(float(result.x[-1]), direction, multipliers)
 
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
@@ -252,6 +202,8 @@ def vertex(
     return result if result.status == 0 and result.x is not None else None
 
 
-def among(names: Sequence[LimitName], chosen: Collection[LimitName]) -> NDArray[np.bool_]:
+def among(
+    names: Sequence[LimitName | None], chosen: Collection[LimitName | None]
+) -> NDArray[np.bool_]:
     """Return which of the names are among the chosen, shape (n,)."""
     return np.array([name in chosen for name in names], dtype=bool)

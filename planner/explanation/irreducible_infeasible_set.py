@@ -10,12 +10,12 @@ all the others have loads is in every one of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import Final
 
 import numpy as np
 
-from planner.explanation.infeasibility import BODY, WEIGHS, HardRowSystem, Violation, among, ranked
+from planner.explanation.infeasibility import WEIGHS, HardRowSystem, Violation, among, ranked
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -63,7 +63,7 @@ def irreducible_set(
 def _filtered(system: HardRowSystem, proof: Violation) -> tuple[LimitName, ...] | None:
     """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
-    needed = _needed(system, proof, list(kept))
+    needed = _needed(system, proof, kept)
     for name in reversed(ranked(kept)):
         if name not in kept or name in needed:
             continue
@@ -74,7 +74,7 @@ def _filtered(system: HardRowSystem, proof: Violation) -> tuple[LimitName, ...] 
         if trial.size > BROKEN:
             proof = trial
             kept = system.weights(proof.direction, proof.multipliers)
-            needed |= _needed(system, proof, list(kept))
+            needed |= _needed(system, proof, kept)
         elif trial.size > KEPT:
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
@@ -124,28 +124,25 @@ def sufficient_alone(
 
 def _prove_alone(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> bool:
     """Whether a proof stands on these constraints alone."""
-    multipliers = np.where(among(system.names, kept), proof.multipliers, 0.0)
-    direction = proof.direction.copy()
-    direction[BODY:] *= among(system.given, kept)
-    return system.proves(direction, multipliers)
+    direction = proof.direction * among(system.balance, {None, *kept})
+    return system.proves(direction, proof.multipliers * among(system.names, kept))
 
 
-def _needed(system: HardRowSystem, proof: Violation, kept: Sequence[LimitName]) -> set[LimitName]:
+def _needed(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> set[LimitName]:
     """Return constraints without which the others have loads, as far as a guess shows that.
 
     The rows that a proof weighs, n = (−d, λ) on M z against r, contradict each other by n · r < 0
     alone. With the row of one constraint moved by −n · r / n_k they agree; those loads z are solved
     for, and count if they also keep to what the others' other rows say.
     """
-    chosen = frozenset(kept)
-    mine = among(system.names, chosen)
+    mine = among(system.names, kept)
     rows = np.flatnonzero(mine & (proof.multipliers > WEIGHS))
-    tied = np.concatenate([np.arange(BODY), np.flatnonzero(among(system.given, chosen)) + BODY])
+    tied = np.flatnonzero(among(system.balance, {None, *kept}))
     M = np.vstack([system.G[tied], system.H[rows]])
     right = np.concatenate([system.goal[tied], system.h[rows]])
     pull = np.concatenate([-proof.direction[tied], proof.multipliers[rows]])
-    owners = [None] * BODY + [system.given[i - BODY] for i in tied[BODY:]]
-    owners += [system.names[i] for i in rows]
+    given = [system.balance[i] for i in tied]
+    owners = given + [system.names[i] for i in rows]
     tried = [name for name in kept if name in owners]
     moved = [
         max((k for k, owner in enumerate(owners) if owner == name), key=lambda k: abs(pull[k]))
@@ -160,7 +157,7 @@ def _needed(system: HardRowSystem, proof: Violation, kept: Sequence[LimitName]) 
             system.H[mine] @ loads - system.h[mine, None],
         ]
     )
-    whose = [*owners[: len(tied)], *(name for name in system.names if name in chosen)]
+    whose = given + [name for name in system.names if name in kept]
     found = set()
     for i, name in enumerate(tried):
         others = np.array([owner != name for owner in whose], dtype=bool)

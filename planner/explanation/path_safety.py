@@ -25,7 +25,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs
-from planner.explanation.active_limits import LimitUse, close_to, limit_name, limit_uses
+from planner.explanation.active_limits import LimitUse, close_to, limit_name
 from planner.explanation.infeasibility import ranked
 from planner.explanation.sentences import blocking_sentence
 from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
@@ -102,8 +102,14 @@ def tension_path(
     here = max(still, *used)
     at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
     if here > cap + SLACK:
-        uses = [*limit_uses(limbs, spaces, np.concatenate(rows), close_to(here)), *idle]
-        return TensionPath(False, 0.0, at_present, change, _most_used(uses))
+        close = close_to(here)
+        names = [
+            limit_name(limb, space.rows[i])
+            for limb, space, mine in zip(limbs, spaces, rows, strict=True)
+            for i in np.flatnonzero(mine >= close).tolist()
+        ]
+        names += [each.name for each in idle if each.utilisation >= close]
+        return TensionPath(False, 0.0, at_present, change, list(dict.fromkeys(names)))
     if change <= GIVE:
         return TensionPath(True, 1.0, at_present, change)
     # rounding must not leave the plan itself outside
@@ -127,12 +133,6 @@ def unsafe_sentence(path: TensionPath) -> str:
     much = f"only the last {part} %" if part > 0 else "no part"
     sentence = f"{much} of the straight way from the present tensions is safe"
     return f"{sentence}: {blocking_sentence(path.limiting)}" if path.limiting else sentence
-
-
-def _most_used(used: Sequence[LimitUse]) -> list[LimitName]:
-    """Return the limit of which a plan uses most, and those that tie with it."""
-    close = close_to(max(each.utilisation for each in used))
-    return list(dict.fromkeys(each.name for each in used if each.utilisation >= close))
 
 
 def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome) -> list[LimitName]:

@@ -232,11 +232,11 @@ def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
     if plan.joints is None:
         return ()
     stance, torque, limits = question.stance, plan.joint_torque, plan.joint_torque_limit
-    model = stance.robot.model
+    robot = stance.robot
     return tuple(
         DrawnLimb(
             limb,
-            stance.body.apply(model.link_chain(plan.joints, limb)),
+            stance.body.apply(robot.link_chain(plan.joints, limb)),
             None if torque is None or limits is None else np.abs(torque[limb]) / limits[limb],
         )
         for limb in stance.robot.limbs
@@ -265,7 +265,7 @@ def _load(plan: Plan, question: Question) -> DrawnLoad:
     """Return what the hands hold up, at the centre of mass that was planned with."""
     stance, load = question.stance, question.load
     robot, turn = stance.robot, stance.body.rotation
-    com = robot.com if plan.joints is None else robot.model.com(plan.joints)
+    com = robot.com if plan.joints is None else robot.com_at(plan.joints)
     if question.body_wrench is None and not load.own:
         com = robot.com if load.com is None else np.asarray(load.com)
     force, moment = -plan.body_wrench[:3], -plan.body_wrench[3:]

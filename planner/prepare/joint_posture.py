@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Array, InvalidInputError, Pose
 from planner.prepare.stance_constraints import JointLoads
 from planner.question import Question, Stance
-from planner.robots import solve_limbs, unreachable
+from planner.robots import UnreachableError, solve_limbs
 
 __all__ = ["Posture", "posture"]
 
@@ -68,7 +68,8 @@ def posture(question: Question) -> Posture | None:
     stance = question.stance
     if stance.joints is None:
         return None
-    poses = hands_in_body(stance)
+    body = stance.body.inverse()
+    poses = {hand.limb: body @ hand.pose for hand in stance.hands}
     gravity, acceleration = gravity_and_acceleration(question)
     angles: Mapping[str, Array]
     if isinstance(stance.joints, str):
@@ -81,20 +82,19 @@ def posture(question: Question) -> Posture | None:
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
     """Return what the joints bear at these angles; limbs left out are at zero."""
     robot = question.stance.robot
-    model = robot.model
     gravity, acceleration = gravity_and_acceleration(question)
     whole = {
-        limb: np.asarray(angles.get(limb, np.zeros(len(model.joint_names[limb]))), dtype=float)
-        for limb in robot.limbs
+        limb: np.asarray(angles.get(limb, np.zeros(len(chain.joints))), dtype=float)
+        for limb, chain in robot.chains.items()
     }
-    statics = model.statics(whole, gravity, acceleration)
-    jacobians = model.jacobians(whole)
+    statics = robot.statics(whole, gravity, acceleration)
+    jacobians = robot.jacobians(whole)
     limits = torque_limits(question)
     return Posture(
         angles=whole,
         joints={
             limb: JointLoads(
-                model.joint_names[limb],
+                robot.chains[limb].joints,
                 statics.joint_torque[limb],
                 jacobians[limb],
                 limits[limb],
@@ -104,12 +104,6 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
         body_wrench=statics.body_wrench,
         solved=isinstance(question.stance.joints, str),
     )
-
-
-def hands_in_body(stance: Stance) -> dict[str, Pose]:
-    """Return H in B of every hand of a stance."""
-    body = stance.body.inverse()
-    return {hand.limb: body @ hand.pose for hand in stance.hands}
 
 
 def gravity_and_acceleration(question: Question) -> tuple[Array, Array]:
@@ -130,10 +124,10 @@ def torque_limits(question: Question) -> dict[str, Array]:
     """Return what each joint can bear: the caller's figures, or else the robot's [N·m]."""
     robot, own = question.stance.robot, question.limits.joint_torque
     if own is None:
-        return {limb: robot.torque_limits[limb] for limb in robot.limbs}
+        return {limb: chain.torque_limits for limb, chain in robot.chains.items()}
     found = {}
-    for limb in robot.limbs:
-        known = robot.torque_limits[limb]
+    for limb, chain in robot.chains.items():
+        known = chain.torque_limits
         given = own.get(limb, known) if isinstance(own, Mapping) else own
         found[limb] = np.broadcast_to(np.asarray(given, dtype=float), known.shape)
     return found
@@ -143,17 +137,16 @@ def _given(
     stance: Stance, joints: Mapping[str, Array], poses: Mapping[str, Pose]
 ) -> Mapping[str, Array]:
     """Return given angles, which must be possible and where the hands' poses are."""
-    model = stance.robot.model
     for limb, angles in joints.items():
-        low, high = model.lower[limb], model.upper[limb]
-        for i, (angle, least, most) in enumerate(zip(angles, low, high, strict=True)):
+        chain = stance.robot.chains[limb]
+        ends = zip(angles, chain.lower, chain.upper, strict=True)
+        for i, (angle, least, most) in enumerate(ends):
             if not least - BEYOND <= angle <= most + BEYOND:
                 raise InvalidInputError(
-                    f"{model.joint_names[limb][i]} goes from {least:.6g} to {most:.6g} rad, "
-                    f"got {angle:.6g}",
+                    f"{chain.joints[i]} goes from {least:.6g} to {most:.6g} rad, got {angle:.6g}",
                     field=f"stance.joints.{limb}[{i}]",
                 )
-    there = model.hand_poses(joints)
+    there = stance.robot.hand_poses(joints)
     for i, (limb, pose) in enumerate(poses.items()):
         if limb not in joints:
             raise InvalidInputError(
@@ -178,11 +171,9 @@ def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> di
     shares = {
         limb: np.concatenate([pose.rotation.T @ force, np.zeros(3)]) for limb, pose in poses.items()
     }
-    found = solve_limbs(robot, poses, loads=shares, gravity=gravity)
-    wrong = unreachable(found)
-    if wrong is not None:
-        limb = next(iter(wrong.missing))
-        index = [hand.limb for hand in question.stance.hands].index(limb)
-        wrong.field = f"stance.hands[{index}].pose"
-        raise wrong
-    return {limb: solution.angles for limb, solution in found.items()}
+    try:
+        return solve_limbs(robot, poses, shares, gravity)
+    except UnreachableError as error:
+        index = list(poses).index(next(iter(error.missing)))
+        error.field = f"stance.hands[{index}].pose"
+        raise

@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from itertools import compress
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -33,16 +34,21 @@ TENSION_CHANGE: Final = "tension_change"
 KEPT: Final = 256
 """Lists of names that are kept."""
 
-AXES: Final = ("fx", "fy", "fz")
+AXES: Final = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
+"""Both ways along the axes of a cap's frame."""
 
 BALL: Final = np.vstack([HELD, HELD[8:] * [1.0, 1.0, -1.0]])
 """Directions (26, 3) whose largest product with a force is at least its size: `HELD` and, toward
 the rock, its mirror image."""
 
-BALL_ROWS: Final = tuple(
-    Row(None, None, FORCE_CAP, "limit", f"{FORCE_CAP}/{k + 1}") for k in range(len(BALL))
+BALL_NAMES: Final = tuple(str(k + 1) for k in range(len(BALL)))
+
+CHANGE_ROWS: Final = tuple(
+    Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")
+    for finger in FINGERS
+    for way in ("up", "down")
 )
-"""Names of the limit rows of a cap whatever the direction."""
+"""Names of the hard rows of a change of tensions."""
 
 
 class JointLoads(NamedTuple):
@@ -67,17 +73,6 @@ class JointLoads(NamedTuple):
     def torques(self, wrench: Array) -> Array:
         """Return the joints' torques for a hand's wrench on the rock, shape (n,) [N·m]."""
         return np.asarray(self.gravity + self.jacobian.T @ wrench)
-
-
-class _Block(NamedTuple):
-    """Limit rows ``D w + d0 ≤ u s`` of a hand's wrench w, and hard rows ``C w ≤ 0``."""
-
-    rows: tuple[Row, ...]
-    D: Array
-    d0: Array
-    s: Array
-    hard: tuple[Row, ...] = ()
-    C: Array = np.zeros((0, 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,91 +100,64 @@ class StanceConstraints:
     change: float = np.inf
 
     def on(self, space: WrenchSpace) -> WrenchSpace:
-        """Return a hand's set with these rows."""
-        if self.joints is None and self.cap is None and not self._keeps_tensions:
+        """Return a hand's set with these rows.
+
+        Limit rows are ``D w + d0 ≤ u s`` of the hand's wrench w, hard rows ``C w ≤ 0`` or of its
+        tensions.
+        """
+        limits: tuple[Row, ...] = ()
+        hard: tuple[Row, ...] = ()
+        D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
+        H, h = [space.H], [space.h]
+        if self.joints is not None:
+            names, gravity, jacobian, most = self.joints
+            limits += _joint_names(names)
+            D += [jacobian.T, -jacobian.T]
+            d0 += [gravity, -gravity]
+            s += [most, most]
+        if self.cap is not None:
+            names, directions, most = self._cap()
+            bounded, closed = np.isfinite(most) & (most > 0.0), most == 0.0
+            limits += _cap_names(names, "limit", tuple(bounded.tolist()))
+            hard += _cap_names(names, "hard", tuple(closed.tolist()))
+            forces = np.hstack([directions, np.zeros_like(directions)])
+            D.append(forces[bounded])
+            d0.append(np.zeros(len(most[bounded])))
+            s.append(most[bounded])
+            C = forces[closed]
+            H.append(C @ space.generators)
+            h.append(-(C @ space.origin))
+        if self.present is not None and math.isfinite(self.change):
+            hard += CHANGE_ROWS
+            columns = np.repeat([space.columns.index(f"{finger}/tension") for finger in FINGERS], 2)
+            signs = np.tile([1.0, -1.0], len(FINGERS))
+            H.append(signs[:, None] * np.eye(len(space.columns))[columns])
+            h.append(self.change + signs * np.repeat(self.present, 2))
+        if not limits + hard:
             return space
-        blocks = [block for block in (self._joint_rows(), self._cap_rows()) if block is not None]
-        hard, H, h = self._change_rows(space)
         # wrench rows stay last among the limit rows
-        apart = len(space.s) - len(space.D)
-        D = np.concatenate([np.zeros((0, 6)), *(block.D for block in blocks)])
-        d0 = np.concatenate([np.zeros(0), *(block.d0 for block in blocks)])
-        s = np.concatenate([np.zeros(0), *(block.s for block in blocks)])
-        C = np.concatenate([np.zeros((0, 6)), *(block.C for block in blocks)])
-        limits = tuple(row for block in blocks for row in block.rows)
-        constraints = tuple(row for block in blocks for row in block.hard)
+        apart, added = len(space.s) - len(space.D), np.concatenate(D)
+        l0 = added @ space.origin + np.concatenate(d0)
         return WrenchSpace(
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,
-            rows=_joined(space.rows, apart, limits, constraints + hard),
-            L=np.concatenate([space.L[:apart], D @ space.generators, space.L[apart:]]),
-            l0=np.concatenate([space.l0[:apart], D @ space.origin + d0, space.l0[apart:]]),
-            s=np.concatenate([space.s[:apart], s, space.s[apart:]]),
-            H=np.concatenate([space.H, C @ space.generators, H]),
-            h=np.concatenate([space.h, -(C @ space.origin), h]),
+            rows=_joined(space.rows, apart, limits, hard),
+            L=np.concatenate([space.L[:apart], added @ space.generators, space.L[apart:]]),
+            l0=np.concatenate([space.l0[:apart], l0, space.l0[apart:]]),
+            s=np.concatenate([space.s[:apart], *s, space.s[apart:]]),
+            H=np.concatenate(H),
+            h=np.concatenate(h),
             D=space.D,
         )
 
-    @property
-    def _keeps_tensions(self) -> bool:
-        return self.present is not None and math.isfinite(self.change)
-
-    def _joint_rows(self) -> _Block | None:
-        joints = self.joints
-        if joints is None:
-            return None
-        turned = joints.jacobian.T
-        return _Block(
-            rows=_joint_names(joints.names),
-            D=np.concatenate([turned, -turned]),
-            d0=np.concatenate([joints.gravity, -joints.gravity]),
-            s=np.concatenate([joints.limits, joints.limits]),
-        )
-
-    def _cap_rows(self) -> _Block | None:
-        if self.cap is None:
-            return None
+    def _cap(self) -> tuple[tuple[str, ...], Array, Array]:
+        """Return names, directions (n, 3) and sizes (n,) of what caps the hand's force."""
         if not isinstance(self.cap, tuple):
-            sizes = np.full(len(BALL), float(self.cap))
-            return _Block(BALL_ROWS, _of_force(BALL), np.zeros(len(BALL)), sizes)
+            return BALL_NAMES, BALL, np.full(len(BALL), self.cap)
         assert self.frame is not None
-        limits: list[tuple[Row, Array, float]] = []
-        hard: list[tuple[Row, Array]] = []
-        for name, axis, (low, high) in zip(AXES, self.frame.T, self.cap, strict=True):
-            for sign, direction, most in (("+", axis, high), ("-", -axis, -low)):
-                label = f"{FORCE_CAP}/{name}{sign}"
-                if most == 0.0:
-                    hard.append((Row(None, None, FORCE_CAP, "hard", label), direction))
-                elif np.isfinite(most):
-                    limits.append((Row(None, None, FORCE_CAP, "limit", label), direction, most))
-        return _Block(
-            rows=tuple(row for row, _, _ in limits),
-            D=_of_force(np.array([d for _, d, _ in limits]).reshape(-1, 3)),
-            d0=np.zeros(len(limits)),
-            s=np.array([most for _, _, most in limits]),
-            hard=tuple(row for row, _ in hard),
-            C=_of_force(np.array([d for _, d in hard]).reshape(-1, 3)),
-        )
-
-    def _change_rows(self, space: WrenchSpace) -> tuple[tuple[Row, ...], Array, Array]:
-        rows: list[Row] = []
-        entries: list[tuple[int, float]] = []
-        most: list[float] = []
-        if self.present is not None and self._keeps_tensions:
-            for i, finger in enumerate(FINGERS):
-                if f"{finger}/tension" not in space.columns:
-                    continue
-                column = space.columns.index(f"{finger}/tension")
-                for kind, sign in (("up", 1.0), ("down", -1.0)):
-                    label = f"{finger}/{TENSION_CHANGE}/{kind}"
-                    rows.append(Row(finger, None, TENSION_CHANGE, "hard", label))
-                    entries.append((column, sign))
-                    most.append(self.change + sign * float(self.present[i]))
-        H = np.zeros((len(rows), len(space.columns)))
-        for row, (column, sign) in enumerate(entries):
-            H[row, column] = sign
-        return tuple(rows), H, np.array(most)
+        axes = np.stack([self.frame.T, -self.frame.T], axis=1).reshape(-1, 3)
+        return AXES, axes, np.array([most for low, high in self.cap for most in (high, -low)])
 
 
 NOTHING: Final = StanceConstraints()
@@ -213,8 +181,10 @@ def _joint_names(joints: tuple[str, ...]) -> tuple[Row, ...]:
     )
 
 
-def _of_force(directions: Array) -> Array:
-    """Return rows (n, 6) of a wrench that take directions (n, 3) of its force."""
-    rows = np.zeros((len(directions), 6))
-    rows[:, :3] = directions
-    return rows
+@lru_cache(maxsize=KEPT)
+def _cap_names(
+    names: tuple[str, ...], kind: Literal["limit", "hard"], there: tuple[bool, ...]
+) -> tuple[Row, ...]:
+    return tuple(
+        Row(None, None, FORCE_CAP, kind, f"{FORCE_CAP}/{name}") for name in compress(names, there)
+    )

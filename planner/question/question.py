@@ -12,7 +12,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from planner import deadline
-from planner.question.stance import Stance, checked_body_wrench, known_limbs
+from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
 __all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
 
@@ -93,10 +93,7 @@ class ForceCap:
         if isinstance(self.largest_force, list):
             ranges = tuple((float(low), float(high)) for low, high in self.largest_force)
             object.__setattr__(self, "largest_force", ranges)
-        if self.frame not in FRAMES:
-            raise InvalidInputError(
-                f"unknown frame {self.frame!r}; known are {', '.join(FRAMES)}", field="frame"
-            )
+        known_choice(self.frame, FRAMES, "frame")
         if isinstance(self.largest_force, tuple):
             if len(self.largest_force) != 3:
                 raise InvalidInputError(
@@ -219,11 +216,7 @@ class Question:
             wrench = finite_vector(self.body_wrench, 6, "body_wrench")
             checked_body_wrench(wrench, "body_wrench")
             object.__setattr__(self, "body_wrench", wrench)
-        if self.objective not in OBJECTIVES:
-            raise InvalidInputError(
-                f"unknown objective {self.objective!r}; known are {', '.join(OBJECTIVES)}",
-                field="objective",
-            )
+        known_choice(self.objective, OBJECTIVES, "objective")
         unknown = sorted(set(self.want) - set(WANTS))
         if isinstance(self.want, str) or unknown:
             raise InvalidInputError(
@@ -277,7 +270,7 @@ class Question:
         if isinstance(limits.joint_torque, Mapping):
             known_limbs(limits.joint_torque, robot, "limits.joint_torque")
             for limb, most in limits.joint_torque.items():
-                count = len(robot.model.joint_names[limb])
+                count = len(robot.chains[limb].joints)
                 if isinstance(most, tuple) and len(most) != count:
                     raise InvalidInputError(
                         f"{count} joints need {count} figures, got {len(most)}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
@@ -24,6 +24,7 @@ __all__ = [
     "Stance",
     "WristMode",
     "checked_body_wrench",
+    "known_choice",
     "known_limbs",
 ]
 
@@ -60,6 +61,14 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
             )
 
 
+def known_choice(value: str, known: Sequence[str], field: str) -> None:
+    """Refuse what is none of those that are known."""
+    if value not in known:
+        raise InvalidInputError(
+            f"unknown {field} {value!r}; known are {', '.join(known)}", field=field
+        )
+
+
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     if not np.abs(wrench).max() <= HEAVIEST:
@@ -79,27 +88,12 @@ def _possible(pose: Pose, field: str) -> None:
         )
     if pose.proper:
         return
-    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").tolist()
-    if not _right_handed(*axes):
+    axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").reshape(3, 3)
+    off = np.append(axes.T @ axes - np.eye(3), np.linalg.det(axes) - 1.0)
+    if not np.abs(off).max() <= ORTHONORMAL:
         raise InvalidInputError(
             "orthonormal right-handed axes are needed", field=f"{field}.orientation"
         )
-
-
-def _right_handed(
-    a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, i: float
-) -> bool:
-    """Whether columns x = (a, d, g), y and z are orthonormal, and z is x × y."""
-    off = (
-        a * a + d * d + g * g - 1.0,
-        b * b + e * e + h * h - 1.0,
-        c * c + f * f + i * i - 1.0,
-        a * b + d * e + g * h,
-        b * c + e * f + h * i,
-        c * a + f * d + i * g,
-        c * (d * h - g * e) + f * (g * b - a * h) + i * (a * e - d * b) - 1.0,
-    )
-    return max(off) <= ORTHONORMAL and min(off) >= -ORTHONORMAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +145,7 @@ class HandOnHold:
     at: Pose | None = None
 
     def __post_init__(self) -> None:
-        if self.wrist not in WRISTS:
-            raise InvalidInputError(
-                f"unknown wrist {self.wrist!r}; known are {', '.join(WRISTS)}", field="wrist"
-            )
+        known_choice(self.wrist, WRISTS, "wrist")
         if self.tendon_preload is not None:
             if self.wrist == "fixed":
                 raise InvalidInputError(
@@ -180,24 +171,17 @@ class HandOnHold:
             _possible(self.hold_in_hand, "hold.pose_in_hand")
 
     def _check_seat(self) -> None:
-        if self.seat not in SEATS:
-            raise InvalidInputError(
-                f"unknown seat {self.seat!r}; known are {', '.join(SEATS)}", field="seat"
-            )
+        known_choice(self.seat, SEATS, "seat")
         posed = self.hold_pose is not None or self.hold_in_hand is not None
-        if self.seat == "best" and posed:
-            raise InvalidInputError(
-                "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, or "
-                "the seat",
-                field="seat",
-            )
-        if self.at is not None:
-            if posed:
+        told = {"seat": self.seat == "best", "at": self.at is not None}
+        for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):
+            if told[name] and posed:
                 raise InvalidInputError(
                     "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
-                    "or where it is seated",
-                    field="at",
+                    f"or {left_out}",
+                    field=name,
                 )
+        if self.at is not None:
             _possible(self.at, "at")
         if self.seat_direction is not None:
             if self.seat != "best":
@@ -252,10 +236,10 @@ class Stance:
                     field="joints",
                 )
         elif self.joints is not None:
-            names = self.robot.model.joint_names
+            chains = self.robot.chains
             known_limbs(self.joints, self.robot, "joints")
             joints = {
-                limb: finite_vector(angles, len(names[limb]), f"joints.{limb}")
+                limb: finite_vector(angles, len(chains[limb].joints), f"joints.{limb}")
                 for limb, angles in self.joints.items()
             }
             object.__setattr__(self, "joints", joints)

@@ -2,54 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
+from scipy.optimize import least_squares
 
-from hand_models.base import Array, InvalidInputError, Pose, finite_vector
+from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
-from planner.robots.limb_batch import Efforts, LimbBatch
-from planner.robots.out_of_reach import PLACED, TURNED, pose_shortfall
+from planner.robots.limb_batch import LimbBatch
 from planner.robots.pose_search import TOLERANCE, find_angles, starts_near
 from planner.robots.robot import Robot
 from planner.robots.torque_lowering import lower_torques
 
-__all__ = ["IkSolution", "UnreachableError", "solve_limbs", "unreachable"]
+__all__ = ["UnreachableError", "solve_limbs"]
 
 STARTS: Final = 2
 """Postures from which a pose out of reach is approached, beside the best found."""
 
+FIRST: Final = 300.0
+"""How much heavier what comes first counts than what comes second."""
 
-@dataclass(frozen=True, eq=False)
-class IkSolution:
-    """Joint angles of a limb for a pose of its hand.
+STEPS: Final = 40
+"""Most steps from a start."""
 
-    Attributes
-    ----------
-    angles : ndarray, shape (n,)
-        Within the joints' limits [rad]; the best found if the pose is not solved.
-    position_error : float
-        Distance of H from the pose [m].
-    orientation_error : float
-        Angle of H from the pose [rad].
-    solved : bool
-        Whether both errors are nil but for rounding.
-    missing : float
-        How far the pose is out of reach [m]: how far away the hand stays, turned as asked if it can
-        be, and not less than the pose is beyond the stretched limb; zero if the pose is solved.
-    turned : float or None
-        Where the place is within reach, but not with these axes: the angle that is missing there
-        [rad].
-    """
+PLACED: Final = 1e-3
+"""Distance up to which a hand counts as in its place [m]."""
 
-    angles: Array
-    position_error: float
-    orientation_error: float
-    solved: bool
-    missing: float
-    turned: float | None = None
+TURNED: Final = 2e-3
+"""Angle up to which it counts as turned as asked [rad]."""
 
 
 class UnreachableError(InvalidInputError):
@@ -86,26 +68,10 @@ class UnreachableError(InvalidInputError):
         self.turned = dict(turned)
 
 
-def unreachable(solutions: Mapping[str, IkSolution]) -> UnreachableError | None:
-    """Return the error that names every limb whose pose is not solved; None if all are."""
-    wrong = {limb: solution for limb, solution in solutions.items() if not solution.solved}
-    if not wrong:
-        return None
-    return UnreachableError(
-        {limb: solution.missing for limb, solution in wrong.items()},
-        {limb: each.turned for limb, each in wrong.items() if each.turned is not None},
-    )
-
-
 def solve_limbs(
-    robot: Robot,
-    poses: Mapping[str, Pose],
-    *,
-    seeds: Mapping[str, Array] | None = None,
-    loads: Mapping[str, Array] | None = None,
-    gravity: Array | None = None,
-) -> dict[str, IkSolution]:
-    """Return joint angles for poses of the hands, within the joints' limits.
+    robot: Robot, poses: Mapping[str, Pose], loads: Mapping[str, Array], gravity: Array
+) -> dict[str, Array]:
+    """Return joint angles for poses of the hands, within the joints' limits, shape (n,) each [rad].
 
     The same question always has the same answer. A limb of more than six joints uses what its pose
     leaves open to lower Σ (τ / τ_max)²; one of fewer than six reaches few poses.
@@ -115,71 +81,88 @@ def solve_limbs(
     robot : Robot
     poses : mapping of str to Pose
         H in B, by limb.
-    seeds : mapping of str to ndarray, shape (n,), optional
-        Angles to start from [rad], for an answer near them; by default, and where none is found
-        from them, those of random postures whose hands are near the pose.
-    loads : mapping of str to ndarray, shape (6,), optional
-        Wrench that a hand is to exert on the rock, in H [N, N·m]; none by default.
-    gravity : ndarray, shape (3,), optional
-        In B [m/s²]; none by default. Without gravity and loads there is no torque to lower.
+    loads : mapping of str to ndarray, shape (6,)
+        Wrench that a hand is to exert on the rock, in H [N, N·m]; none where it is left out.
+    gravity : ndarray, shape (3,)
+        In B [m/s²]. Without gravity and loads there is no torque to lower.
 
     Raises
     ------
-    InvalidInputError
-        If a limb is unknown, a pose is not finite, or a seed or a load has not its shape or is not
-        finite.
+    UnreachableError
+        That names every limb whose pose is not solved.
     DeadlineError
         If the time is over before.
     """
-    seeds, loads = seeds or {}, loads or {}
-    for field, given in (("poses", poses), ("seeds", seeds), ("loads", loads)):
-        for limb in given:
-            if limb not in robot.limbs:
-                raise InvalidInputError(
-                    f"unknown limb {limb!r}; known are {', '.join(robot.limbs)}", field=field
-                )
-    if not poses:
-        return {}
-    for limb, pose in poses.items():
-        finite_vector(pose.position, 3, f"poses.{limb}.position")
-        finite_vector(np.ravel(pose.rotation), 9, f"poses.{limb}.orientation")
-    batch = LimbBatch(robot, poses)
-    efforts = None
-    if loads or gravity is not None:
-        efforts = Efforts(batch, loads, np.zeros(3) if gravity is None else gravity)
-    angles = find_angles(batch, seeds, efforts)
-    if efforts is not None:
-        angles = lower_torques(batch, angles, efforts)
-    errors = batch.errors(angles[None])[0][0]
-    solved = np.abs(errors).max(axis=1) <= TOLERANCE
-    positions = np.linalg.norm(errors[:, :3], axis=1) * batch.reach
-    turns = np.linalg.norm(errors[:, 3:], axis=1)
-    found = {}
-    for i, limb in enumerate(batch.limbs):
-        values = angles[i, : batch.joints[i]].copy()
-        missing, turned = 0.0, None
-        if not solved[i]:
-            deadline.check("it was known how far a hand is out of reach")
-            missing, turned = _lacking(batch, i, values)
-        found[limb] = IkSolution(
-            angles=values,
-            position_error=float(positions[i]),
-            orientation_error=float(turns[i]),
-            solved=bool(solved[i]),
-            missing=missing,
-            turned=turned,
-        )
-    return found
+    batch = LimbBatch(robot, poses, loads, gravity)
+    angles = lower_torques(batch, find_angles(batch))
+    solved = np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCE
+    if solved.all():
+        return {
+            limb: angles[i, :n] for i, (limb, n) in enumerate(zip(poses, batch.joints, strict=True))
+        }
+    missing, turned = {}, {}
+    for i in np.flatnonzero(~solved).tolist():
+        deadline.check("it was known how far a hand is out of reach")
+        limb = batch.limbs[i]
+        missing[limb], angle = _lacking(batch, i, angles[i, : batch.joints[i]])
+        if angle is not None:
+            turned[limb] = angle
+    raise UnreachableError(missing, turned)
 
 
 def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None]:
-    """Return the distance that a limb lacks [m], and the angle at its place if that is in reach."""
-    beyond = float(batch.beyond[i])
-    limb = batch.limbs[i]
+    """Return what a pose lacks that no joint angles give.
+
+    From several starts, the hand is put in its place and turned as far as that lets it; and it is
+    turned as asked and brought as near as that lets it.
+
+    Returns
+    -------
+    missing : float
+        How far away the hand stays, turned as asked if it can be, and not less than the pose is
+        beyond the stretched limb [m].
+    turned : float or None
+        Where the place is within reach, but not with these axes: the angle that is missing there
+        [rad].
+    """
+    part = batch.part(np.array([i]))
     starts = [best, *starts_near(batch, i, 0)[:STARTS, : batch.joints[i]]]
-    lacks = pose_shortfall(batch.robot.model, limb, batch.poses[limb], starts)
+    place, turn = _nearest(part, starts, FIRST, 1.0)
+    way, askew = _nearest(part, starts, 1.0, FIRST)
     # without a posture that is turned as asked, what is told is how far away the place is
-    missing = lacks.way if lacks.askew <= TURNED else lacks.place
+    missing = way if askew <= TURNED else place
+    beyond = float(batch.beyond[i])
     if beyond > 0.0 and missing <= beyond + PLACED:
         missing = beyond
-    return missing, lacks.turn if lacks.place <= PLACED else None
+    return missing, turn if place <= PLACED else None
+
+
+def _nearest(
+    limb: LimbBatch, starts: Sequence[Array], place: float, turn: float
+) -> tuple[float, float]:
+    """Return a hand's distance [m] and angle [rad] where their weighted sum of squares is least."""
+    (pose,), (reach,) = limb.poses.values(), limb.reach.tolist()
+
+    def weighed(angles: Array) -> Array:
+        way, turned = limb.errors(angles[None, None])[0].reshape(2, 3)
+        return np.concatenate([place * reach * _axes(pose, turned) @ way, turn * turned])
+
+    def slope(angles: Array) -> Array:
+        errors, jacobians = limb.errors(angles[None, None])
+        turned, (linear, angular) = errors[0, 0, 3:], np.split(jacobians[0, 0], 2)
+        # Jₗ⁻¹(r), which is Jᵣ⁻¹(r)ᵀ, is how a rotation vector r changes with a rotation before it
+        turning = pin.Jlog3(pin.exp3(turned)).T
+        return -np.vstack([place * reach * _axes(pose, turned) @ linear, turn * turning @ angular])
+
+    low, high = limb.lower[0], limb.upper[0]
+    ends = [
+        least_squares(weighed, np.clip(start, low, high), slope, bounds=(low, high), max_nfev=STEPS)
+        for start in starts
+    ]
+    way, turned = weighed(min(ends, key=lambda end: float(end.cost)).x).reshape(2, 3)
+    return float(np.linalg.norm(way)) / place, float(np.linalg.norm(turned)) / turn
+
+
+def _axes(pose: Pose, turned: Array) -> Array:
+    """Return a hand's axes in B, shape (3, 3), that lack a turn (3,) in H to those of a pose."""
+    return np.asarray(pose.rotation @ pin.exp3(-turned))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
@@ -11,24 +11,29 @@ import pinocchio as pin
 from hand_models.base import Array, Indices, Pose
 from planner.robots.robot import Robot
 
-__all__ = ["Efforts", "LimbBatch"]
+__all__ = ["LimbBatch"]
 
 ROUNDING: Final = 1e-9
 """Part of its reach that a stretched limb's end may be beyond it by rounding."""
 
 
 class LimbBatch:
-    """L limbs of up to m joints, and the poses that their hands are to have.
+    """L limbs of up to m joints, the poses that their hands are to have, and what these carry.
 
     Angles are (L, m) [rad]. A hand's error is the twist in H that is missing, its Jacobian that of
-    the hand, both with lengths over the limb's reach. Limbs of fewer joints have columns of zeros
-    at the end.
+    the hand, both with lengths over the limb's reach. An effort is a joint's torque over its limit,
+    at rest. Limbs of fewer joints have columns of zeros at the end.
 
     Parameters
     ----------
     robot : Robot
     poses : mapping of str to Pose
         H in B, by limb.
+    loads : mapping of str to ndarray, shape (6,)
+        Wrench that a limb's hand exerts on the rock, in H [N, N·m]; none if it is left out. It
+        turns with the hand.
+    gravity : ndarray, shape (3,)
+        In B [m/s²].
 
     Attributes
     ----------
@@ -43,50 +48,50 @@ class LimbBatch:
         How far each pose is out of reach of the limb, stretched out [m]; zero if it is not.
     """
 
-    def __init__(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
-        model = robot.model
-        self.robot = robot
-        self.poses = dict(poses)
+    def __init__(
+        self, robot: Robot, poses: Mapping[str, Pose], loads: Mapping[str, Array], gravity: Array
+    ) -> None:
+        self.robot, self.poses, self.loads, self.gravity = robot, poses, loads, gravity
         self.limbs = tuple(poses)
-        self.joints = [len(model.joint_names[limb]) for limb in poses]
+        self._chains = [robot.chains[limb] for limb in poses]
+        self.joints = [len(chain.joints) for chain in self._chains]
         self.shape = len(poses), max(self.joints)
         self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
-        for i, (limb, n) in enumerate(zip(poses, self.joints, strict=True)):
-            self.lower[i, :n] = model.lower[limb]
-            self.upper[i, :n] = model.upper[limb]
-        self.reach = np.array([robot.reaches[limb] for limb in poses])
-        beyond = np.array([robot.beyond(limb, pose) for limb, pose in poses.items()])
+        self._limits = np.ones(self.shape)
+        for i, (chain, n) in enumerate(zip(self._chains, self.joints, strict=True)):
+            self.lower[i, :n] = chain.lower
+            self.upper[i, :n] = chain.upper
+            self._limits[i, :n] = chain.torque_limits
+        self.reach = np.array([chain.reach for chain in self._chains])
+        stretches = robot.stretches(Pose.identity(), self.limbs, list(poses.values()))
+        beyond = (np.array(stretches) - 1.0) * self.reach
         self.beyond = np.where(beyond > ROUNDING * self.reach, beyond, 0.0)
-        self._there = np.arange(self.shape[1]) < np.array(self.joints)[:, None]
-        self._places: Indices = np.concatenate([model.places[limb] for limb in poses])
-        self._continuous = np.concatenate([model.continuous[limb] for limb in poses])
-        self._turns = bool(self._continuous.any())
-        self._neutral = model.configuration({})
-        root = model.built.body
-        targets = [root @ pose for pose in poses.values()]
+        self._neutral = robot.configuration({})
+        targets = [robot.root @ pose for pose in poses.values()]
         self._targets = [pin.SE3(target.rotation, target.position) for target in targets]
-        self._frames = [model.built.frames[limb] for limb in poses]
-        self._columns = [model.columns[limb] for limb in poses]
-
-    def by_limb(self, angles: Array) -> dict[str, Array]:
-        """Return the limbs' angles by name."""
-        return {limb: angles[i, : self.joints[i]] for i, limb in enumerate(self.limbs)}
+        self._acceleration = robot.root_acceleration(gravity)
+        self._still = np.zeros_like(self._acceleration)
+        self._forces = pin.StdVec_Force()
+        for _ in range(robot.model.njoints):
+            self._forces.append(pin.Force.Zero())
+        for limb, load in loads.items():
+            chain = robot.chains[limb]
+            place = robot.model.frames[chain.frame].placement
+            self._forces[chain.ids[-1]] = place.act(pin.Force(-load))
 
     def part(self, chosen: Indices) -> LimbBatch:
         """Return the batch of some of the limbs."""
         if len(chosen) == len(self.limbs):
             return self
         names = [self.limbs[i] for i in chosen]
-        return LimbBatch(self.robot, {limb: self.poses[limb] for limb in names})
+        poses = {limb: self.poses[limb] for limb in names}
+        return LimbBatch(self.robot, poses, self.loads, self.gravity)
 
-    def configuration(self, angles: Array) -> Array:
+    def _configuration(self, angles: Array) -> Array:
         """Return Pinocchio's configuration of angles (L, m)."""
         q = self._neutral.copy()
-        values = angles[self._there]
-        q[self._places] = values
-        if self._turns:
-            turning, values = self._places[self._continuous], values[self._continuous]
-            q[turning], q[turning + 1] = np.cos(values), np.sin(values)
+        for chain, n, values in zip(self._chains, self.joints, angles, strict=True):
+            chain.turn(q, values[:n])
         return q
 
     def errors(self, angles: Array) -> tuple[Array, Array]:
@@ -102,80 +107,42 @@ class LimbBatch:
         errors : ndarray, shape (S, L, 6)
         jacobians : ndarray, shape (S, L, 6, m)
         """
-        model, data = self.robot.model.built.model, self.robot.model.data
+        model, data = self.robot.model, self.robot.data
         errors = np.empty((*angles.shape[:2], 6))
         jacobians = np.zeros((*angles.shape[:2], 6, angles.shape[2]))
-        hands = list(zip(self._frames, self._targets, self._columns, self.joints, strict=True))
+        hands = list(zip(self._chains, self._targets, self.joints, strict=True))
         for posture, missing, motions in zip(angles, errors, jacobians, strict=True):
-            pin.computeJointJacobians(model, data, self.configuration(posture))
-            for i, (frame, target, columns, n) in enumerate(hands):
-                off = pin.updateFramePlacement(model, data, frame).actInv(target)
+            pin.computeJointJacobians(model, data, self._configuration(posture))
+            for i, (chain, target, n) in enumerate(hands):
+                off = pin.updateFramePlacement(model, data, chain.frame).actInv(target)
                 missing[i, :3] = off.translation
                 missing[i, 3:] = pin.log3(off.rotation)
-                jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL)
-                motions[i, :, :n] = jacobian[:, columns]
+                jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
+                motions[i, :, :n] = jacobian[:, chain.columns]
         errors[..., :3] /= self.reach[:, None]
         jacobians[..., :3, :] /= self.reach[:, None, None]
         return errors, jacobians
 
-
-class Efforts:
-    """Torques of the limbs of a batch over their joints' limits, at rest.
-
-    Parameters
-    ----------
-    batch : LimbBatch
-    loads : mapping of str to ndarray, shape (6,)
-        Wrench that a limb's hand exerts on the rock, in H [N, N·m]; none if it is left out. It
-        turns with the hand.
-    gravity : ndarray, shape (3,)
-        In B [m/s²].
-
-    Raises
-    ------
-    InvalidInputError
-        If a load or gravity is not of its shape or not finite.
-    """
-
-    def __init__(self, batch: LimbBatch, loads: Mapping[str, Array], gravity: Array) -> None:
-        model = batch.robot.model
-        self._batch = batch
-        self._forces: Any = model.forces(loads)
-        self._acceleration = model.root_acceleration(gravity)
-        self._still = np.zeros_like(self._acceleration)
-        self._columns = [model.columns[limb] for limb in batch.limbs]
-        self._limits = np.ones(batch.shape)
-        for i, limb in enumerate(batch.limbs):
-            self._limits[i, : batch.joints[i]] = batch.robot.torque_limits[limb]
-
-    def __call__(self, angles: Array) -> tuple[Array, Array]:
+    def efforts(self, angles: Array) -> tuple[Array, Array]:
         """Return the efforts of angles (S, L, m), of that shape, and their slopes.
 
         The slopes are of shape (S, L, m, m) [1/rad].
         """
-        model, data = self._batch.robot.model.built.model, self._batch.robot.model.data
+        model, data = self.robot.model, self.robot.data
         efforts = np.zeros(angles.shape)
         slopes = np.zeros((*angles.shape, angles.shape[-1]))
         for posture, effort, slope in zip(angles, efforts, slopes, strict=True):
-            q = self._batch.configuration(posture)
+            q = self._configuration(posture)
             pin.computeRNEADerivatives(
                 model, data, q, self._still, self._acceleration, self._forces
             )
             torques, changes = data.tau, data.dtau_dq
-            for i, columns in enumerate(self._columns):
-                n = self._batch.joints[i]
-                effort[i, :n] = torques[columns]
-                slope[i, :n, :n] = changes[columns, columns]
+            for i, (chain, n) in enumerate(zip(self._chains, self.joints, strict=True)):
+                effort[i, :n] = torques[chain.columns]
+                slope[i, :n, :n] = changes[chain.columns, chain.columns]
         return efforts / self._limits, slopes / self._limits[:, :, None]
 
     def cost(self, angles: Array) -> Array:
         """Return Σ (τ / τ_max)² of angles (S, L, m), shape (S, L)."""
-        model, data = self._batch.robot.model.built.model, self._batch.robot.model.data
-        efforts = np.zeros(angles.shape)
-        for posture, effort in zip(angles, efforts, strict=True):
-            q = self._batch.configuration(posture)
-            torques = pin.rnea(model, data, q, self._still, self._acceleration, self._forces)
-            for i, columns in enumerate(self._columns):
-                effort[i, : self._batch.joints[i]] = torques[columns]
-        efforts /= self._limits
+        efforts, _ = self.efforts(angles)
         return np.asarray((efforts * efforts).sum(axis=-1))

@@ -8,17 +8,16 @@ from another of many postures whose hands are near the pose.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hand_models.base import Array, Indices, Pose, finite_vector
+from hand_models.base import Array, Pose
 from planner import deadline
-from planner.robots.kinematics import RobotModel
-from planner.robots.limb_batch import Efforts, LimbBatch
+from planner.robots.limb_batch import LimbBatch
+from planner.robots.robot import Robot
 
 __all__ = ["TOLERANCE", "damped_step", "find_angles", "starts_near"]
 
@@ -58,90 +57,50 @@ TURN_WEIGHT: Final = 0.35
 """What a hand's axes count for, in reaches, when postures near a pose are looked up."""
 
 
-def find_angles(
-    batch: LimbBatch, seeds: Mapping[str, Array], efforts: Efforts | None = None
-) -> Array:
+def find_angles(batch: LimbBatch) -> Array:
     """Return angles within the limits, shape (L, m), that solve the poses or come nearest to it.
 
-    Parameters
-    ----------
-    batch : LimbBatch
-    seeds : mapping of str to ndarray, shape (n,)
-        Where to start first, if it is said; where that leads to a solution, it is taken.
-    efforts : Efforts, optional
-        With them, the one of the least torques is taken where several solutions turn up.
+    The one of the least torques is taken where several solutions turn up.
 
     Raises
     ------
-    InvalidInputError
-        If a seed is not as many finite numbers as its limb has joints.
     DeadlineError
         If the time is over before.
     """
     best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
-    seeded = np.flatnonzero([limb in seeds for limb in batch.limbs])
-    if len(seeded):
-        first = np.zeros((1, *batch.shape))
-        for i in seeded:
-            own = finite_vector(seeds[batch.limbs[i]], batch.joints[i], f"seeds.{batch.limbs[i]}")
-            first[0, i, : batch.joints[i]] = own
-        first = np.clip(first, batch.lower, batch.upper)
-        best[seeded], least[seeded] = _follow(batch, seeded, first[:, seeded], efforts)
     for k in range(ROUNDS):
         # what is beyond the stretched limb is tried once, for the angles that come nearest
         left = np.flatnonzero((least > TOLERANCE) & ((batch.beyond <= 0.0) | np.isinf(least)))
         if not len(left):
             break
         starts = np.stack([starts_near(batch, int(i), k) for i in left], axis=1)
-        angles, size = _follow(batch, left, starts, efforts)
+        part = batch.part(left)
+        angles, size = _follow(part, starts[:, :, : part.shape[1]])
         better = size < least[left]
-        best[left[better]], least[left[better]] = angles[better], size[better]
+        best[left[better], : part.shape[1]], least[left[better]] = angles[better], size[better]
     return best
 
 
-def _follow(
-    batch: LimbBatch, chosen: Indices, angles: Array, efforts: Efforts | None
-) -> tuple[Array, Array]:
-    """Return where starts lead, the best for each limb, and the size of its error.
-
-    Parameters
-    ----------
-    batch : LimbBatch
-    chosen : ndarray, shape (C,)
-        Limbs that are moved.
-    angles : ndarray, shape (S, C, m)
-        Their starts.
-    efforts : Efforts, optional
-        Of the whole batch.
-    """
-    part = batch.part(chosen)
-    angles = angles[:, :, : part.shape[1]]
-    enough = min(len(angles), 1 if efforts is None else CHOICE)
+def _follow(batch: LimbBatch, angles: Array) -> tuple[Array, Array]:
+    """Return where starts (S, L, m) lead, the best for each limb, and the size of its error."""
     size = np.full(angles.shape[:2], np.inf)
     slow = np.zeros(angles.shape[:2], dtype=bool)
     for k in range(STEPS + MORE_STEPS):
         deadline.check("the joint angles were found")
-        errors, jacobians = part.errors(angles)
+        errors, jacobians = batch.errors(angles)
         last, size = size, np.abs(errors).max(axis=2)
         done = size <= TOLERANCE
         if k >= STEPS:
             slow |= size > 0.5 * last
-        over = done | slow | (done.sum(axis=0) >= enough)
+        over = done | slow | (done.sum(axis=0) >= CHOICE)
         if over.all():
             break
-        angles = np.where(over[:, :, None], angles, damped_step(part, angles, errors, jacobians))
-    size = np.abs(part.errors(angles)[0]).max(axis=2)
-    rank = size
-    if efforts is not None and len(angles) > 1:
-        whole = np.zeros((len(angles), *batch.shape))
-        whole[:, chosen, : part.shape[1]] = angles
-        cost = efforts.cost(whole)[:, chosen]
-        # solutions by torque, then all others by error
-        rank = np.where(size <= TOLERANCE, -1.0 / (1.0 + cost), size)
-    pick = rank.argmin(axis=0), np.arange(len(chosen))
-    found = np.zeros((len(chosen), batch.shape[1]))
-    found[:, : part.shape[1]] = angles[pick]
-    return found, size[pick]
+        angles = np.where(over[:, :, None], angles, damped_step(batch, angles, errors, jacobians))
+    size = np.abs(batch.errors(angles)[0]).max(axis=2)
+    # solutions by torque, then all others by error
+    rank = np.where(size <= TOLERANCE, -1.0 / (1.0 + batch.cost(angles)), size)
+    pick = rank.argmin(axis=0), np.arange(len(batch.limbs))
+    return angles[pick], size[pick]
 
 
 def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array) -> Array:
@@ -168,32 +127,32 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
 
 def starts_near(batch: LimbBatch, i: int, k: int) -> Array:
     """Return a limb's angles to start from in round k, shape (S, m), the most promising first."""
-    limb, model = batch.limbs[i], batch.robot.model
-    samples, tree = _postures(model)[limb]
-    _, nearest = tree.query(_place(batch.poses[limb], model.reach[limb]), ABREAST * (k + 1))
+    limb = batch.limbs[i]
+    samples, tree = _postures(batch.robot)[limb]
+    _, nearest = tree.query(_place(batch.poses[limb], batch.reach[i]), ABREAST * (k + 1))
     starts = np.zeros((ABREAST, batch.shape[1]))
     starts[:, : batch.joints[i]] = samples[nearest[-ABREAST:]]
     return starts
 
 
 @lru_cache(maxsize=32)
-def _postures(model: RobotModel) -> dict[str, tuple[Array, Any]]:
+def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
     """Return random angles of every limb, and a tree of where they put its hand."""
     rng = np.random.default_rng(0)
     samples = {
         limb: rng.uniform(
-            np.maximum(model.lower[limb], -np.pi),
-            np.minimum(model.upper[limb], np.pi),
-            (SAMPLES, len(model.joint_names[limb])),
+            np.maximum(chain.lower, -np.pi),
+            np.minimum(chain.upper, np.pi),
+            (SAMPLES, len(chain.joints)),
         )
-        for limb in model.limbs
+        for limb, chain in robot.chains.items()
     }
-    places = {limb: np.empty((SAMPLES, 9)) for limb in model.limbs}
+    places = {limb: np.empty((SAMPLES, 9)) for limb in robot.limbs}
     for k in range(SAMPLES):
-        poses = model.hand_poses({limb: angles[k] for limb, angles in samples.items()})
+        poses = robot.hand_poses({limb: angles[k] for limb, angles in samples.items()})
         for limb, pose in poses.items():
-            places[limb][k] = _place(pose, model.reach[limb])
-    return {limb: (samples[limb], cKDTree(places[limb])) for limb in model.limbs}
+            places[limb][k] = _place(pose, robot.chains[limb].reach)
+    return {limb: (samples[limb], cKDTree(places[limb])) for limb in robot.limbs}
 
 
 def _place(pose: Pose, reach: float) -> Array:

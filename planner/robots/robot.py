@@ -1,100 +1,224 @@
-"""Robots: RoboSimian, which is bundled, and those that a file describes."""
+"""Robots, RoboSimian, which is bundled, and those that a file describes: kinematics and statics.
+
+By joint angles, in the body frame B, with Pinocchio. Rates of joints, twists and wrenches have the
+project's signs: a hand's Jacobian turns joint rates into the twist of H in H's axes, and a joint's
+torque is its gravity torque + Jᵀ·(hand wrench on the rock).
+"""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, lru_cache
 from importlib import resources
-from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, Pose, finite_vector, wrench_transport
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
-from planner.robots.kinematics import RobotModel
+from planner.robots.build import build_model, pose_of
 from planner.robots.robot_file import RobotDescription, RobotFile
 
-__all__ = ["Robot", "RobotFile", "load_robot", "robosimian", "robot_of"]
+__all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
-    """A climbing robot.
+class Statics(NamedTuple):
+    """What holds a robot up whose joints stand still.
 
     Attributes
     ----------
+    body_wrench : ndarray, shape (6,)
+        That the rock must exert on the robot, in B about B's origin [N, N·m].
+    joint_torque : dict of str to ndarray, shape (n,)
+        By limb: torque of its joints while its hand carries nothing [N·m].
+    """
+
+    body_wrench: Array
+    joint_torque: dict[str, Array]
+
+
+class Robot:
+    """A climbing robot: a body and its limbs, each a chain of turning joints that ends in a hand.
+
+    Angles are always a mapping of limb to an array (n,) [rad], from the body outward; limbs that
+    are left out are at zero. Joints of the URDF that no limb has are locked at zero. A hand counts
+    as a point mass. Threads may share a robot.
+
+    Parameters
+    ----------
+    description : RobotDescription
+    urdf : str
+        Text of the robot's URDF, without hands.
+    hand : SpinyHand
+        The hand on every limb.
+
+    Attributes
+    ----------
+    description, urdf, hand
+        As given.
     name : str
         As in the service's keys.
     mass : float
         With its hands [kg].
     com : ndarray, shape (3,)
         Centre of mass in B while no joint angles are given [m].
-    shoulders : mapping of str to ndarray, shape (3,)
-        By limb: where it begins, which none of its joints moves, in B [m].
-    reaches : mapping of str to float
-        By limb: farthest that the link with the hand can be from the shoulder [m].
-    hand_in_link : mapping of str to Pose
-        By limb: H in the link that carries it.
-    hand : SpinyHand
-        The hand on every limb.
-    model : RobotModel
-        Kinematics and statics by joint angles.
-    torque_limits : mapping of str to ndarray, shape (n,)
-        By limb: what its joints bear, from the body outward [N·m].
+    limbs : tuple of str
+        In the order of the robot's file.
+    chains : dict of str to Chain
+        By limb.
+    reach : float
+        The longest limb's [m].
+    model
+        Pinocchio's; the body floats, with its root link at the origin.
+    root : Pose
+        B in the root link.
+
+    Raises
+    ------
+    InvalidInputError
+        If the URDF is none, a link is not in it, or a limb is no chain of turning joints of its
+        own.
     """
 
-    name: str
-    mass: float
-    com: Array
-    shoulders: Mapping[str, Array]
-    reaches: Mapping[str, float]
-    hand_in_link: Mapping[str, Pose]
-    hand: SpinyHand
-    model: RobotModel
-    torque_limits: Mapping[str, Array]
+    def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
+        self.description, self.urdf, self.hand = description, urdf, hand
+        self.model, self.root, self.chains = build_model(urdf, description, hand.mass)
+        self._local = threading.local()
+        self._from_root = self.root.inverse()
+        self._to_body = wrench_transport(self._from_root)
+        self.name = description.name
+        self.limbs = tuple(self.chains)
+        self.reach = max(chain.reach for chain in self.chains.values())
+        self.mass = float(pin.computeTotalMass(self.model))
+        self.com = self.com_at({}) if description.com is None else np.array(description.com)
+        # of each limb: its link's origin in H, its shoulder in B, its reach
+        self._ends = {
+            limb: np.array(
+                [*chain.hand_in_link.inverse().position, *chain.shoulder, chain.reach]
+            ).tolist()
+            for limb, chain in self.chains.items()
+        }
 
-    @property
-    def limbs(self) -> tuple[str, ...]:
-        """Names of the limbs, in the order of the robot's file."""
-        return tuple(self.shoulders)
-
-    @property
-    def reach(self) -> float:
-        """The longest limb's reach [m]."""
-        return max(self.reaches.values())
-
-    def beyond(self, limb: str, hand_in_body: Pose) -> float:
-        """Return how far a hand's pose puts its link from the shoulder [m], less the limb's reach.
-
-        Above zero the pose is out of reach, and this is the distance that is missing.
-        """
-        return (self.stretch(limb, hand_in_body) - 1.0) * self.reaches[limb]
-
-    def stretch(self, limb: str, hand_in_body: Pose) -> float:
-        """Return how much of a limb's reach a hand's pose asks for; above 1 is out of reach."""
-        return self.stretches(Pose.identity(), (limb,), (hand_in_body,))[0]
+    def __reduce__(self) -> tuple[type[Robot], tuple[Any, ...]]:
+        # Pinocchio's model and the thread's data stay behind: the other process builds its own
+        return Robot, (self.description, self.urdf, self.hand)
 
     def stretches(self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]) -> list[float]:
-        """Return how much of their limbs' reaches hands ask for, with their poses and B's in W."""
+        """Return how much of their limbs' reaches hands ask for, with their poses and B's in W.
+
+        Above 1 is out of reach.
+        """
         ends = np.array([self._ends[limb] for limb in limbs])
         links = np.einsum("nxy,ny->nx", np.array([hand.rotation for hand in hands]), ends[:, :3])
         links += np.array([hand.position for hand in hands]) - body.position
         away = links @ body.rotation - ends[:, 3:6]
         return (np.sqrt(np.einsum("nx,nx->n", away, away)) / ends[:, 6]).tolist()  # type: ignore[no-any-return]
 
-    @cached_property
-    def _ends(self) -> dict[str, tuple[float, ...]]:
-        """By limb: its link's origin in H, its shoulder in B, its reach [m]."""
-        return {
-            limb: (
-                *self.hand_in_link[limb].inverse().position.tolist(),
-                *shoulder.tolist(),
-                self.reaches[limb],
+    @property
+    def data(self) -> Any:
+        """Pinocchio's working memory of this thread."""
+        try:
+            return self._local.data
+        except AttributeError:
+            self._local.data = self.model.createData()
+            return self._local.data
+
+    def configuration(self, angles: Mapping[str, Array]) -> Array:
+        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin.
+
+        Raises
+        ------
+        InvalidInputError
+            If a limb is unknown, or its angles are not as many finite numbers as it has joints.
+        """
+        q = np.array(pin.neutral(self.model))
+        for limb, given in angles.items():
+            self.known(limb, "joints")
+            chain = self.chains[limb]
+            chain.turn(q, finite_vector(given, len(chain.joints), f"joints.{limb}"))
+        return q
+
+    def known(self, limb: str, field: str) -> None:
+        """Refuse a limb that the robot does not have."""
+        if limb not in self.chains:
+            raise InvalidInputError(
+                f"unknown limb {limb!r}; known are {', '.join(self.limbs)}", field=field
             )
-            for limb, shoulder in self.shoulders.items()
-        }
+
+    def hand_poses(self, angles: Mapping[str, Array]) -> dict[str, Pose]:
+        """Return every limb's H in B."""
+        return {limb: pose for limb, (pose, _) in self.kinematics(angles).items()}
+
+    def jacobians(self, angles: Mapping[str, Array]) -> dict[str, Array]:
+        """Return every limb's Jacobian, shape (6, n) [m/rad, 1].
+
+        It turns the joints' rates into the twist of H against B in H's axes, linear part first.
+        """
+        return {limb: jacobian for limb, (_, jacobian) in self.kinematics(angles).items()}
+
+    def kinematics(self, angles: Mapping[str, Array]) -> dict[str, tuple[Pose, Array]]:
+        """Return H in B and the Jacobian of each limb, from one pass."""
+        model, data = self.model, self.data
+        pin.computeJointJacobians(model, data, self.configuration(angles))
+        found: dict[str, tuple[Pose, Array]] = {}
+        for limb, chain in self.chains.items():
+            pose = self._from_root @ pose_of(pin.updateFramePlacement(model, data, chain.frame))
+            jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
+            found[limb] = pose, np.ascontiguousarray(jacobian[:, chain.columns])
+        return found
+
+    def statics(
+        self,
+        angles: Mapping[str, Array],
+        gravity: Array,
+        acceleration: Array | None = None,
+    ) -> Statics:
+        """Return what holds the robot up, at rest or while it accelerates as one rigid body.
+
+        Parameters
+        ----------
+        angles : mapping of str to ndarray
+        gravity : ndarray, shape (3,)
+            In B [m/s²].
+        acceleration : ndarray, shape (6,), optional
+            Of B in B, linear part first [m/s², rad/s²]; none by default. Velocities are zero.
+        """
+        model, data = self.model, self.data
+        rates = self.root_acceleration(gravity, acceleration)
+        torque = pin.rnea(model, data, self.configuration(angles), np.zeros(model.nv), rates)
+        return Statics(
+            self._to_body @ torque[:6],
+            {limb: np.array(torque[chain.columns]) for limb, chain in self.chains.items()},
+        )
+
+    def root_acceleration(self, gravity: Array, acceleration: Array | None = None) -> Array:
+        """Return Pinocchio's accelerations, shape (nv,), of a body that moves as in `statics`.
+
+        Gravity is an acceleration of the root link the other way.
+        """
+        spatial = (
+            np.zeros(6) if acceleration is None else finite_vector(acceleration, 6, "acceleration")
+        )
+        spatial = spatial - np.concatenate([finite_vector(gravity, 3, "gravity"), np.zeros(3)])
+        rates = np.zeros(self.model.nv)
+        rates[:6] = self._to_body.T @ spatial
+        return rates
+
+    def com_at(self, angles: Mapping[str, Array]) -> Array:
+        """Return the centre of mass of the robot with its hands in B, shape (3,) [m]."""
+        centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))
+        return self._from_root.apply(np.array(centre))
+
+    def link_chain(self, angles: Mapping[str, Array], limb: str) -> Array:
+        """Return the places in B of a limb's joints and of its H, shape (n + 1, 3) [m]."""
+        data, chain = self.data, self.chains[limb]
+        pin.framesForwardKinematics(self.model, data, self.configuration(angles))
+        places = [data.oMi[i].translation for i in chain.ids]
+        places.append(data.oMf[chain.frame].translation)
+        return self._from_root.apply(np.array(places))
 
 
 def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
@@ -111,11 +235,6 @@ def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
         If a number of the hand is missing or impossible.
     """
     return robot_of(_bundled(), hand_numbers)
-
-
-def load_robot(path: Path, hand_numbers: ParameterTable | None = None) -> Robot:
-    """Return the robot that a file describes; raises what `RobotFile.load` and `robot_of` raise."""
-    return robot_of(RobotFile.load(path), hand_numbers)
 
 
 @lru_cache(maxsize=32)
@@ -136,36 +255,9 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
     """
     hand = spiny_hand(hand_numbers)
     try:
-        described = RobotDescription.read(file.toml)
-        model = RobotModel(file.urdf, described.body, described.mounts, hand.mass)
-        torque_limits = {
-            limb: _per_joint(described.torque_limits[limb], model, limb) for limb in model.limbs
-        }
+        return Robot(RobotDescription.read(file.toml), file.urdf, hand)
     except InvalidInputError as error:
         raise InvalidInputError(str(error), field=file.origin) from None
-    return Robot(
-        name=described.name,
-        mass=model.mass,
-        com=model.com({}) if described.com is None else np.array(described.com),
-        shoulders=model.shoulders,
-        reaches=model.reach,
-        hand_in_link={limb: mount.pose for limb, mount in described.mounts.items()},
-        hand=hand,
-        model=model,
-        torque_limits=torque_limits,
-    )
-
-
-def _per_joint(limits: tuple[float, ...], model: RobotModel, limb: str) -> Array:
-    """Return torque limits, one a joint; refuse a list of another length."""
-    joints = len(model.joint_names[limb])
-    if len(limits) not in (1, joints):
-        raise InvalidInputError(
-            f"one number is needed, or {joints}, one for each joint from the body outward, "
-            f"got {len(limits)}",
-            field=f"limbs.{limb}.torque_limit",
-        )
-    return np.broadcast_to(np.array(limits), joints).copy()
 
 
 @cache

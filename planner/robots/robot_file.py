@@ -17,9 +17,8 @@ from typing import Any, Final
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
-from planner.robots.build import Mount
 
-__all__ = ["RobotDescription", "RobotFile"]
+__all__ = ["Mount", "RobotDescription", "RobotFile"]
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 """What a robot and a limb may be called: their names are part of keys."""
@@ -77,13 +76,41 @@ class RobotFile:
         """
         toml = _text(path, str(path), "TOML")
         try:
-            texts = _texts(_parsed(toml))
-            urdf = _text(path.parent / texts["urdf"], "urdf", "a URDF")
+            described = RobotDescription.read(toml)
+            urdf = _text(path.parent / described.urdf, "urdf", "a URDF")
         except InvalidInputError as error:
-            if error.field == str(path):
-                raise
             raise InvalidInputError(str(error), field=str(path)) from None
-        return cls(texts["name"], toml, urdf, str(path))
+        return cls(described.name, toml, urdf, str(path))
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Where a hand sits, and what the joints of its limb bear.
+
+    Attributes
+    ----------
+    link : str
+        The link that carries it.
+    position : tuple of float
+        Origin of H in the link [m].
+    orientation : tuple of float
+        Quaternion ``[x, y, z, w]`` of H in the link.
+    hand_com : tuple of float
+        The hand's centre of mass in H [m].
+    torque_limits : tuple of float
+        One number for all joints of the limb, or one each [N·m].
+    """
+
+    link: str
+    position: tuple[float, ...]
+    orientation: tuple[float, ...]
+    hand_com: tuple[float, ...]
+    torque_limits: tuple[float, ...]
+
+    @property
+    def pose(self) -> Pose:
+        """H in the link."""
+        return Pose.from_quaternion(self.position, self.orientation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,21 +120,21 @@ class RobotDescription:
     Attributes
     ----------
     name : str
+    urdf : str
+        Path of the URDF, from the file's folder.
     body : str
         The link whose frame is B.
     com : tuple of float, optional
         Centre of mass in B [m] while no joint angles are given.
     mounts : mapping of str to Mount
         By limb.
-    torque_limits : mapping of str to tuple of float
-        By limb: one number for all its joints, or one each [N·m].
     """
 
     name: str
+    urdf: str
     body: str
     com: tuple[float, ...] | None
     mounts: Mapping[str, Mount]
-    torque_limits: Mapping[str, tuple[float, ...]]
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
@@ -118,8 +145,12 @@ class RobotDescription:
         InvalidInputError
             If an entry is unknown, missing or impossible; the field is its place in the file.
         """
-        raw = _parsed(toml)
-        texts = _texts(raw)
+        try:
+            raw = tomllib.loads(toml)
+        except tomllib.TOMLDecodeError as error:
+            raise InvalidInputError(str(error)) from None
+        texts = [_string(raw.get(name), name) for name in TEXTS]
+        _named(texts[0], "name")
         for name in raw:
             if name not in (*TEXTS, "robot", "every_limb", "limbs"):
                 raise InvalidInputError(
@@ -135,17 +166,14 @@ class RobotDescription:
                 field="limbs",
             )
         mounts: dict[str, Mount] = {}
-        torque_limits: dict[str, tuple[float, ...]] = {}
         for limb, entries in limbs.items():
             section = f"limbs.{limb}"
             _named(limb, "limbs")
             entries = dict(_mapping(entries, section))
             link = _string(entries.pop("link", None), f"{section}.link")
-            table = _table({**every, **entries}, section, LIMB_UNITS)
-            mounts[limb] = _mount(link, table, section)
-            torque_limits[limb] = _torque_limit(table, section)
+            mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(texts["name"], texts["body"], com, mounts, torque_limits)
+        return cls(*texts, com, mounts)
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -158,19 +186,6 @@ def _text(path: Path, field: str, what: str) -> str:
         ) from None
     except (UnicodeDecodeError, ValueError):
         raise InvalidInputError(f"must be {what} in UTF-8", field=field) from None
-
-
-def _parsed(toml: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(toml)
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInputError(str(error)) from None
-
-
-def _texts(raw: Mapping[str, Any]) -> dict[str, str]:
-    texts = {name: _string(raw.get(name), name) for name in TEXTS}
-    _named(texts["name"], "name")
-    return texts
 
 
 def _string(value: Any, field: str) -> str:
@@ -231,16 +246,9 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
         Pose.from_quaternion((0.0, 0.0, 0.0), orientation)
     except InvalidInputError as error:
         raise error.within(section) from None
-    given = table.sections[section]
-    return Mount(
-        link,
-        _triple(table, section, "position"),
-        orientation,
-        _triple(table, section, "hand_com") if "hand_com" in given else (0.0, 0.0, 0.0),
-    )
-
-
-def _torque_limit(table: ParameterTable, section: str) -> tuple[float, ...]:
+    position = _triple(table, section, "position")
+    given = "hand_com" in table.sections[section]
+    hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
     value = table.quantity(section, "torque_limit").value
     limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
     if not limits or not all(WEAKEST <= limit <= STRONGEST for limit in limits):
@@ -248,7 +256,7 @@ def _torque_limit(table: ParameterTable, section: str) -> tuple[float, ...]:
             f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
-    return limits
+    return Mount(link, position, orientation, hand_com, limits)
 
 
 def _quoted(values: tuple[float, ...]) -> str:

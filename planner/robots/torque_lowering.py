@@ -6,13 +6,13 @@ moving its hand, with each step's error of the pose taken back in the next.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
 from planner import deadline
-from planner.robots.limb_batch import Efforts, LimbBatch
+from planner.robots.limb_batch import LimbBatch
 from planner.robots.pose_search import TOLERANCE, damped_step
 
 __all__ = ["lower_torques"]
@@ -45,7 +45,7 @@ POSE: Final = 6
 """Joints that a pose takes up."""
 
 
-def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
+def lower_torques(batch: LimbBatch, angles: Array) -> Array:
     """Return angles for the same poses, within the limits, with joint torques no higher.
 
     Parameters
@@ -53,8 +53,6 @@ def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
     batch : LimbBatch
     angles : ndarray, shape (L, m)
         Limbs whose poses they do not solve are left as they are.
-    efforts : Efforts
-        What is lowered.
 
     Returns
     -------
@@ -66,50 +64,51 @@ def lower_torques(batch: LimbBatch, angles: Array, efforts: Efforts) -> Array:
     DeadlineError
         If the time is over before.
     """
-    errors, jacobians = _one(batch.errors(angles[None]))
-    movable = np.abs(errors).max(axis=1) <= TOLERANCE
+    now = _measured(batch, angles.copy())
+    movable = np.abs(now.errors).max(axis=1) <= TOLERANCE
     movable &= np.array(batch.joints) > POSE
     if not movable.any():
         return angles
-    effort, slopes = _one(efforts(angles[None]))
-    first = cost = (effort * effort).sum(axis=1)
-    start, damping, going = angles, np.full(len(angles), DAMPING), movable
+    first, damping, going = now.cost.copy(), np.full(len(angles), DAMPING), movable
     for _ in range(STEPS):
         deadline.check("the joint angles were found")
-        back = damped_step(batch, angles, errors, jacobians) - angles
-        along = _along(_idle(jacobians), effort, slopes, damping)
+        back = damped_step(batch, now.angles, now.errors, now.jacobians) - now.angles
+        along = _along(_idle(now.jacobians), now.efforts, now.slopes, damping)
         along *= (LONGEST_STEP / np.maximum(np.abs(along).max(axis=1), LONGEST_STEP))[:, None]
-        along *= _room(batch, angles, along)[:, None]
-        tried = np.minimum(np.maximum(angles + along + back, batch.lower), batch.upper)
-        tried = np.where(going[:, None], tried, angles)
-        new_errors, new_jacobians = _one(batch.errors(tried[None]))
-        new_effort, new_slopes = _one(efforts(tried[None]))
-        new_cost = (new_effort * new_effort).sum(axis=1)
-        kept = going & (new_cost < cost) & (np.abs(new_errors).max(axis=1) <= ASTRAY)
-        angles = np.where(kept[:, None], tried, angles)
-        errors = np.where(kept[:, None], new_errors, errors)
-        jacobians = np.where(kept[:, None, None], new_jacobians, jacobians)
-        effort = np.where(kept[:, None], new_effort, effort)
-        slopes = np.where(kept[:, None, None], new_slopes, slopes)
-        cost = np.where(kept, new_cost, cost)
+        along *= _room(batch, now.angles, along)[:, None]
+        tried = np.minimum(np.maximum(now.angles + along + back, batch.lower), batch.upper)
+        new = _measured(batch, np.where(going[:, None], tried, now.angles))
+        kept = going & (new.cost < now.cost) & (np.abs(new.errors).max(axis=1) <= ASTRAY)
+        for before, after in zip(now, new, strict=True):
+            before[kept] = after[kept]
         damping = np.where(kept, damping / 10.0, damping * 10.0)
         going = going & (np.abs(along).max(axis=1) > LOWERED)
         if not going.any():
             break
     for _ in range(CORRECTIONS):
-        if np.abs(errors[movable]).max() <= TOLERANCE:
+        if np.abs(now.errors[movable]).max() <= TOLERANCE:
             break
-        moved = damped_step(batch, angles, errors, jacobians)
-        angles = np.where(movable[:, None], moved, angles)
-        errors, jacobians = _one(batch.errors(angles[None]))
-    good = movable & (np.abs(errors).max(axis=1) <= TOLERANCE)
-    good &= efforts.cost(angles[None])[0] <= first
-    return np.where(good[:, None], angles, start)
+        moved = damped_step(batch, now.angles, now.errors, now.jacobians)
+        now = _measured(batch, np.where(movable[:, None], moved, now.angles))
+    good = movable & (np.abs(now.errors).max(axis=1) <= TOLERANCE) & (now.cost <= first)
+    return np.where(good[:, None], now.angles, angles)
 
 
-def _one(pair: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return the values of the only posture."""
-    return pair[0][0], pair[1][0]
+class _Posture(NamedTuple):
+    """Angles of the limbs, with what `LimbBatch` says of them."""
+
+    angles: Array
+    errors: Array
+    jacobians: Array
+    efforts: Array
+    slopes: Array
+    cost: Array
+
+
+def _measured(batch: LimbBatch, angles: Array) -> _Posture:
+    (errors,), (jacobians,) = batch.errors(angles[None])
+    (efforts,), (slopes,) = batch.efforts(angles[None])
+    return _Posture(angles, errors, jacobians, efforts, slopes, (efforts * efforts).sum(axis=1))
 
 
 def _idle(jacobians: Array) -> Array:

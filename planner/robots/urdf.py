@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from textwrap import shorten
 from typing import Final
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from hand_models.base import InvalidInputError
+from hand_models.base import Array, InvalidInputError, Pose
 
-__all__ = ["JointElement", "Urdf", "parse_urdf"]
+__all__ = ["JointElement", "Link", "Urdf", "parse_urdf"]
 
 TURNING: Final = ("revolute", "continuous")
 """Types of joint that a limb may have."""
@@ -37,7 +39,28 @@ NEGATIVE: Final = 1e-9
 """How far below zero rounding may put a principal moment, over the largest."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link of a URDF.
+
+    Attributes
+    ----------
+    name : str
+    mass : float
+        [kg]
+    com : ndarray, shape (3,)
+        In the link [m].
+    inertia : ndarray, shape (3, 3)
+        About its centre of mass, in the link's axes [kg·m²].
+    """
+
+    name: str
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False)
 class JointElement:
     """A joint of a URDF.
 
@@ -45,6 +68,10 @@ class JointElement:
     ----------
     name, type, parent, child : str
         As the file has them.
+    place : Pose
+        In the parent, at zero.
+    axis : ndarray, shape (3,)
+        In its own frame, of unit length.
     lower, upper : float
         Limits [rad]; infinite for any but revolute joints.
     mimic : bool
@@ -55,27 +82,37 @@ class JointElement:
     type: str
     parent: str
     child: str
+    place: Pose
+    axis: Array
     lower: float
     upper: float
     mimic: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Urdf:
     """The tree of a URDF.
 
     Attributes
     ----------
-    links : tuple of str
+    links : mapping of str to Link
+        By name.
     joints : mapping of str to JointElement
         By child link.
-    mass : float
-        Of all links [kg].
     """
 
-    links: tuple[str, ...]
+    links: Mapping[str, Link]
     joints: Mapping[str, JointElement]
-    mass: float
+
+    def trail(self, link: str) -> list[str]:
+        """Return a link and those that it hangs on, up to the root; refuse a ring."""
+        trail = [link]
+        while trail[-1] in self.joints:
+            parent = self.joints[trail[-1]].parent
+            if parent in trail:
+                raise InvalidInputError(f"link {parent!r} hangs on itself; a robot must be a tree")
+            trail.append(parent)
+        return trail
 
     def chain(self, body: str, link: str) -> tuple[JointElement, ...]:
         """Return the joints that move between a link and the body, from the body outward.
@@ -87,29 +124,26 @@ class Urdf:
             neither turns nor is fixed, or follows another.
         """
         self.require(link)
-        chain: list[JointElement] = []
-        at = link
-        while at != body:
-            joint = self.joints.get(at)
-            if joint is None:
+        trail = self.trail(link)
+        if body not in trail:
+            raise InvalidInputError(
+                f"link {link!r} does not hang on the body {body!r}; every limb must be a chain "
+                "of joints from the body to its link"
+            )
+        joints = [self.joints[at] for at in trail[: trail.index(body)]]
+        chain = [joint for joint in reversed(joints) if joint.type != "fixed"]
+        for joint in reversed(chain):
+            if joint.type not in TURNING:
                 raise InvalidInputError(
-                    f"link {link!r} does not hang on the body {body!r}; every limb must be a chain "
-                    "of joints from the body to its link"
+                    f"joint {joint.name!r} between {body!r} and {link!r} is {joint.type}; "
+                    f"a limb's joints must be {' or '.join(TURNING)}, or fixed"
                 )
-            if joint.type != "fixed":
-                if joint.type not in TURNING:
-                    raise InvalidInputError(
-                        f"joint {joint.name!r} between {body!r} and {link!r} is {joint.type}; "
-                        f"a limb's joints must be {' or '.join(TURNING)}, or fixed"
-                    )
-                if joint.mimic:
-                    raise InvalidInputError(
-                        f"joint {joint.name!r} between {body!r} and {link!r} follows another "
-                        "(mimic); each joint of a limb must move by itself"
-                    )
-                chain.append(joint)
-            at = joint.parent
-        return tuple(reversed(chain))
+            if joint.mimic:
+                raise InvalidInputError(
+                    f"joint {joint.name!r} between {body!r} and {link!r} follows another "
+                    "(mimic); each joint of a limb must move by itself"
+                )
+        return tuple(chain)
 
     def require(self, link: str) -> None:
         """Refuse a link that is not there."""
@@ -118,6 +152,7 @@ class Urdf:
             raise InvalidInputError(f"unknown link {link!r}; known are {known}")
 
 
+@lru_cache(maxsize=32)
 def parse_urdf(text: str) -> Urdf:
     """Read the tree of a URDF, and check its numbers.
 
@@ -139,21 +174,22 @@ def parse_urdf(text: str) -> Urdf:
     _distinct("joint", [joint.name for joint in joints])
     by_child: dict[str, JointElement] = {}
     for joint in joints:
-        if joint.child in by_child:
+        other = by_child.setdefault(joint.child, joint)
+        if other is not joint:
             raise InvalidInputError(
-                f"link {joint.child!r} hangs on two joints, {by_child[joint.child].name!r} and "
-                f"{joint.name!r}; a robot must be a tree"
+                f"link {joint.child!r} hangs on two joints, {other.name!r} and {joint.name!r}; "
+                "a robot must be a tree"
             )
-        by_child[joint.child] = joint
     roots = [link for link in links if link not in by_child]
     if len(roots) != 1:
         raise InvalidInputError(
             f"one link must be the root of all others, got {len(roots)}: "
             f"{shorten(', '.join(roots) or 'a ring of joints', 200, placeholder=' …')}"
         )
-    _no_ring(by_child)
-    mass = math.fsum(_mass(element) for element in root.findall("link"))
-    return Urdf(tuple(links), by_child, mass)
+    tree = Urdf({}, by_child)
+    for child in by_child:
+        tree.trail(child)
+    return replace(tree, links={link.name: link for link in map(_link, root.findall("link"))})
 
 
 def _name(element: ElementTree.Element) -> str:
@@ -167,20 +203,6 @@ def _distinct(kind: str, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InvalidInputError(f"{kind} {name!r} appears twice")
-
-
-def _no_ring(joints: Mapping[str, JointElement]) -> None:
-    """Refuse links that hang on each other instead of on the root."""
-    safe: set[str] = set()
-    for link in joints:
-        trail: list[str] = []
-        at = link
-        while at in joints and at not in safe:
-            if at in trail:
-                raise InvalidInputError(f"link {at!r} hangs on itself; a robot must be a tree")
-            trail.append(at)
-            at = joints[at].parent
-        safe.update(trail)
 
 
 def _numbers(
@@ -203,13 +225,16 @@ def _numbers(
     return numbers
 
 
-def _origin(owner: str, element: ElementTree.Element) -> None:
+def _origin(owner: str, element: ElementTree.Element) -> Pose:
+    """Return where an element is; at its parent's origin where it does not say."""
     origin = element.find("origin")
-    if origin is not None:
-        if "xyz" in origin.attrib:
-            _numbers(owner, origin, "xyz", 3, LONGEST)
-        if "rpy" in origin.attrib:
-            _numbers(owner, origin, "rpy", 3, WIDEST)
+    if origin is None:
+        return Pose.identity()
+    position, angles = (
+        _numbers(owner, origin, name, 3, most) if name in origin.attrib else [0.0, 0.0, 0.0]
+        for name, most in (("xyz", LONGEST), ("rpy", WIDEST))
+    )
+    return Pose(np.array(position), Rotation.from_euler("xyz", angles).as_matrix())
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
@@ -225,12 +250,15 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
     kind = element.get("type", "")
     if kind not in TYPES:
         raise InvalidInputError(f"{owner}: type must be one of {', '.join(TYPES)}, got {kind!r}")
-    _origin(owner, element)
-    axis = element.find("axis")
-    if axis is not None and kind in (*TURNING, "prismatic", "planar"):
-        direction = _numbers(owner, axis, "xyz", 3, LONGEST)
-        if not np.linalg.norm(direction) > 0.0:
+    place = _origin(owner, element)
+    given = element.find("axis")
+    axis = np.array([1.0, 0.0, 0.0])
+    if given is not None and kind in (*TURNING, "prismatic", "planar"):
+        axis = np.array(_numbers(owner, given, "xyz", 3, LONGEST))
+        length = np.linalg.norm(axis)
+        if not length > 0.0:
             raise InvalidInputError(f"{owner}: its axis must not be zero")
+        axis = axis / length
     lower, upper = -math.inf, math.inf
     if kind in ("revolute", "prismatic"):
         limit = element.find("limit")
@@ -250,17 +278,26 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
                     f"{owner}: lower must be less than upper, got {lower:g} and {upper:g} rad"
                 )
     return JointElement(
-        name, kind, ends["parent"], ends["child"], lower, upper, element.find("mimic") is not None
+        name=name,
+        type=kind,
+        parent=ends["parent"],
+        child=ends["child"],
+        place=place,
+        axis=axis,
+        lower=lower,
+        upper=upper,
+        mimic=element.find("mimic") is not None,
     )
 
 
-def _mass(element: ElementTree.Element) -> float:
-    """Return the mass of a link; refuse an inertia that no body has."""
+def _link(element: ElementTree.Element) -> Link:
+    """Return a link; refuse an inertia that no body has."""
+    name = _name(element)
     inertial = element.find("inertial")
     if inertial is None:
-        return 0.0
-    owner = f"link {_name(element)!r}"
-    _origin(owner, inertial)
+        return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)))
+    owner = f"link {name!r}"
+    at = _origin(owner, inertial)
     weight, tensor = inertial.find("mass"), inertial.find("inertia")
     if weight is None or tensor is None:
         raise InvalidInputError(f"{owner}: <inertial> needs <mass> and <inertia>")
@@ -271,9 +308,10 @@ def _mass(element: ElementTree.Element) -> float:
         _numbers(owner, tensor, name, 1, LARGEST_INERTIA)[0]
         for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
-    principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    principal = np.linalg.eigvalsh(own)
     if principal[0] < -NEGATIVE * principal[-1]:
         raise InvalidInputError(
             f"{owner}: its inertia must have no negative principal moment, got {principal[0]:g}"
         )
-    return mass
+    return Link(name, mass, at.position, at.rotation @ own @ at.rotation.T)

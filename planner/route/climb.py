@@ -229,31 +229,26 @@ def evaluate(
         workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
     with Workers(partial(_planning, todo), min(workers, len(todo)) - 1) as processes:
-        for i, answer in processes.each(range(len(todo)), _planning(todo)):
+        for i, found in processes.each(range(len(todo)), _planning(todo)):
+            # a stage that has cost a process is planned here
+            answer = _plan_stage(todo[i]) if isinstance(found, Lost) else found
             if isinstance(answer, InvalidInputError):
                 raise answer
-            # a stage that has cost a process is planned here
-            plans[i] = _plan_stage(todo[i]) if isinstance(answer, Lost) else answer
+            plans[i] = answer
             if progress is not None:
                 progress(len(plans), len(todo))
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 
-def _planning(
-    todo: Sequence[RouteStage],
-) -> Callable[[int], Plan | OutOfReach | InvalidInputError]:
+Answer = Plan | OutOfReach | InvalidInputError
+
+
+def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
     """Return what plans a stage, in each process."""
-
-    def answer(index: int) -> Plan | OutOfReach | InvalidInputError:
-        try:
-            return _plan_stage(todo[index])
-        except InvalidInputError as error:
-            return error
-
-    return answer
+    return lambda index: _plan_stage(todo[index])
 
 
-def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:
+def _plan_stage(stage: RouteStage) -> Answer:
     try:
         if stage.phase == "place":
             _must_touch(stage)
@@ -261,8 +256,9 @@ def _plan_stage(stage: RouteStage) -> Plan | OutOfReach:
     except UnreachableError as error:
         return OutOfReach(error.message)
     except InvalidInputError as error:
-        place = "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
-        raise error.within(place) from None
+        return error.within(
+            "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
+        )
 
 
 def _must_touch(stage: RouteStage) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from planner import programs
 from planner.deadline import Budget, Overlap, Unfinished, late
-from planner.explanation import InfeasibleStance, LimitUse, certify, certify_idle
-from planner.prepare import PreparedStance, Sets
-from planner.programs import SLACK
+from planner.explanation import LimitUse, certify, certify_idle
+from planner.prepare import PreparedStance
+from planner.programs import SLACK, Outcome
 from planner.result import Certificate
 from planner.solving.effort import solve_effort
 from planner.solving.fixed import solve_in_two
@@ -40,8 +40,7 @@ def look_again(
         if given_wrench(prepared):
             return found, None
         given = len(data.wrench) > len(prepared.wrench)
-        stance = _infeasible(prepared, found.sets, None)
-        proof = certify(stance, None if given else nearest, found.outcome)
+        proof = _certify(prepared, found, None, None if given else nearest)
         if proof is not None:
             found = found._replace(outcome=replace(found.outcome, solved=False))
             found = found.late(*unexplained(proof))
@@ -70,10 +69,13 @@ def unexplained(proof: Certificate) -> tuple[Unfinished, ...]:
     return () if whole else late("explanation")
 
 
-def _infeasible(prepared: PreparedStance, sets: Sets, cap: float | None) -> InfeasibleStance:
-    """Return what a proof is made of: at any utilisation, or within a cap."""
-    held, limits = prepared.hands.held, prepared.question.limits
-    return InfeasibleStance(sets.data, prepared.limbs, sets.spaces, held, cap, limits)
+def _certify(
+    prepared: PreparedStance, found: Solution, cap: float | None, nearest: Outcome | None = None
+) -> Certificate | None:
+    """Return the proof that there is no plan: at any utilisation, or within a cap."""
+    spaces, data = found.sets
+    stance = data, prepared.limbs, spaces, prepared.hands.held, prepared.question.limits
+    return certify(*stance, cap, nearest=nearest, known=found.outcome)
 
 
 def overload(
@@ -93,6 +95,6 @@ def overload(
         return certify_idle(most, cap, alone)
     if found.unproven:
         return None
-    proof = certify(_infeasible(prepared, found.sets, cap), known=found.outcome)
+    proof = _certify(prepared, found, cap)
     # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
     return replace(proof, sufficient=()) if proof is not None and beyond else proof

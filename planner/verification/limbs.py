@@ -85,21 +85,19 @@ def check_limbs(
 
 def _limits(question: Question, limb: str) -> Array:
     """Return what a limb's joints bear: what the caller says of them, else the robot [N·m]."""
-    limits, asked = question.stance.robot.torque_limits[limb], question.limits.joint_torque
+    limits, asked = question.stance.robot.chains[limb].torque_limits, question.limits.joint_torque
     own = asked.get(limb) if isinstance(asked, Mapping) else asked
     return limits if own is None else np.array(own, dtype=float) * np.ones(len(limits))
 
 
 def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) -> LimbTorques:
-    stance, model = question.stance, question.stance.robot.model
-    tree = LinkTree(model.urdf, model.body, model.mounts, model.hand_mass)
+    stance = question.stance
     into_body = stance.body.rotation.T
     acceleration = np.zeros((2, 3))
     if question.body_wrench is None:
         load = question.load
         acceleration = np.array([load.acceleration, load.angular_acceleration])
-    return tree.hold_up(
-        {limb: where.joints[limb].names for limb in stance.robot.limbs},
+    return LinkTree(stance.robot).hold_up(
         where.angles,
         wrenches,
         into_body @ stance.gravity,
@@ -109,7 +107,7 @@ def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) 
 
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
     """Check that joints put the hands where the stance has them, within the joints' limits."""
-    stance, model = question.stance, question.stance.robot.model
+    stance = question.stance
     most_off, most_turned = FOUND if where.solved else PLACED
     body = stance.body.inverse()
     for place in stance.hands:
@@ -122,7 +120,8 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
                 "pose"
             )
     for limb, angles in where.angles.items():
-        beyond = np.maximum(model.lower[limb] - angles, angles - model.upper[limb])
+        chain = stance.robot.chains[limb]
+        beyond = np.maximum(chain.lower - angles, angles - chain.upper)
         if not float(beyond.max()) <= BEYOND:
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
         if not isinstance(stance.joints, str | None):

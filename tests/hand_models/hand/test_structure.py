@@ -13,6 +13,7 @@ from hand_models.hand import HELD
 from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers.hands import changed_hand, settled_at
+from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 
 seeds = st.integers(0, 2**32 - 1)
@@ -121,7 +122,7 @@ def test_a_plan_that_a_limit_overloads_names_it_and_prices_it(limit):
     section, name, value, *words, unit = OVERLOADS[limit]
     # with the outer fingers not turned their tips press before spines are pulled off
     stance = on_wall(outer_rotation=0.0) if limit == "fingertip_force" else on_wall()
-    weak = replace(stance.robot, hand=changed_hand(section, name, value))
+    weak = with_hand(stance.robot, changed_hand(section, name, value))
     answer = plan(ask(replace(stance, robot=weak), "prices"))
     assert answer.status == "overloaded"
     assert answer.verified

@@ -58,7 +58,7 @@ def slopes(changed, limit: float) -> tuple[float, float]:
 def with_torque(question: Question, price: Price):
     """The question with another limit of the joint that a price is of."""
     limits, limb = question.limits, price.name.limb
-    index = ROBOT.model.joint_names[limb].index(price.name.joint)
+    index = ROBOT.chains[limb].joints.index(price.name.joint)
 
     def changed(limit: float) -> Question:
         torque = list(limits.joint_torque[limb])

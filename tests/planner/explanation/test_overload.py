@@ -137,7 +137,7 @@ def test_of_the_joints_of_a_limb_without_a_hand_the_only_weak_one_would_do():
     limits = Limits(joint_torque={limb: (1e3, 1e-3, *[1e3] * 5)})
     proof = plan(ask(stance, body_wrench=np.zeros(6), limits=limits)).certificate
     assert proof.sufficient == proof.irreducible
-    assert proof.irreducible[0].joint == stance.robot.model.joint_names[limb][1]
+    assert proof.irreducible[0].joint == stance.robot.chains[limb].joints[1]
 
 
 def test_closing_too_hard_leaves_no_loads_whatever_the_body_needs():
@@ -239,7 +239,7 @@ def test_weak_joints_are_named():
     assert answer.limiting.limit == "joint_torque"
     assert f"{answer.limiting.limb}: joint {answer.limiting.joint} would bear" in answer.reason
     joints = {name.joint for name in answer.certificate.irreducible}
-    assert joints & {joint for names in robot.model.joint_names.values() for joint in names}
+    assert joints & {joint for chain in robot.chains.values() for joint in chain.joints}
 
 
 # As it travels ----------------------------------------------------------------------------------

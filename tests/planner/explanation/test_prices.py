@@ -14,6 +14,7 @@ from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.hands import changed_hand
+from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import SANDPAPER, ask, on_wall, random_question
 
 QUESTIONS = {
@@ -108,7 +109,7 @@ def test_prices_of_motors_and_of_the_structure_are_in_units_of_their_own(
     section, number, weak, limit, unit
 ):
     stance = on_wall()
-    robot = replace(stance.robot, hand=changed_hand(section, number, weak))
+    robot = with_hand(stance.robot, changed_hand(section, number, weak))
     question = ask(replace(stance, robot=robot), "prices")
     price = next(p for p in plan(question).prices if p.name.limit == limit)
     assert price.unit == unit

@@ -19,6 +19,7 @@ from planner.solving import plan
 from service.answering import questions
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import changed_hand
+from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 
 
@@ -36,7 +37,7 @@ def test_of_limits_that_tie_the_dearest_is_named(name: str):
 def test_of_a_tendon_and_a_motor_as_strong_as_it_the_tendon_is_named():
     stance = on_wall()
     motor = stance.robot.hand.drive.torque(60.0)
-    robot = replace(stance.robot, hand=changed_hand("motor", "maximum_torque", motor))
+    robot = with_hand(stance.robot, changed_hand("motor", "maximum_torque", motor))
     question = ask(replace(stance, robot=robot), limits=Limits(tendon_tension=60.0))
     answer = plan(question)
     assert answer.limiting.limit == "tendon_tension"

@@ -91,11 +91,9 @@ def standing(*limbs):
     if limbs == ("leg",):
         toml, urdf = limbs_toml("leg", {"leg": "foot"}), TWO_LINK
     robot = robot_of(RobotFile("own", toml, urdf))
-    joints = {
-        limb: np.linspace(0.2, 0.6, len(robot.model.joint_names[limb])) for limb in robot.limbs
-    }
+    joints = {limb: np.linspace(0.2, 0.6, len(robot.chains[limb].joints)) for limb in robot.limbs}
     body = Pose(np.array([1.0, 2.0, 3.0]), wall())
-    poses = robot.model.hand_poses(joints)
+    poses = robot.hand_poses(joints)
     hands = tuple(
         HandOnHold(limb, body @ poses[limb], Sphere(0.3), ROCK, grasp=Grasp()) for limb in limbs
     )
@@ -342,7 +340,7 @@ def test_limbs_are_drawn_where_the_model_has_them(name):
     stance = question.stance
     space, facing, side = panels(drawn(name))
     for i, limb in enumerate(stance.robot.limbs):
-        chain = stance.robot.model.link_chain(plan.joints, limb)
+        chain = stance.robot.link_chain(plan.joints, limb)
         line = limb_lines(space)[i]
         assert isinstance(line, Line3D)
         places = np.array(line.get_data_3d()).T
@@ -421,7 +419,7 @@ def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
     # about B a force and a moment: at the centre of mass the moment is another
     given = Question(question.stance, body_wrench=np.array([500.0, 0, 0, 0, 0, 30.0]))
     load = scene_of(solve.plan(given), given).load
-    com = question.stance.robot.model.com(plan.joints)
+    com = question.stance.robot.com_at(plan.joints)
     about = -np.array([0.0, 0, 30.0]) + np.cross(com, [500.0, 0, 0])
     np.testing.assert_allclose(load.moment, question.stance.body.rotation @ about, atol=1e-9)
 

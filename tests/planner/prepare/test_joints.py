@@ -30,11 +30,6 @@ SEEDS = st.integers(0, 10_000)
 ANGLES = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 
 
-def tree_of(robot) -> LinkTree:
-    model = robot.model
-    return LinkTree(model.urdf, model.body, model.mounts, model.hand_mass)
-
-
 def solved(**kwargs) -> Question:
     return Question(replace(on_wall(), joints="solve"), **kwargs)
 
@@ -88,15 +83,14 @@ def test_torques_are_the_power_of_weights_and_of_the_hand(angles, wrench):
     """By virtual work with finite differences: τ · dq = dE + w · (dx, dθ) of H."""
     robot = two_link_robot()
     at = np.array(angles)
-    model = robot.model
     stance = at_joints(robot, {"leg": at}, ("leg",), hold=Plane())
     torques = posture(Question(stance)).joints["leg"].torques(np.array(wrench))
     step = 1e-6
     for i in range(2):
         ahead, behind = (at + sign * step * np.eye(2)[i] for sign in (1.0, -1.0))
-        energy = [model.mass * G * model.com({"leg": q})[2] for q in (ahead, behind)]
-        there, here = (model.hand_poses({"leg": q})["leg"] for q in (ahead, behind))
-        middle = model.hand_poses({"leg": at})["leg"].rotation
+        energy = [robot.mass * G * robot.com_at({"leg": q})[2] for q in (ahead, behind)]
+        there, here = (robot.hand_poses({"leg": q})["leg"] for q in (ahead, behind))
+        middle = robot.hand_poses({"leg": at})["leg"].rotation
         slid = middle.T @ (there.position - here.position)
         turned = middle.T @ Rotation.from_matrix(there.rotation @ here.rotation.T).as_rotvec()
         work = energy[0] - energy[1] + np.dot(wrench, np.concatenate([slid, turned]))
@@ -129,8 +123,7 @@ def test_moments_about_each_axis_are_the_jacobians_and_newton_euler(seed):
     body = question.stance.body.rotation.T
     wrenches = {limb: rng.normal(size=6) * 100.0 for limb in robot.limbs}
     acceleration = [question.load.acceleration, question.load.angular_acceleration]
-    own = tree_of(robot).hold_up(
-        robot.model.joint_names,
+    own = LinkTree(robot).hold_up(
         where.angles,
         wrenches,
         body @ question.stance.gravity,
@@ -140,7 +133,7 @@ def test_moments_about_each_axis_are_the_jacobians_and_newton_euler(seed):
     for limb in robot.limbs:
         claimed = where.joints[limb].torques(wrenches[limb])
         np.testing.assert_allclose(own.torques[limb], claimed, rtol=1e-9, atol=1e-7)
-        pose = robot.model.hand_poses(where.angles)[limb]
+        pose = robot.hand_poses(where.angles)[limb]
         np.testing.assert_allclose(own.hands[limb].position, pose.position, atol=1e-12)
         np.testing.assert_allclose(own.hands[limb].rotation, pose.rotation, atol=1e-12)
 
@@ -154,7 +147,7 @@ def test_acceleration_is_the_rate_of_momentum(seed):
     question = random_question_with_joints(seed)
     robot = question.stance.robot
     where = posture(question)
-    model, tree = robot.model, tree_of(robot)
+    tree = LinkTree(robot)
     still = posture(replace(question, load=Load()))
     into_body = question.stance.body.rotation.T
     linear = into_body @ np.array(question.load.acceleration)
@@ -162,7 +155,7 @@ def test_acceleration_is_the_rate_of_momentum(seed):
     names = {
         name: float(angle)
         for limb in robot.limbs
-        for name, angle in zip(model.joint_names[limb], where.angles[limb], strict=True)
+        for name, angle in zip(robot.chains[limb].joints, where.angles[limb], strict=True)
     }
     places = tree.places(names)
     rate = np.zeros(6)
@@ -171,9 +164,9 @@ def test_acceleration_is_the_rate_of_momentum(seed):
         rate += momentum_rate(link.mass, places[link.name].apply(link.com), linear, angular, step)
         turn = places[link.name].rotation
         rate[3:] += turn @ link.inertia @ turn.T @ angular
-    for mount in tree.mounts.values():
+    for mount in robot.description.mounts.values():
         hand = (places[mount.link] @ mount.pose).apply(np.array(mount.hand_com))
-        rate += momentum_rate(tree.hand_mass, hand, linear, angular, step)
+        rate += momentum_rate(robot.hand.mass, hand, linear, angular, step)
     np.testing.assert_allclose(where.body_wrench - still.body_wrench, rate, rtol=1e-4, atol=1e-3)
 
 
@@ -238,10 +231,10 @@ def test_plans_with_joints_pass_the_check(seed):
 def _limits(question: Question) -> dict[str, np.ndarray]:
     own, robot = question.limits.joint_torque, question.stance.robot
     if own is None:
-        return dict(robot.torque_limits)
+        return {limb: chain.torque_limits for limb, chain in robot.chains.items()}
     if isinstance(own, float):
         return {limb: np.full(7, own) for limb in robot.limbs}
-    return {limb: np.array(own.get(limb, robot.torque_limits[limb])) for limb in robot.limbs}
+    return {limb: np.array(own.get(limb, robot.chains[limb].torque_limits)) for limb in robot.limbs}
 
 
 def test_the_plan_is_the_same_wherever_the_world_is_turned():
@@ -288,9 +281,8 @@ def test_a_body_frame_elsewhere_in_the_trunk_changes_no_torque():
     np.testing.assert_allclose(
         wrench_transport(frame) @ there.body_wrench, here.body_wrench, atol=1e-9
     )
-    tree = tree_of(turned)
+    tree = LinkTree(turned)
     own = tree.hold_up(
-        turned.model.joint_names,
         there.angles,
         {},
         frame.rotation.T @ np.array(EARTH),
@@ -317,7 +309,9 @@ def test_limits_of_the_caller_are_honoured(limit):
     assert answer.utilisation >= free.utilisation - 1e-6
     robot = robosimian()
     for limb, torques in answer.joint_torque.items():
-        given_one = limit.get(limb, robot.torque_limits[limb]) if isinstance(limit, dict) else limit
+        given_one = (
+            limit.get(limb, robot.chains[limb].torque_limits) if isinstance(limit, dict) else limit
+        )
         share = np.abs(torques) / np.array(given_one)
         assert share.max() <= answer.utilisation + 1e-6
 
@@ -348,7 +342,7 @@ def test_a_limb_without_a_hand_counts():
     assert weak.utilisation == pytest.approx(2.0, abs=1e-6)
     assert weak.status == "overloaded"
     assert weak.limiting.limb == "front_right"
-    assert weak.limiting.joint in robot.model.joint_names["front_right"]
+    assert weak.limiting.joint in robot.chains["front_right"].joints
     assert weak.verified
     assert free.status == "optimal"
 

@@ -15,7 +15,7 @@ import pytest
 import zenoh
 
 from hand_models.base import InvalidInputError, Pose
-from planner.robots import load_robot, robosimian
+from planner.robots import RobotFile, robosimian, robot_of
 from service import CruxClient
 from service.answering import dispatch, read_hand, read_robot, robots_of, with_hand, with_robot
 from service.answering.questions import question
@@ -63,7 +63,7 @@ def lemur(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def hanging(file: Path, joints: Any = ANGLES) -> dict:
     """The two arms' hands where their angles put them, in pinches; on the Moon."""
-    hands = load_robot(file).model.hand_poses({k: np.array(v) for k, v in ANGLES.items()})
+    hands = robot_of(RobotFile.load(file)).hand_poses({k: np.array(v) for k, v in ANGLES.items()})
     stance: dict[str, Any] = {
         "gravity": [0.0, 0.0, -1.62],
         "body": pose(BODY),
@@ -122,20 +122,20 @@ def test_a_stance_is_planned_for_the_robot_of_the_file(
     request = hanging(file, joints)
     assert run(["plan", written(request), "--robot", str(file), "--json"]) == 0
     reply = told(capfd)
-    robot = load_robot(file)
+    robot = robot_of(RobotFile.load(file))
     assert robot.mass == pytest.approx(20.0 + 2 * sum(1 / k for k in range(1, 7)) + 2 * 2.6)
     np.testing.assert_allclose(np.linalg.norm(reply["body_wrench"][:3]), 1.62 * robot.mass)
     if joints is None:
         assert reply["joint_torque"] is None
         return
     angles = {limb: np.array(values) for limb, values in reply["joints"].items()}
-    for limb, hand in robot.model.hand_poses(angles).items():
+    for limb, hand in robot.hand_poses(angles).items():
         asked = request["stance"]["hands"][robot.limbs.index(limb)]["pose"]
         np.testing.assert_allclose((BODY @ hand).position, asked["position"], atol=1e-5)
     # contract: gravity torque + Jᵀ · hand wrench on the rock
     gravity = BODY.rotation.T @ [0.0, 0.0, -1.62]
-    weights = robot.model.statics(angles, gravity, np.zeros(6)).joint_torque
-    jacobians = robot.model.jacobians(angles)
+    weights = robot.statics(angles, gravity, np.zeros(6)).joint_torque
+    jacobians = robot.jacobians(angles)
     for hand in reply["hands"]:
         limb = hand["limb"]
         np.testing.assert_allclose(
@@ -236,7 +236,7 @@ def test_a_hand_and_a_robot_of_ones_own_go_together(
     path = written(hanging(file))
     assert run(["plan", path, "--robot", str(file), "--hand", str(hand), "--json"]) == 0
     weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
-    assert weight == pytest.approx(1.62 * (load_robot(file).mass + 2 * 3.0))
+    assert weight == pytest.approx(1.62 * (robot_of(RobotFile.load(file)).mass + 2 * 3.0))
 
 
 def test_a_wrench_space_is_that_of_the_robots_hand(
@@ -259,7 +259,7 @@ def test_a_body_space_is_that_of_the_robot(
     reply = told(capfd)
     assert reply["robot"] == "arms"
     weight = np.linalg.norm(reply["body_wrench"][:3])
-    assert weight == pytest.approx(1.62 * load_robot(file).mass)
+    assert weight == pytest.approx(1.62 * robot_of(RobotFile.load(file)).mass)
 
 
 def test_a_lighter_robot_takes_the_bundled_stances(
@@ -269,7 +269,7 @@ def test_a_lighter_robot_takes_the_bundled_stances(
     heavy = told(capfd)
     assert run(["plan", "wall-300", "--robot", str(lemur), "--json"]) == 0
     light = told(capfd)
-    assert load_robot(lemur).mass == pytest.approx(robosimian().mass - 20.0)
+    assert robot_of(RobotFile.load(lemur)).mass == pytest.approx(robosimian().mass - 20.0)
     np.testing.assert_allclose(
         light["body_wrench"][:3],
         np.array(heavy["body_wrench"][:3]) * (1.0 - 20.0 / robosimian().mass),
@@ -390,7 +390,7 @@ def test_the_demo_is_of_the_robot(
     picture = tmp_path / "demo.png"
     assert run(["demo", "-o", str(picture), "--json", "--robot", str(lemur)]) == 0
     weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
-    assert weight == pytest.approx(9.81 * load_robot(lemur).mass)
+    assert weight == pytest.approx(9.81 * robot_of(RobotFile.load(lemur)).mass)
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -29,7 +29,7 @@ def test_limbs_come_in_the_order_of_the_model_with_its_shoulders():
     robot = robosimian()
     assert robot.limbs == tuple(SHOULDERS)
     for limb, shoulder in SHOULDERS.items():
-        np.testing.assert_allclose(robot.shoulders[limb], shoulder, atol=1e-5)
+        np.testing.assert_allclose(robot.chains[limb].shoulder, shoulder, atol=1e-5)
 
 
 def test_centre_of_mass_is_that_of_the_zero_pose():
@@ -44,7 +44,8 @@ def test_reach_is_that_of_a_stretched_limb():
 
 def test_hand_is_mounted_where_the_meshes_say():
     # hand frame 87.2 mm along link 7, less 19.85 mm from it to H; palm 112.5 mm above the axis
-    for mount in robosimian().hand_in_link.values():
+    for chain in robosimian().chains.values():
+        mount = chain.hand_in_link
         np.testing.assert_allclose(mount.position, [0.0872 - 0.01985, 0.0, 0.1125])
         np.testing.assert_array_equal(mount.rotation, np.eye(3))
 
@@ -55,11 +56,11 @@ def test_stretch_is_the_distance_of_the_last_link_over_the_reach(limb, part):
     robot = robosimian()
     rng = np.random.default_rng(3)
     way = rng.normal(size=3)
-    link = robot.shoulders[limb] + part * robot.reach * way / np.linalg.norm(way)
+    link = robot.chains[limb].shoulder + part * robot.reach * way / np.linalg.norm(way)
     turn = Pose.from_quaternion([0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5]).rotation
-    hand = Pose(link, turn) @ robot.hand_in_link[limb]
-    assert robot.stretch(limb, hand) == pytest.approx(part, abs=1e-9)
-    assert robot.beyond(limb, hand) == pytest.approx((part - 1.0) * robot.reach, abs=1e-9)
+    hand = Pose(link, turn) @ robot.chains[limb].hand_in_link
+    (stretch,) = robot.stretches(Pose.identity(), [limb], [hand])
+    assert stretch == pytest.approx(part, abs=1e-9)
 
 
 def test_the_hand_on_every_limb_is_the_spinyhand():

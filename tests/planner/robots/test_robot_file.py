@@ -10,7 +10,7 @@ import pytest
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import hand_table, own_hand
-from planner.robots import RobotFile, load_robot, robosimian, robot_of
+from planner.robots import RobotFile, robosimian, robot_of
 from tests.suite.helpers.robots import TWO_LINK, arm, joint, limbs_toml, link, urdf
 
 TOML = limbs_toml("walker", {"leg": "foot"})
@@ -40,16 +40,17 @@ def refusal(toml=TOML, text=TWO_LINK):
 
 
 def test_a_file_makes_a_robot(tmp_path):
-    robot = load_robot(written(tmp_path), OWN_MASS)
+    robot = robot_of(RobotFile.load(written(tmp_path)), OWN_MASS)
     assert (robot.name, robot.limbs) == ("walker", ("leg",))
     assert robot.mass == pytest.approx(10.0 + 2.0 + 1.0 + 0.5 + 3.0)
     # its centre of mass at zero angles, worked by hand
     x = (2.0 * 0.8 + 1.0 * 1.3 + 3.0 * 1.6) / 16.5
     np.testing.assert_allclose(robot.com, [x, 0.0, (10.0 * 0.1 + 0.5 * 0.4) / 16.5], atol=1e-12)
-    np.testing.assert_array_equal(robot.torque_limits["leg"], [80.0, 80.0])
+    np.testing.assert_array_equal(robot.chains["leg"].torque_limits, [80.0, 80.0])
     assert robot.reach == pytest.approx(1.0)
     # the foot 0.9 m before the hip: stretched to 90 %
-    assert robot.stretch("leg", Pose(np.array([1.5, 0.0, 0.0]), np.eye(3))) == pytest.approx(0.9)
+    hand = Pose(np.array([1.5, 0.0, 0.0]), np.eye(3))
+    assert robot.stretches(Pose.identity(), ["leg"], [hand]) == [pytest.approx(0.9)]
 
 
 def test_files_of_the_same_content_make_one_robot(tmp_path):
@@ -64,9 +65,9 @@ def test_files_of_the_same_content_make_one_robot(tmp_path):
 
 def test_the_bundled_robot_is_a_file_like_any_other():
     with resources.as_file(resources.files("planner.parameters")) as folder:
-        robot = load_robot(folder / "robosimian.toml")
+        robot = robot_of(RobotFile.load(folder / "robosimian.toml"), None)
     assert robot is robosimian()
-    assert all(np.all(limits == 200.0) for limits in robot.torque_limits.values())
+    assert all(np.all(chain.torque_limits == 200.0) for chain in robot.chains.values())
 
 
 def test_a_limb_says_what_differs_from_every_limb():
@@ -77,9 +78,11 @@ orientation = { value = [0.0, 1.0, 0.0, 0.0], unit = "1", source = "measured" }
 hand_com = { value = [0.0, 0.0, -0.04], unit = "m", source = "measured" }
 """
     robot = robot_of(RobotFile("arms", toml + own, text))  # the last section is that of the right
-    np.testing.assert_array_equal(robot.torque_limits["left"], [80.0] * 3)
-    np.testing.assert_array_equal(robot.torque_limits["right"], [30.0, 20.0, 10.0])
-    np.testing.assert_allclose(robot.hand_in_link["right"].rotation, np.diag([-1.0, 1.0, -1.0]))
+    np.testing.assert_array_equal(robot.chains["left"].torque_limits, [80.0] * 3)
+    np.testing.assert_array_equal(robot.chains["right"].torque_limits, [30.0, 20.0, 10.0])
+    np.testing.assert_allclose(
+        robot.chains["right"].hand_in_link.rotation, np.diag([-1.0, 1.0, -1.0])
+    )
     # the right hand's centre of mass is turned up, by its orientation, from where the left's is
     plain = robot_of(RobotFile("arms", toml + own.replace("-0.04", "0.0"), text))
     lift = robot.hand.mass * 0.04 / robot.mass
@@ -95,7 +98,7 @@ def test_the_centre_of_mass_may_be_given():
 def test_a_joint_that_no_limb_has_stays_at_zero():
     """The slide of the head may go from 0.1 to 0.2 m; it is where the file draws it."""
     robot = robot_of(RobotFile("walker", TOML, TWO_LINK))
-    assert robot.model.joint_names == {"leg": ("hip", "knee")}
+    assert robot.chains["leg"].joints == ("hip", "knee")
     heavy = TWO_LINK.replace('<mass value="0.5"/>', '<mass value="1.5"/>')
     other = robot_of(RobotFile("walker", TOML, heavy))
     moved = other.mass * other.com - robot.mass * robot.com
@@ -302,6 +305,6 @@ def test_files_that_cannot_be_read(tmp_path, spoil, message):
     path = written(tmp_path)
     spoil(tmp_path)
     with pytest.raises(InvalidInputError, match=message) as caught:
-        load_robot(path)
+        robot_of(RobotFile.load(path))
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)

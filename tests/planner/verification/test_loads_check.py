@@ -17,6 +17,7 @@ from planner.verification.limit_surface import LimitCurves
 from tests.suite.helpers.fingernails import STRONG, hung, one_hand
 from tests.suite.helpers.hands import changed_hand
 from tests.suite.helpers.random_questions import KINDS
+from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import ask, on_wall
 from tests.suite.helpers.streams import streamable
 
@@ -133,7 +134,7 @@ def test_no_load_has_the_wrong_sign(name):
 
 def test_a_tendon_with_friction_must_not_be_slackened():
     hand = changed_hand("tendon", "friction", 0.1)
-    robot = replace(WALL.stance.robot, hand=hand)
+    robot = with_hand(WALL.stance.robot, hand)
     question = replace(WALL, stance=replace(WALL.stance, robot=robot))
     known = StreamStance(question)
     loads = known.solve(known.first).loads

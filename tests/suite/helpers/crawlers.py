@@ -14,7 +14,7 @@ from hand_models.hand import Grasp
 from hand_models.rock import Cylinder
 from planner.prepare.settled_stance import settle_at, wrist_at
 from planner.question import HandOnHold, Question, Stance
-from planner.robots import Robot, load_robot
+from planner.robots import Robot, RobotFile, robot_of
 from tests.suite.helpers.robots import joint, link, urdf
 from tests.suite.helpers.stances import ROCK, wall
 
@@ -45,7 +45,7 @@ def crawler_in(folder: Path) -> Robot:
     toml = 'name = "crawler"\nurdf = "crawler.urdf"\nbody = "plate"\n'
     (folder / "crawler.urdf").write_text(urdf(*parts))
     (folder / "crawler.toml").write_text(toml + "".join(ARM.format(limb=limb) for limb in LIMBS))
-    return load_robot(folder / "crawler.toml")
+    return robot_of(RobotFile.load(folder / "crawler.toml"))
 
 
 def crawler_question(
@@ -57,7 +57,7 @@ def crawler_question(
     for limb in LIMBS:
         pitch = chance.uniform(0.5, 0.8)
         angles[limb] = np.array([chance.uniform(-0.5, 0.5), pitch, -pitch])
-    there, body = robot.model.hand_poses(angles), Pose(np.zeros(3), wall(-0.2))
+    there, body = robot.hand_poses(angles), Pose(np.zeros(3), wall(-0.2))
     hands = tuple(
         HandOnHold(
             limb,

@@ -19,7 +19,10 @@ def told_effort(question: Question, answer: Plan) -> float:
         )
         total += sum((finger.tendon_tension / most) ** 2 for finger in hand.fingers)
         if answer.joint_torque is not None:
-            most = question.limits.joint_torque or question.stance.robot.torque_limits[hand.limb]
+            most = (
+                question.limits.joint_torque
+                or question.stance.robot.chains[hand.limb].torque_limits
+            )
             total += float(np.sum((answer.joint_torque[hand.limb] / most) ** 2))
     return total
 

@@ -12,6 +12,7 @@ from hand_models.rock import Hold, Profile
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
 from tests.suite.helpers.hands import HAND, ROCK, changed_hand
+from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import PALM_TO_WALL
 
 PIN = {"inner": 0.06615 + 3 * 0.0431, "outer": 0.03275 + 0.0346 + 3 * 0.0431}
@@ -45,7 +46,7 @@ def one_hand(hand=HAND, hold: Hold | None = None, place: float = 0.001) -> Stanc
         grasp=Grasp(fingernail=True),
     )
     stance = Stance((there,), body)
-    return replace(stance, robot=replace(stance.robot, hand=hand))
+    return replace(stance, robot=with_hand(stance.robot, hand))
 
 
 def hung(stance: Stance, pull: float) -> Question:

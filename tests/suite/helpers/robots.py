@@ -1,6 +1,10 @@
 """Robots for the tests, as texts: a two-link arm worked by hand, and arms of 5, 6 and 8 joints."""
 
 from itertools import pairwise
+from types import SimpleNamespace
+
+from planner.robots import Robot
+from planner.robots.robot_file import Mount, RobotDescription
 
 ROBOT_TOML = """
 name = "{name}"
@@ -43,6 +47,21 @@ def link(name, mass=0.0, com="0 0 0", moment=0.0):
 
 def urdf(*parts):
     return f'<?xml version="1.0"?><robot name="test">{"".join(parts)}</robot>'
+
+
+def bare_robot(text, body, hands, hand_mass, com=(0.0, 0.0, 0.0)):
+    """A robot whose hands are points of that mass; ``hands``: each limb's link and place there."""
+    mounts = {
+        limb: Mount(link, place, (0.0, 0.0, 0.0, 1.0), com, (80.0,))
+        for limb, (link, place) in hands.items()
+    }
+    hand = SimpleNamespace(mass=hand_mass)
+    return Robot(RobotDescription("test", "", body, None, mounts), text, hand)
+
+
+def with_hand(robot, hand):
+    """The robot with another hand on every limb."""
+    return Robot(robot.description, robot.urdf, hand)
 
 
 TWO_LINK = urdf(

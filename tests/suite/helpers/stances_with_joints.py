@@ -36,7 +36,7 @@ def at_joints(
 ) -> Stance:
     """Hands of those limbs where the angles put them, each seated on a hold of its own."""
     body = Pose.identity() if body is None else body
-    there = robot.model.hand_poses(angles)
+    there = robot.hand_poses(angles)
     hands = tuple(
         HandOnHold(
             limb,
@@ -55,7 +55,7 @@ def random_question_with_joints(seed: int, **kwargs) -> Question:
     rng = np.random.default_rng(seed)
     robot = robosimian()
     angles = {limb: rng.uniform(-1.5, 1.5, 7) for limb in robot.limbs}
-    there = robot.model.hand_poses(angles)
+    there = robot.hand_poses(angles)
     body = Pose(rng.uniform(-3.0, 3.0, 3), Rotation.random(random_state=seed).as_matrix())
     limbs = [str(limb) for limb in rng.permutation(robot.limbs)[: rng.integers(2, 5)]]
     hands = tuple(
