@@ -149,8 +149,8 @@ class RobotDescription:
             raw = tomllib.loads(toml)
         except tomllib.TOMLDecodeError as error:
             raise InvalidInputError(str(error)) from None
-        texts = [_string(raw.get(name), name) for name in TEXTS]
-        _named(texts[0], "name")
+        name, urdf, body = (_string(raw.get(each), each) for each in TEXTS)
+        _named(name, "name")
         for name in raw:
             if name not in (*TEXTS, "robot", "every_limb", "limbs"):
                 raise InvalidInputError(
@@ -173,7 +173,7 @@ class RobotDescription:
             link = _string(entries.pop("link", None), f"{section}.link")
             mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(*texts, com, mounts)
+        return cls(name, urdf, body, com, mounts)
 
 
 def _text(path: Path, field: str, what: str) -> str:
