@@ -15,8 +15,7 @@ its joint turns by δq_i, and its tile by δd_i toward the base relative to the 
     v_i = 0 ⇒ between the two                      (the bounds 1 ± μ of Section 5.2).
 
 Where nothing slips, δd_i = −r_i δq_i / c_p is the δl of Eq. 20. Either the motor's tension f is
-given, or the motor is held: v_1 = 0, or the tendon goes slack (f = 0, v_1 > 0) and must be taut
-again before it pulls.
+given, or the motor is held: v_1 = 0, or the tendon goes slack (f = 0, v_1 > 0).
 
 There is one solution. Take two, and their differences Δ: where Δv_i > 0, Δt_i is at most
 (1 − μ_i) Δt_{i−1} or (1 + μ_i) Δt_{i−1}, so Δt_{i−1} ≤ 0 brings Δt_i ≤ 0; and
@@ -29,7 +28,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -54,20 +52,11 @@ class TendonState:
         f [N].
     tensions, shears : ndarray, shape (n,)
         t_i and T_i [N].
-    tile_travel : ndarray, shape (n,)
-        d_i since closing, toward the base [m].
-    tendon_travel : ndarray, shape (n,)
-        Σ v_i since closing, toward the motor [m].
-    slack : float
-        Length that a held motor would have to wind before the tendon pulls again [m].
     """
 
     motor_tension: float
     tensions: Array
     shears: Array
-    tile_travel: Array
-    tendon_travel: Array
-    slack: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -171,46 +160,7 @@ class FingerTendon:
             motor_tension=float(tension),
             tensions=np.asarray(tension * losses),
             shears=self._of_phalanges("shears", shears),
-            tile_travel=np.zeros(n),
-            tendon_travel=np.zeros(n),
         )
-
-    def at_tension(
-        self,
-        state: TendonState,
-        tension: float,
-        shift: Sequence[float] | Array | None = None,
-        turn: Sequence[float] | Array | None = None,
-    ) -> TendonState:
-        """Change the load with the motor's tension given; the motor takes up any slack.
-
-        Exact for a step at whose end every boundary that slipped on the way still slips.
-
-        Parameters
-        ----------
-        state : TendonState
-            From `closed` or an earlier change of load of this tendon.
-        tension : float
-            f after the change [N].
-        shift, turn : sequence of float, length n, optional
-            δx_i, of each phalanx along the rock toward the finger's base [m]; δq_i, of each joint,
-            closing [rad].
-
-        Raises
-        ------
-        InvalidInputError
-            If the tension is negative, or a number is not finite or missing.
-        SolverError
-            If rounding errors keep the solution from being found.
-        """
-        _check("tension", tension, 0.0 <= tension < np.inf, "finite and not negative [N]")
-        run, change = self._entered, self._change(state, shift, turn)
-        alone = run.tensions[:, 0] * tension
-        a = stick_slip(
-            (self._travel(run.tensions[:, 1:])[run.rubs], self._travel(alone, change)[run.rubs]),
-            (run.before[run.rubs, 1:], run.before[run.rubs, 0] * tension),
-        )
-        return self._after(state, tension, alone + run.tensions[:, 1:] @ a, change)
 
     def held(
         self,
@@ -221,85 +171,53 @@ class FingerTendon:
         """Change the load with the motor held.
 
         The tendon gives no length past the first boundary, whatever its friction; the motor's own
-        strand keeps its tension as far as that friction can hold the difference.
+        strand keeps its tension as far as that friction can hold the difference. Exact for a step
+        at whose end every boundary that slipped on the way still slips.
 
-        Parameters, exceptions and exactness as of `at_tension`.
+        Parameters
+        ----------
+        state : TendonState
+            At rest, not slack.
+        shift, turn : sequence of float, length n, optional
+            δx_i, of each phalanx along the rock toward the finger's base [m]; δq_i, of each joint,
+            closing [rad].
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is not finite or missing.
+        SolverError
+            If rounding errors keep the solution from being found.
         """
-        run, change = self._held, self._change(state, shift, turn)
-        rows = np.concatenate([[0], np.flatnonzero(run.rubs)])
-        free = self._travel(np.zeros(len(run.rubs)), change)
-        free[0] += state.slack / self._unit
-        found = stick_slip(
-            (self._travel(run.tensions)[rows], free[rows]),
-            (run.before[run.rubs], np.zeros(len(rows) - 1)),
-        )
-        first, mu = float(found[0]), self.entry_friction
-        tension = min(max(state.motor_tension, first / (1.0 + mu)), first / (1.0 - mu))
-        slack = 0.0 if first > 0.0 else float(free[0]) * self._unit
-        return self._after(state, tension, run.tensions @ found, change, slack)
-
-    @cached_property
-    def _give(self) -> Array:
-        """Return how far a tile travels per newton, 1 / (k + K_p), shape (n,) [m/N]."""
-        return np.asarray(1.0 / (np.array(self.contact_stiffness) + self.spring_stiffness))
-
-    @cached_property
-    def _unit(self) -> float:
-        """Return a phalanx's share of tendon per newton, in which travels are scaled [m/N]."""
-        return float(self.pulley_ratio**2 * self._give.mean())
-
-    @cached_property
-    def _entered(self) -> _Run:
-        return _Run((self.entry_friction, *(self.friction,) * (len(self.pulley_radii) - 1)))
-
-    @cached_property
-    def _held(self) -> _Run:
-        return _Run((0.0, *(self.friction,) * (len(self.pulley_radii) - 1)))
-
-    def _change(
-        self,
-        state: TendonState,
-        shift: Sequence[float] | Array | None,
-        turn: Sequence[float] | Array | None,
-    ) -> _Change:
-        pushed = np.array(self.contact_stiffness) * self._of_phalanges("shift", shift)
+        k, c, n = np.array(self.contact_stiffness), self.pulley_ratio, len(self.pulley_radii)
+        pushed = k * self._of_phalanges("shift", shift)
         wound = np.array(self.pulley_radii) * self._of_phalanges("turn", turn)
-        return _Change(state.tensions, pushed, wound)
+        # how far a tile travels per newton, and a phalanx's share of tendon then [m/N]
+        give = 1.0 / (k + self.spring_stiffness)
+        unit = c**2 * float(give.mean())
+        # t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i by t_0 and the a of boundaries that have friction
+        mu = np.append(0.0, np.full(n - 1, self.friction))
+        rubs, columns = mu > FRICTIONLESS, np.eye(n + 1)
+        rows = [columns[0]]
+        for mu_i, column in zip(mu, columns[1:], strict=True):
+            rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * column)
+        tensions = np.array(rows)[:, np.append(True, rubs)]
 
-    def _tile_travel(self, tensions: Array, change: _Change) -> Array:
-        """Return δd (Eqs. 5 and 20) [m]."""
-        rise = self.pulley_ratio * (tensions - change.tensions)
-        return np.asarray(self._give * (rise - change.pushed))
+        def passed(given: Array) -> Array:
+            """Return v, what the phalanges from each boundary on give, in newtons."""
+            return np.asarray(np.cumsum(given[::-1], axis=0)[::-1] / unit)
 
-    def _travel(self, tensions: Array, change: _Change | None = None) -> Array:
-        """Return v, what the phalanges from each boundary on give, in units [N].
-
-        The part of it that is linear in the tensions, by column, or all of a change.
-        """
-        if change is None:
-            given = self.pulley_ratio**2 * self._give[:, None] * tensions
-        else:
-            given = self.pulley_ratio * self._tile_travel(tensions, change) + change.wound
-        return np.asarray(np.cumsum(given[::-1], axis=0)[::-1] / self._unit)
-
-    def _after(
-        self,
-        state: TendonState,
-        tension: float,
-        tensions: Array,
-        change: _Change,
-        slack: float = 0.0,
-    ) -> TendonState:
-        travel = self._tile_travel(tensions, change)
-        pressed = np.array(self.contact_stiffness) * travel
-        return TendonState(
-            motor_tension=float(tension),
-            tensions=tensions,
-            shears=state.shears + change.pushed + pressed,
-            tile_travel=state.tile_travel + travel,
-            tendon_travel=state.tendon_travel + self._unit * self._travel(tensions, change),
-            slack=slack,
+        moves = np.append(0, np.flatnonzero(rubs))
+        free = passed(wound - c * give * (c * state.tensions + pushed))[moves]
+        found = stick_slip(
+            (passed(c**2 * give[:, None] * tensions[1:])[moves], free),
+            (tensions[:-1][rubs], np.zeros(len(moves) - 1)),
         )
+        after = tensions[1:] @ found
+        travel = give * (c * (after - state.tensions) - pushed)
+        first, mu_1 = float(found[0]), self.entry_friction
+        motor = min(max(state.motor_tension, first / (1.0 + mu_1)), first / (1.0 - mu_1))
+        return TendonState(motor, after, state.shears + pushed + k * travel)
 
     def _of_phalanges(self, field: str, values: Sequence[float] | Array | None) -> Array:
         n = len(self.pulley_radii)
@@ -309,33 +227,6 @@ class FingerTendon:
         valid = given.shape == (n,) and bool(np.isfinite(given).all())
         _check(field, values, valid, f"{n} finite numbers")
         return given
-
-
-@dataclass(frozen=True, eq=False)
-class _Change:
-    """Tensions before a change of load, k_i δx_i [N] and r_i δq_i [m] of it."""
-
-    tensions: Array
-    pushed: Array
-    wound: Array
-
-
-class _Run:
-    """Tensions along the tendon as `complementarity` has them: t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i.
-
-    ``tensions`` gives t_1 … t_n and ``before`` t_0 … t_{n−1}; their first columns are per newton of
-    t_0, the others per newton of a at each boundary that has friction (``rubs``).
-    """
-
-    def __init__(self, friction: Sequence[float]) -> None:
-        mu = np.array(friction)
-        self.rubs = mu > FRICTIONLESS
-        before, columns = np.eye(1, len(mu) + 1)[0], np.eye(len(mu) + 1)[1:]
-        rows = [before]
-        for i, mu_i in enumerate(mu):
-            rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * columns[i])
-        chosen = np.array(rows)[:, np.concatenate([[True], self.rubs])]
-        self.tensions, self.before = chosen[1:], chosen[:-1]
 
 
 def _check(field: str, value: object, valid: bool, needed: str) -> None:

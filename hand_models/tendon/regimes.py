@@ -24,12 +24,10 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.tendon.finger_tendon import FRICTIONLESS, FingerTendon, TendonState
 
-__all__ = ["MOTOR_SCHEMES", "MotorScheme", "TendonRegimes", "TendonResponse"]
+__all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
 
 MotorScheme = Literal["held", "tension"]
 """What the motor does while the load changes: it stands still, or keeps its tension."""
-
-MOTOR_SCHEMES: Final = ("held", "tension")
 
 CONSISTENT: Final = 1e-9
 """By how many newtons a regime may seem to contradict itself, by rounding."""

@@ -193,9 +193,8 @@ def _tendon(
         friction,
         known.entry_friction,
     )
-    nothing = np.zeros(len(own))
     losses = np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float))
-    return tendon, TendonState(preload, np.asarray(preload * losses), at_rest, nothing, nothing)
+    return tendon, TendonState(preload, np.asarray(preload * losses), at_rest)
 
 
 def _normals(

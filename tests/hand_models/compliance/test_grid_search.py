@@ -29,6 +29,7 @@ from hand_models.rock import Cylinder, Plane, Sphere
 from hand_models.tendon import FingerTendon
 from hand_models.tile import Surface
 from hand_models.wrench_spaces import SCALE
+from tests.hand_models.tendon.test_finger_tendon import by_enumeration
 from tests.suite.helpers.hands import HAND
 
 PINCH = Grasp(outer_rotation=math.pi)
@@ -65,7 +66,8 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
     rest = gripper.finger.finger
     model: FingerModel = rest.model
     moved = settle_finger(model, gripper.section, base)
-    (cx, cz), radius = gripper.section.centre, gripper.section.radius
+    centre, radius = gripper.section.centre, gripper.section.radius
+    cx, cz = centre.real, centre.imag
 
     def arc(point):
         return radius * math.atan2(point[0] - cx, cz - point[1])
@@ -90,12 +92,13 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
     start = FingerTendon(2.0, (1.0,) * 3, 1.0, model.pulley_radii, 0.0).closed(
         37.0, rest.shears(37.0) @ [1.0, 37.0]
     )
-    state = tendon.at_tension(start, 37.0, slips, turns)
-    np.testing.assert_allclose(loads.shears[0], state.shears, atol=1e-8)
-    np.testing.assert_allclose(loads.tensions[0], state.tensions, atol=1e-8)
+    travel, tensions = by_enumeration(tendon, start, np.array(slips), turns, 37.0)[0]
+    shears = start.shears + np.array(tendon.contact_stiffness) * (slips + travel)
+    np.testing.assert_allclose(loads.shears[0], shears, atol=1e-8)
+    np.testing.assert_allclose(loads.tensions[0], tensions, atol=1e-8)
     # joint torques of the loads found, joint by joint
     for i, contact in enumerate(moved.contacts):
-        torque = state.tensions[i] * model.pulley_radii[i]
+        torque = tensions[i] * model.pulley_radii[i]
         torque -= model.joint_stiffness[i] * turned[i] + model.joint_preload[i]
         for j in range(i, 3):
             force = loads.forces[0, j]

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 
 from hand_models import InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table
-from hand_models.tendon import FingerTendon, TendonState
+from hand_models.tendon import FingerTendon, TendonRegimes, TendonState
 
 MU = 0.34
 CLOSING = 37.0
@@ -63,7 +62,6 @@ def by_enumeration(finger, before, shift, turn, tension=None):
         for i, state in enumerate(pattern):
             if state == 0:
                 laws[i, 2 * n + i] = 1.0
-                rest[i] = -before.slack if tension is None and i == 0 else 0.0
             else:
                 # slack (2): no tension; else t_i = (1 ∓ μ) t_{i−1}
                 ratio = 0.0 if state == 2 else 1.0 - state * mu[i]
@@ -79,102 +77,37 @@ def by_enumeration(finger, before, shift, turn, tension=None):
         low, high = (1.0 - mu) * before_boundary, (1.0 + mu) * before_boundary
         if tension is None:
             low[0], high[0] = 0.0, np.inf
-        slipped = v + (before.slack if tension is None else 0.0) * (np.arange(n) == 0)
         fits = (t >= low - 1e-9).all() and (t <= high + 1e-9).all()
         ways = np.where(np.array(pattern) == 2, 1, pattern)
-        if fits and (slipped * ways >= -1e-12).all():
+        if fits and (v * ways >= -1e-12).all():
             found.append((d, t))
     return found
 
 
-def assert_only_solution(finger, before, after, shift, turn, tension=None):
-    found = by_enumeration(finger, before, shift, turn, tension)
-    assert found
-    for d, t in found:
-        np.testing.assert_allclose(after.tensions, t, rtol=1e-8, atol=1e-8)
-        np.testing.assert_allclose(after.tile_travel - before.tile_travel, d, atol=1e-10)
-
-
-@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
-def test_random_fingers_move_as_the_only_consistent_state(count):
-    """Each through a history: closing, a change of load, and another from there."""
-    rng = np.random.default_rng(1)
-    for _ in range(count):
-        finger = random_finger(rng)
-        n = len(finger.pulley_radii)
-        before = finger.closed(rng.uniform(5.0, 200.0), rng.uniform(0.0, 20.0, n))
-        for _ in range(2):
-            shift, turn = random_motion(rng, n)
-            tension = before.motor_tension * rng.choice([1.0, rng.uniform(0.3, 2.0)])
-            after = finger.at_tension(before, tension, shift, turn)
-            assert_only_solution(finger, before, after, shift, turn, tension)
-            before = after
-
-
-def test_with_the_motor_held_too_the_solution_is_the_only_one():
+def test_with_the_motor_held_the_solution_is_the_only_one():
     rng = np.random.default_rng(2)
     slackened = 0
-    for _ in range(300):
+    for _ in range(500):
         finger = random_finger(rng)
         n = len(finger.pulley_radii)
         before = finger.closed(rng.uniform(5.0, 200.0), rng.uniform(0.0, 20.0, n))
-        for _ in range(3):
-            shift, turn = random_motion(rng, n)
-            after = finger.held(before, 10.0 * shift, turn)
-            assert_only_solution(finger, before, after, 10.0 * shift, turn)
-            slackened += after.slack > 0.0
-            before = after
-    assert slackened > 50
+        shift, turn = random_motion(rng, n)
+        after = finger.held(before, 10.0 * shift, turn)
+        found = by_enumeration(finger, before, 10.0 * shift, turn)
+        assert found
+        for d, t in found:
+            np.testing.assert_allclose(after.tensions, t, rtol=1e-8, atol=1e-8)
+            moved = np.array(finger.contact_stiffness) * (10.0 * shift + d)
+            np.testing.assert_allclose(after.shears - before.shears, moved, atol=1e-6)
+        slackened += after.tensions.max() == 0.0
+    assert slackened > 30
 
 
 def test_a_sticking_tendon_gives_equation_20_by_hand():
     """δl = −r δq / c_p: 0.02 rad on 5.5, 3.08 and 2.69 mm wind 55.0, 30.8 and 26.9 µm off."""
     state = SLIDING.held(SLIDING.closed(CLOSING, ENGAGED), [1e-3] * 3, [0.02] * 3)
     wound = np.array([55.0e-6, 30.8e-6, 26.9e-6])
-    np.testing.assert_allclose(state.tile_travel, -wound, rtol=1e-9)
     np.testing.assert_allclose(state.shears - ENGAGED, (1e-3 - wound) * 1e4, rtol=1e-9)
-    np.testing.assert_allclose(state.tendon_travel, 0.0, atol=1e-15)
-
-
-def test_the_first_tile_sticks_until_25_newtons():
-    """With Section 5.2's bound on the first element: δT = μ c_p f = 0.34 · 2 · 37 N = 25.16 N."""
-    finger = replace(SLIDING, entry_friction=MU)
-    closed = finger.closed(CLOSING, ENGAGED)
-    bound = 0.34 * 2.0 * 37.0
-    # in proportion to the tensions, so that nothing slips further out
-    shift = bound / K * closed.tensions / CLOSING
-    below = finger.at_tension(closed, CLOSING, 0.999 * shift)
-    assert below.shears[0] - ENGAGED[0] == pytest.approx(0.999 * 25.16)
-    np.testing.assert_allclose(below.tendon_travel, 0.0, atol=1e-12)
-    beyond = finger.at_tension(closed, CLOSING, 1.5 * shift)
-    assert beyond.tensions[0] == pytest.approx(1.34 * CLOSING)
-    assert beyond.tendon_travel[0] < 0.0
-    # beyond it the springs alone take the motion: the tile stays behind, K_p and k in series
-    assert beyond.shears[0] - ENGAGED[0] == pytest.approx(bound + 0.5 * bound * KP / (K + KP))
-
-
-@pytest.mark.parametrize("mu", [0.0, 0.1, MU])
-def test_more_tension_loads_the_tiles_by_the_affine_law(mu):
-    """T = M (T_e + g (f − f_close)), in one step or in many."""
-    finger = replace(SLIDING, friction=mu)
-    losses = (1.0 - mu) ** np.arange(3)
-    state = finger.closed(CLOSING, losses * ENGAGED)
-    for tension in (37.5, 45.0, 90.0):
-        state = finger.at_tension(state, tension)
-        expected = losses * (ENGAGED + GAIN * (tension - CLOSING))
-        np.testing.assert_allclose(state.shears, expected, rtol=1e-12)
-
-
-def test_below_the_closing_tension_the_far_tiles_keep_their_shear():
-    """The tendon sticks at a joint until t_i = (1 + μ) t_{i−1}; then that tile follows."""
-    closed = SLIDING.closed(CLOSING, ENGAGED)
-    start = closed.tensions
-    for tension in np.linspace(CLOSING, 0.0, 30):
-        second = min(start[1], 1.34 * tension)
-        expected = np.array([tension, second, min(start[2], 1.34 * second)])
-        state = SLIDING.at_tension(closed, tension)
-        np.testing.assert_allclose(state.tensions, expected, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(state.shears, ENGAGED + GAIN * (expected - start), atol=1e-9)
 
 
 def test_without_friction_the_tension_is_the_same_everywhere():
@@ -188,20 +121,6 @@ def test_without_friction_the_tension_is_the_same_everywhere():
     assert state.motor_tension == pytest.approx(CLOSING + rise)
 
 
-def test_a_slack_tendon_pulls_again_only_when_its_slack_is_used_up():
-    closed = SLIDING.closed(CLOSING, ENGAGED)
-    loose = SLIDING.held(closed, [-0.02] * 3)
-    assert loose.slack == pytest.approx(3.0 * CP * K * 0.02 / (K + KP) - CP**2 / (K + KP) * 77.5372)
-    assert (loose.tensions == 0.0).all()
-    looser = SLIDING.held(loose, [-0.01] * 3)
-    assert looser.slack == pytest.approx(loose.slack + 3.0 * CP * K * 0.01 / (K + KP))
-    almost = SLIDING.held(loose, [0.8 * loose.slack * (K + KP) / (3.0 * CP * K)] * 3)
-    assert almost.slack == pytest.approx(0.2 * loose.slack)
-    taut = SLIDING.held(loose, [0.02] * 3)
-    assert taut.slack == 0.0
-    assert taut.tensions.min() > 0.0
-
-
 def test_a_held_motor_feels_only_what_the_entry_cannot_hold():
     finger = replace(SLIDING, entry_friction=MU)
     closed = finger.closed(CLOSING, ENGAGED)
@@ -210,85 +129,6 @@ def test_a_held_motor_feels_only_what_the_entry_cannot_hold():
     assert little.tensions[0] == pytest.approx(CLOSING + K * 1e-3 / CP)
     much = finger.held(closed, [4e-3] * 3)
     assert much.motor_tension == pytest.approx(much.tensions[0] / 1.34)
-
-
-history = st.lists(
-    st.tuples(
-        st.one_of(st.none(), st.floats(0.0, 300.0)),
-        st.lists(st.floats(-5e-3, 5e-3), min_size=4, max_size=4),
-        st.lists(st.floats(-0.3, 0.3), min_size=4, max_size=4),
-    ),
-    min_size=1,
-    max_size=5,
-)
-
-
-@settings(max_examples=150)
-@given(st.integers(0, 10**6), history)
-def test_friction_takes_energy_and_tendons_only_pull(seed, steps):
-    """The work put in is at least what the springs and contacts store.
-
-    From T = c_p t − K_p d + const and the tendon's length, T δx − t r δq + f v_1 is the change of
-    the stored T²/2k + K_p d²/2 − const d, plus what the boundaries dissipate.
-    """
-    rng = np.random.default_rng(seed)
-    finger = random_finger(rng)
-    n, k = len(finger.pulley_radii), np.array(finger.contact_stiffness)
-    kp, r = finger.spring_stiffness, np.array(finger.pulley_radii)
-    grips = k > 0.0
-    state = finger.closed(rng.uniform(0.0, 200.0), np.where(grips, rng.uniform(0.0, 20.0, n), 0.0))
-    offset = state.shears - finger.pulley_ratio * state.tensions
-    mu = np.full(n, finger.friction)
-
-    def stored(s):
-        contact = s.shears[grips] ** 2 / (2.0 * k[grips])
-        return contact.sum() + (kp * s.tile_travel**2 / 2.0 - offset * s.tile_travel).sum()
-
-    for tension, shift, turn in steps:
-        shift, turn = np.array(shift[:n]), np.array(turn[:n])
-        held = tension is None
-        after = (
-            finger.held(state, shift, turn)
-            if held
-            else finger.at_tension(state, tension, shift, turn)
-        )
-        assert after.tensions.min() >= 0.0
-        assert after.slack >= 0.0
-        assert after.motor_tension >= 0.0
-        before_boundary = np.concatenate([[after.motor_tension], after.tensions[:-1]])
-        moved = after.tendon_travel - state.tendon_travel
-        lost = (before_boundary - after.tensions) * moved
-        # (a slack that is taken up passes the first boundary before there is any friction)
-        assert lost[1:].min(initial=0.0) >= -1e-9
-        mu[0] = finger.entry_friction
-        within = np.abs(after.tensions - before_boundary) <= mu * before_boundary + 1e-6
-        assert within.all()
-        balance = finger.pulley_ratio * after.tensions - kp * after.tile_travel + offset
-        np.testing.assert_allclose(after.shears, balance, atol=1e-6)
-        work = (after.shears * shift - after.tensions * r * turn).sum()
-        work += after.tensions[0] * moved[0]
-        assert work >= stored(after) - stored(state) - 1e-6
-        state = after
-
-
-@pytest.mark.parametrize("held", [True, False])
-def test_a_cycle_of_load_leaves_a_loop(held):
-    """Half way back, the shear is not what it was half way up; without friction it is."""
-
-    def halves(finger):
-        state, found = finger.closed(CLOSING, ENGAGED), []
-        for shift in (3e-3, 3e-3, -3e-3):
-            motion = np.array([0.0, 0.0, shift])
-            state = (
-                finger.held(state, motion) if held else finger.at_tension(state, CLOSING, motion)
-            )
-            found.append(state.shears[2])
-        return found[0], found[2]
-
-    up, back = halves(SLIDING)
-    assert back < up - 1.0
-    up, back = halves(replace(SLIDING, friction=0.0))
-    assert back == pytest.approx(up)
 
 
 def test_a_tile_on_the_base_comes_first_and_has_no_joint():
@@ -336,17 +176,15 @@ def test_impossible_tendons_are_refused_by_field(change, field):
 @pytest.mark.parametrize(
     ("arguments", "field"),
     [
-        ((-1.0,), "tension"),
-        ((float("inf"),), "tension"),
-        ((10.0, [0.0, 0.0]), "shift"),
-        ((10.0, [0.0, 0.0, float("nan")]), "shift"),
-        ((10.0, None, [0.0] * 4), "turn"),
+        (([0.0, 0.0],), "shift"),
+        (([0.0, 0.0, float("nan")],), "shift"),
+        ((None, [0.0] * 4), "turn"),
     ],
 )
 def test_impossible_changes_of_load_are_refused_by_field(arguments, field):
     state = SLIDING.closed(CLOSING, ENGAGED)
     with pytest.raises(InvalidInputError) as caught:
-        SLIDING.at_tension(state, *arguments)
+        SLIDING.held(state, *arguments)
     assert caught.value.field == field
 
 
@@ -365,10 +203,11 @@ def test_tiles_partly_on_the_rock_give_that_part_of_a_whole_tiles_shear():
     some = whole.engaged(share)
     assert some.contact_stiffness[0] == whole.contact_stiffness[0]
     assert some.contact_stiffness[2] == 0.0
-    slips = np.array([1e-4, -2e-4, 3e-4])
-    for tension, shift in ((50.0, None), (37.0, slips), (60.0, slips)):
-        drags = [
-            tendon.at_tension(tendon.closed(CLOSING, part * ENGAGED), tension, shift).shears
-            for tendon, part in ((whole, 1.0), (some, share))
-        ]
-        np.testing.assert_allclose(drags[1], share * drags[0], rtol=1e-12, atol=1e-12)
+    slips = np.array([[1e-4, -2e-4, 3e-4], [0.0, 0.0, 0.0]])
+    drags = [
+        TendonRegimes(tendon, tendon.closed(CLOSING, part * ENGAGED), "tension")
+        .respond(slips, np.zeros((2, 3)))
+        .shears
+        for tendon, part in ((whole, 1.0), (some, share))
+    ]
+    np.testing.assert_allclose(drags[1], share * drags[0], rtol=1e-12, atol=1e-12)

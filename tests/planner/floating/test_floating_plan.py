@@ -118,7 +118,7 @@ def pressed(model, section, contact, depth):
     places = np.linspace(near, far, 20001)
     u = np.array([math.cos(contact.angle), math.sin(contact.angle)])
     face = np.outer(places, u) + contact.joint + model.tile_height * np.array([-u[1], u[0]])
-    away = np.array(section.centre) - face
+    away = np.array([section.centre.real, section.centre.imag]) - face
     # up to the fourth order the distance from the circle, of parabolas
     heights = (away @ u) ** 2 / (2.0 * section.radius)
     pressures = np.maximum(depth - heights, 0.0)
