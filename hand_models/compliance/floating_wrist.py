@@ -77,8 +77,8 @@ class FloatingWrist:
     def _planes(self) -> tuple[Indices, Array, Array, Array, Array]:
         """Of `RowLayout.planes`, capacities of each tile's spines on the rock."""
         settled = self.hand.settled
-        tile, *slopes, capacity = self.layout.planes(settled.surface)
-        a_shear, a_normal, a_lateral = slopes
+        tile, (planes,) = self.layout.plane_tiles, self.layout.planes([settled.surface])
+        a_shear, a_normal, a_lateral, capacity = planes.T
         return tile, a_shear, a_normal, a_lateral, capacity * settled.engagement[tile]
 
     @property
