@@ -83,7 +83,8 @@ class FloatingWrist(CompliantGrasp):
         stop = palm + 2
         size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD)
         P, p, s = np.zeros((nl, size)), np.zeros(nl), np.full(len(layout.limits), np.nan)
-        tile, *slopes, capacity = layout.planes(settled.surface)
+        tile, (planes,) = layout.plane_tiles, layout.planes([settled.surface])
+        *slopes, capacity = planes.T
         k = len(tile)
         for part, slope in enumerate(slopes):
             P[np.arange(k), part * n + tile] = slope

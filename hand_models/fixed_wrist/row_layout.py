@@ -28,7 +28,6 @@ __all__ = [
     "layout_of",
     "named_row",
     "row_layout",
-    "surface_planes",
 ]
 
 PALM_SHEAR = "palm_shear"
@@ -43,8 +42,12 @@ KEPT: Final = 512
 """Layouts that are kept, those used last; each takes some 30 kB."""
 
 
+_Name = tuple[str | None, str | None, str, str]
+"""Finger, phalanx and limit of a row, and what tells it from others of the same names."""
+
+
 @lru_cache(maxsize=256)
-def surface_planes(surface: Surface) -> Array:
+def _surface_planes(surface: Surface) -> Array:
     """Return the half-planes of whole tiles on a surface, shape (p, 4).
 
     Coefficients of shear, normal and lateral load, and capacity [N].
@@ -106,48 +109,32 @@ class RowLayout:
     palm: bool
     sticking: bool
 
-    def planes(self, surface: Surface) -> tuple[Indices, Array, Array, Array, Array]:
-        """Return what each of the tiles' limit rows says.
+    def planes(self, surfaces: Sequence[Surface]) -> Array:
+        """Return what each of the k limit rows of tiles says on some surfaces, shape (n, k, 4).
 
-        Returns
-        -------
-        tile : ndarray of int
-        a_shear, a_normal, a_lateral : ndarray
-            Its coefficients, the last with its sign.
-        capacity : ndarray
-            Of a whole tile [N].
+        Its coefficients of shear, normal and lateral load, the last with its sign, and the capacity
+        of a whole tile [N].
         """
-        shear, normal, lateral, capacity = surface_planes(surface)[self.plane_pieces].T
-        return self.plane_tiles, shear, normal, lateral * self.plane_signs, capacity
+        signs = np.ones((len(self.plane_signs), 4))
+        signs[:, 2] = self.plane_signs
+        planes = np.array([_surface_planes(surface) for surface in surfaces])
+        return np.asarray(planes[:, self.plane_pieces] * signs)
 
 
 def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
     """Return the rows of a settled hand; ``sticking`` as of `RowLayout`."""
-    return _layout_on(
-        settled.tiles,
+    # nothing depends on what of a tile touches, and of a surface only the names
+    alike = [
+        tile if tile.contact != "edge" else tile._replace(contact="face") for tile in settled.tiles
+    ]
+    return row_layout(
+        tuple(alike),
         settled.grasp.lateral,
-        settled.surface,
+        tuple([piece.limit for piece in inner_half_planes(settled.surface)]),
         tuple([(finger, joint) for finger, joint, _ in settled.stops]),
         bool(settled.palm.engaged),
         sticking,
     )
-
-
-@lru_cache(maxsize=4 * KEPT)
-def _layout_on(
-    tiles: tuple[Tile, ...],
-    lateral: bool,
-    surface: Surface,
-    stops: tuple[tuple[int, int], ...],
-    palm: bool,
-    sticking: bool,
-) -> RowLayout:
-    # nothing depends on what of a tile touches, and of a surface only the names
-    alike = tuple(
-        tile if tile.contact != "edge" else tile._replace(contact="face") for tile in tiles
-    )
-    names = tuple(piece.limit for piece in inner_half_planes(surface))
-    return row_layout(alike, lateral, names, stops, palm, sticking)
 
 
 @lru_cache(maxsize=KEPT)
@@ -190,51 +177,44 @@ def row_layout(
     nail_columns = range(len(columns), len(columns) + len(nails))
     clinging = [tiles[i].finger for i in nails]
     columns += [f"{finger}/{NAIL}" for finger in clinging]
-    limits, hard = [], []
-    planes: list[tuple[int, int, int]] = []
     signs = (("+", 1), ("-", -1)) if lateral else (("", 0),)
-    for i in touching:
-        finger, phalanx = tiles[i].finger, tiles[i].phalanx
-        pulls = 0
-        for k, piece in enumerate(pieces):
-            pulls += piece == "pull_off"
-            label = f"{finger}/{phalanx}/{piece}" + (f"_{pulls}" if pulls > 1 else "")
-            for name, sign in signs:
-                limits.append(Row(finger, phalanx, piece, "limit", label + name))
-                planes.append((i, k, sign))
-    for name in TENDON_LIMITS:
-        limits += [named_row(finger, None, name, "limit") for finger in FINGERS]
-    limits += [named_row(FINGERS[i], None, "finger_shear", "limit") for i in engaged]
-    limits += [named_row(tiles[i].finger, "distal", FINGERTIP_FORCE, "limit") for i in tips]
+    pulls = [pieces[: k + 1].count("pull_off") for k in range(len(pieces))]
+    limits: list[_Name] = [
+        (*tiles[i][:2], piece, (f"_{count}" if count > 1 else "") + sign)
+        for i in touching
+        for piece, count in zip(pieces, pulls, strict=True)
+        for sign, _ in signs
+    ]
+    planes = [(i, k, sign) for i in touching for k in range(len(pieces)) for _, sign in signs]
+    limits += [(finger, None, name, "") for name in TENDON_LIMITS for finger in FINGERS]
+    limits += [(FINGERS[i], None, "finger_shear", "") for i in engaged]
+    limits += [(tiles[i].finger, "distal", FINGERTIP_FORCE, "") for i in tips]
+    limits += [
+        (each, NAIL, name, "") for each in clinging for name in (NAIL_SHEAR, FINGERTIP_FORCE)
+    ]
+    hard: list[_Name] = [(finger, None, "slack_tendon", "") for finger in FINGERS]
+    hard += [(*tiles[i][:2], "dragged_backwards", "") for i in touching]
+    hard += [(*tiles[i][:2], "frame_pulled", "") for i in frames]
+    hard += [(FINGERS[i], PHALANGES[joint], "joint_stop", "") for i, joint in stops]
     for finger in clinging:
-        limits += [named_row(finger, NAIL, name, "limit") for name in (NAIL_SHEAR, FINGERTIP_FORCE)]
-    hard += [named_row(finger, None, "slack_tendon", "hard") for finger in FINGERS]
-    for name, those in (("dragged_backwards", touching), ("frame_pulled", frames)):
-        hard += [named_row(tiles[i].finger, tiles[i].phalanx, name, "hard") for i in those]
-    for finger_index, joint in stops:
-        hard.append(named_row(FINGERS[finger_index], PHALANGES[joint], "joint_stop", "hard"))
-    for finger in clinging:
-        for name, label in (("nail_lifts", ""), ("nail_slips", "+"), ("nail_slips", "-")):
-            hard.append(Row(finger, NAIL, name, "hard", f"{finger}/{NAIL}/{name}{label}"))
-        hard += [named_row(finger, phalanx, "joint_stop", "hard") for phalanx in PHALANGES]
+        hard.append((finger, NAIL, "nail_lifts", ""))
+        hard += [(finger, NAIL, "nail_slips", sign) for sign in "+-"]
+        hard += [(finger, phalanx, "joint_stop", "") for phalanx in PHALANGES]
     if sticking:
-        hard += [named_row(FINGERS[i], None, "tendon_sticks", "hard") for i in drawing]
+        hard += [(FINGERS[i], None, "tendon_sticks", "") for i in drawing]
     if palm:
         columns += [PALM_SHEAR, PALM_PRESSING]
-        limits += [Row(None, None, name, "limit", name) for name in (PALM_SHEAR, PALM_PRESSING)]
-        hard += [
-            Row(None, None, f"{name}_reversed", "hard", f"{name}_reversed")
-            for name in (PALM_SHEAR, PALM_PRESSING)
-        ]
-    limits += [
-        Row(None, None, HAND_LOAD, "limit", f"{HAND_LOAD}/{k + 1}") for k in range(len(HELD))
-    ]
+        limits += [(None, None, name, "") for name in (PALM_SHEAR, PALM_PRESSING)]
+        hard += [(None, None, f"{name}_reversed", "") for name in (PALM_SHEAR, PALM_PRESSING)]
+    limits += [(None, None, HAND_LOAD, f"/{k + 1}") for k in range(len(HELD))]
+    limit_rows = tuple([named_row(*each[:3], "limit", each[3]) for each in limits])
+    hard_rows = tuple([named_row(*each[:3], "hard", each[3]) for each in hard])
     plane_tiles, plane_pieces, plane_signs = np.array(planes, dtype=np.intp).reshape(-1, 3).T
     return RowLayout(
         columns=tuple(columns),
-        limits=tuple(limits),
-        hard=tuple(hard),
-        rows=(*limits, *hard),
+        limits=limit_rows,
+        hard=hard_rows,
+        rows=limit_rows + hard_rows,
         finger_of=_kept(finger_of),
         touching=_kept(touching),
         frames=_kept(frames),
@@ -261,7 +241,13 @@ def _kept(numbers: Sequence[int] | Indices) -> Indices:
     return array
 
 
-def named_row(finger: str, phalanx: str | None, limit: str, kind: Literal["limit", "hard"]) -> Row:
-    """Return a row of a finger, labelled by its names."""
+def named_row(
+    finger: str | None,
+    phalanx: str | None,
+    limit: str,
+    kind: Literal["limit", "hard"],
+    more: str = "",
+) -> Row:
+    """Return a row, labelled by its names and what tells it from others of the same ones."""
     label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
-    return Row(finger, phalanx, limit, kind, label)
+    return Row(finger, phalanx, limit, kind, label + more)

@@ -120,10 +120,7 @@ def best_seats(
     stored = zip(keys, hand.seated_best.find(keys), strict=True)
     known: dict[Hashable, SettledHand | InvalidInputError | None] = dict(stored)
     new = {key: each for key, each in zip(keys, placements, strict=True) if known[key] is None}
-    search = _Search(hand, list(new.values()), d)
-    search.look([(*FIRST, *own) for own in search.resting()])
-    search.look([[] if found is None else _about(found.move) for found in search.best])
-    found = dict(zip(new, search.outcomes(), strict=True))
+    found = dict(zip(new, _searched(hand, list(new.values()), d), strict=True)) if new else {}
     hand.seated_best.keep(
         [(key, each) for key, each in found.items() if isinstance(each, SettledHand)]
     )
@@ -148,58 +145,48 @@ def _reach(space: WrenchSpace, direction: Array) -> tuple[float, float]:
         return -math.inf, -math.inf
 
 
-class _Search:
-    """Hands that look for their seats."""
+def _searched(
+    hand: SpinyHand, placements: Sequence[Placement], direction: Array
+) -> list[SettledHand | InvalidInputError]:
+    """Return hands where they hold most, of all places of both stages."""
+    seats = seated(hand, placements)
+    refused: list[InvalidInputError | None] = [None] * len(placements)
+    best: list[_Found | None] = [None] * len(placements)
 
-    def __init__(self, hand: SpinyHand, placements: Sequence[Placement], direction: Array) -> None:
-        self._hand, self._placements, self._direction = hand, placements, direction
-        self._seats = seated(hand, placements)
-        self._refused: list[InvalidInputError | None] = [None] * len(placements)
-        self.best: list[_Found | None] = [None] * len(placements)
-
-    def resting(self) -> list[list[_Move]]:
-        """Return each hand's move to where it comes to rest, if it backs off for that."""
-        moves: list[list[_Move]] = []
-        for rest in self._hand.settle_each(self._placements):
-            off = 0.0
-            if isinstance(rest, SettledHand):
-                off = rest.seating.backed_off / self._hand.back_off
-            moves.append([] if off in OFFS else [_Move(off, 0.0)])
-        return moves
-
-    def look(self, moves: Sequence[Iterable[_Move]]) -> None:
+    def look(moves: Sequence[Iterable[_Move]]) -> None:
         """Close each hand at each of its places, and keep the best of them."""
         tries = [(i, move) for i, own in enumerate(moves) for move in own]
-        frames = [move.of(self._hand) for _, move in tries]
-        outcomes = self._hand.settle_each(
+        outcomes = hand.settle_each(
             [
-                self._placements[i]._replace(
-                    hold_in_hand=frame.inverse() @ self._seats[i].pose, at=None
+                placements[i]._replace(
+                    hold_in_hand=move.of(hand).inverse() @ seats[i].pose, at=None
                 )
-                for (i, _), frame in zip(tries, frames, strict=True)
+                for i, move in tries
             ]
         )
-        hands = [each for each in outcomes if isinstance(each, SettledHand)]
-        spaces = iter(wrench_spaces(hands))
+        spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
         for (i, move), outcome in zip(tries, outcomes, strict=True):
             if isinstance(outcome, InvalidInputError):
-                self._refused[i] = self._refused[i] or outcome
+                refused[i] = refused[i] or outcome
                 continue
             go_on()
-            reach = _reach(next(spaces), self._direction)
-            best = self.best[i]
-            if best is None or reach > best.reach:
-                self.best[i] = _Found(reach, move, outcome)
+            reach, known = _reach(next(spaces), direction), best[i]
+            if known is None or reach > known.reach:
+                best[i] = _Found(reach, move, outcome)
 
-    def outcomes(self) -> list[SettledHand | InvalidInputError]:
-        """Return the hands where they hold most."""
-        found: list[SettledHand | InvalidInputError] = []
-        for best, refused in zip(self.best, self._refused, strict=True):
-            if best is None:
-                assert refused is not None
-                found.append(refused)
-                continue
-            seating = best.settled.seating
-            off = self._hand.back_off * best.move.off
-            found.append(replace(best.settled, seating=Seating(seating.pose, BEST, off)))
-        return found
+    # first also where a hand comes to rest that backs off for that
+    rests = [
+        each.seating.backed_off / hand.back_off if isinstance(each, SettledHand) else 0.0
+        for each in hand.settle_each(placements)
+    ]
+    look([FIRST if off in OFFS else (*FIRST, _Move(off, 0.0)) for off in rests])
+    look([[] if found is None else _about(found.move) for found in best])
+    outcomes: list[SettledHand | InvalidInputError] = []
+    for found, error in zip(best, refused, strict=True):
+        if found is None:
+            assert error is not None
+            outcomes.append(error)
+            continue
+        seating = Seating(found.settled.seating.pose, BEST, hand.back_off * found.move.off)
+        outcomes.append(replace(found.settled, seating=seating))
+    return outcomes

@@ -6,7 +6,7 @@ and the palm's shear and pressing. Everything is affine in them:
     w = Σ_tiles W_t (c_sys + f c_act) + lateral and palm loads = o + V y,
 
 and so are the loads of the motors and of the structure. All hands of a stance are worked out
-together, those with the same rows and columns in arrays of all of them (`AlikeHands`).
+together, those with the same rows and columns in arrays of all of them (`alike_hands`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,13 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
-from hand_models.fixed_wrist.alike_hands import HELD_ROWS, AlikeHands
+from hand_models.base import InvalidInputError
+from hand_models.fixed_wrist.alike_hands import (
+    HELD_ROWS,
+    hard_rows,
+    limit_rows,
+    wrench_columns,
+)
 from hand_models.fixed_wrist.row_layout import RowLayout, layout_of
 from hand_models.hand import HandModel, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
@@ -96,32 +101,25 @@ def _worked_out(limits: Mapping[SettledHand, float]) -> Iterator[tuple[SettledHa
         layout = layout_of(hand, sticking=hand.hand.finger.friction > 0.0)
         alike.setdefault((layout, hand.hand), []).append(hand)
     for (layout, model), hands in alike.items():
+        at_zero, V = wrenches = wrench_columns(layout, hands)
         most = np.array([limits[hand] for hand in hands])
-        yield from zip(hands, _of_layout(layout, model, hands, most), strict=True)
-
-
-def _of_layout(
-    layout: RowLayout, model: HandModel, hands: Sequence[SettledHand], most: Array
-) -> list[WrenchSpace]:
-    """Return the sets of hands with the same rows and columns; ``most`` tension of each (h,)."""
-    alike = AlikeHands.of(layout, model, hands, most)
-    at_zero, V = alike.wrenches()
-    L, l0, s = alike.limits(at_zero, V)
-    H, h = alike.hard()
-    for array in (at_zero, V, L, l0, s, H, h):
-        array.setflags(write=False)
-    return [
-        WrenchSpace(
-            origin=at_zero[i, :6],
-            generators=V[i, :6],
-            columns=layout.columns,
-            rows=layout.rows,
-            L=L[i],
-            l0=l0[i],
-            s=s[i],
-            H=H[i],
-            h=h[i],
-            D=HELD_ROWS,
-        )
-        for i in range(len(hands))
-    ]
+        L, l0, s = limit_rows(layout, model, hands, most, wrenches)
+        H, h = hard_rows(layout, hands)
+        for array in (at_zero, V, L, l0, s, H, h):
+            array.setflags(write=False)
+        for i, hand in enumerate(hands):
+            yield (
+                hand,
+                WrenchSpace(
+                    origin=at_zero[i, :6],
+                    generators=V[i, :6],
+                    columns=layout.columns,
+                    rows=layout.rows,
+                    L=L[i],
+                    l0=l0[i],
+                    s=s[i],
+                    H=H[i],
+                    h=h[i],
+                    D=HELD_ROWS,
+                ),
+            )
