@@ -43,14 +43,11 @@ class Posture:
         What every limb's joints bear.
     body_wrench : ndarray, shape (6,)
         That the rock must exert on the robot for its own weight and acceleration, in B.
-    solved : bool
-        Whether the angles were found, not given.
     """
 
     angles: Mapping[str, Array]
     joints: Mapping[str, JointLoads]
     body_wrench: Array
-    solved: bool
 
 
 def posture(question: Question) -> Posture | None:
@@ -102,7 +99,6 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
             for limb in robot.limbs
         },
         body_wrench=statics.body_wrench,
-        solved=isinstance(question.stance.joints, str),
     )
 
 

@@ -67,10 +67,7 @@ class Load:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-        x, y, z = com.tolist()
-        fx, fy, fz = force.tolist()
-        moment = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
-        return checked_body_wrench(np.array([fx, fy, fz, *moment]), None)
+        return checked_body_wrench(np.concatenate([force, np.cross(com, force)]), None)
 
 
 @dataclass(frozen=True)

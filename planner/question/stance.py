@@ -78,10 +78,7 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
 
 def _possible(pose: Pose, field: str) -> None:
     """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
-    if pose.proper:
-        position = pose.position.tolist()
-    else:
-        position = finite_vector(pose.position, 3, f"{field}.position").tolist()
+    position = finite_vector(pose.position, 3, f"{field}.position").tolist()
     if max(map(abs, position)) > FARTHEST:
         raise InvalidInputError(
             f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"

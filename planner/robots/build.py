@@ -180,7 +180,7 @@ def _mounted(
     link = model.frames[model.getFrameId(mount.link, pin.FrameType.BODY)]
     shoulder, reach = _bound(model, ids, columns.start, pose_of(link.placement))
     if reach <= ON_AXIS:
-        reach = float(np.linalg.norm(mount.position))
+        reach = float(np.linalg.norm(mount.pose.position))
     if reach <= ON_AXIS:
         raise InvalidInputError(
             "the limb's joints only turn the hand in its place; it must be away from them",

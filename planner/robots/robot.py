@@ -127,26 +127,11 @@ class Robot:
             return self._local.data
 
     def configuration(self, angles: Mapping[str, Array]) -> Array:
-        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin.
-
-        Raises
-        ------
-        InvalidInputError
-            If a limb is unknown, or its angles are not as many finite numbers as it has joints.
-        """
+        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin."""
         q = np.array(pin.neutral(self.model))
         for limb, given in angles.items():
-            self.known(limb, "joints")
-            chain = self.chains[limb]
-            chain.turn(q, finite_vector(given, len(chain.joints), f"joints.{limb}"))
+            self.chains[limb].turn(q, given)
         return q
-
-    def known(self, limb: str, field: str) -> None:
-        """Refuse a limb that the robot does not have."""
-        if limb not in self.chains:
-            raise InvalidInputError(
-                f"unknown limb {limb!r}; known are {', '.join(self.limbs)}", field=field
-            )
 
     def hand_poses(self, angles: Mapping[str, Array]) -> dict[str, Pose]:
         """Return every limb's H in B."""
@@ -262,9 +247,5 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
 
 @cache
 def _bundled() -> RobotFile:
-    folder = resources.files("planner.parameters")
-    toml, urdf = (
-        folder.joinpath(f"robosimian.{kind}").read_text(encoding="utf-8")
-        for kind in ("toml", "urdf")
-    )
-    return RobotFile("robosimian", toml, urdf, "robosimian.toml")
+    with resources.as_file(resources.files("planner.parameters")) as folder:
+        return RobotFile.load(folder / "robosimian.toml")

@@ -83,7 +83,7 @@ class RobotFile:
         return cls(described.name, toml, urdf, str(path))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mount:
     """Where a hand sits, and what the joints of its limb bear.
 
@@ -91,10 +91,8 @@ class Mount:
     ----------
     link : str
         The link that carries it.
-    position : tuple of float
-        Origin of H in the link [m].
-    orientation : tuple of float
-        Quaternion ``[x, y, z, w]`` of H in the link.
+    pose : Pose
+        H in the link.
     hand_com : tuple of float
         The hand's centre of mass in H [m].
     torque_limits : tuple of float
@@ -102,15 +100,9 @@ class Mount:
     """
 
     link: str
-    position: tuple[float, ...]
-    orientation: tuple[float, ...]
+    pose: Pose
     hand_com: tuple[float, ...]
     torque_limits: tuple[float, ...]
-
-    @property
-    def pose(self) -> Pose:
-        """H in the link."""
-        return Pose.from_quaternion(self.position, self.orientation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +141,8 @@ class RobotDescription:
             raw = tomllib.loads(toml)
         except tomllib.TOMLDecodeError as error:
             raise InvalidInputError(str(error)) from None
-        name, urdf, body = (_string(raw.get(each), each) for each in TEXTS)
-        _named(name, "name")
+        called, urdf, body = (_string(raw.get(name), name) for name in TEXTS)
+        _named(called, "name")
         for name in raw:
             if name not in (*TEXTS, "robot", "every_limb", "limbs"):
                 raise InvalidInputError(
@@ -173,7 +165,7 @@ class RobotDescription:
             link = _string(entries.pop("link", None), f"{section}.link")
             mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(name, urdf, body, com, mounts)
+        return cls(called, urdf, body, com, mounts)
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -241,12 +233,14 @@ def _triple(table: ParameterTable, section: str, name: str) -> tuple[float, ...]
 
 
 def _mount(link: str, table: ParameterTable, section: str) -> Mount:
-    orientation = table.vector(section, "orientation")
+    position, orientation = (
+        _triple(table, section, "position"),
+        table.vector(section, "orientation"),
+    )
     try:
-        Pose.from_quaternion((0.0, 0.0, 0.0), orientation)
+        pose = Pose.from_quaternion(position, orientation)
     except InvalidInputError as error:
         raise error.within(section) from None
-    position = _triple(table, section, "position")
     given = "hand_com" in table.sections[section]
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
     value = table.quantity(section, "torque_limit").value
@@ -256,7 +250,7 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
             f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
-    return Mount(link, position, orientation, hand_com, limits)
+    return Mount(link, pose, hand_com, limits)
 
 
 def _quoted(values: tuple[float, ...]) -> str:

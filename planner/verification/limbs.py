@@ -108,7 +108,7 @@ def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) 
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
-    most_off, most_turned = FOUND if where.solved else PLACED
+    most_off, most_turned = FOUND if isinstance(stance.joints, str) else PLACED
     body = stance.body.inverse()
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]

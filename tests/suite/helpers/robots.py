@@ -3,6 +3,9 @@
 from itertools import pairwise
 from types import SimpleNamespace
 
+import numpy as np
+
+from hand_models.base import Pose
 from planner.robots import Robot
 from planner.robots.robot_file import Mount, RobotDescription
 
@@ -52,7 +55,7 @@ def urdf(*parts):
 def bare_robot(text, body, hands, hand_mass, com=(0.0, 0.0, 0.0)):
     """A robot whose hands are points of that mass; ``hands``: each limb's link and place there."""
     mounts = {
-        limb: Mount(link, place, (0.0, 0.0, 0.0, 1.0), com, (80.0,))
+        limb: Mount(link, Pose(np.array(place), np.eye(3)), com, (80.0,))
         for limb, (link, place) in hands.items()
     }
     hand = SimpleNamespace(mass=hand_mass)
