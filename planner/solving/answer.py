@@ -119,7 +119,7 @@ class Answer:
         space, wrist, search = self.spaces[index], self.parts.wrists[index], self.search
         if wrist is None or search is None:
             reader = LoadRecovery(HandBatch.of((settled,)), (space,))
-            return reader.hands((limb,), reader.read((y,)).arrays)[0]
+            return reader.hands((limb,), reader.read((y,))[0])[0]
         pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
         return recover_floating_hand(limb, settled, wrist.hand, space, pose)
 
