@@ -51,12 +51,9 @@ def draw_tiles(axes: Any, plan: Plan) -> None:
     rows: list[list[float]] = []
     for hand in hands:
         for finger in hand.fingers:
-            used = {tile.phalanx: tile for tile in finger.tiles}
-            row = [
-                used[p].utilisation if p in used and used[p].contact != "none" else np.nan
-                for p in columns
-            ]
-            rows.append([*row, np.nan])
+            touching = (tile for tile in finger.tiles if tile.contact != "none")
+            used = {tile.phalanx: tile.utilisation for tile in touching}
+            rows.append([*(used.get(phalanx, np.nan) for phalanx in columns), np.nan])
             names.append(
                 f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
                 f"  {finger.tendon_tension:3.0f} N"

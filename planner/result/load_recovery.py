@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -19,27 +19,10 @@ from planner.result.hand_plan import HandPlan, PalmPlan
 from planner.result.load_layout import COUNT, WRENCH, ZERO, layout_of
 from planner.result.plan_arrays import PlanArrays
 
-__all__ = ["LoadRecovery", "RecoveredLoads", "drawn_tendons"]
+__all__ = ["LoadRecovery", "drawn_tendons"]
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Which way a palm shears and presses along x and z."""
-
-
-class RecoveredLoads(NamedTuple):
-    """What loads say.
-
-    Attributes
-    ----------
-    arrays : PlanArrays
-    used : ndarray, shape (sum of nl,)
-        Utilisation of every limit row, hand by hand.
-    effort : float
-        Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
-    """
-
-    arrays: PlanArrays
-    used: Array
-    effort: float
 
 
 class LoadRecovery:
@@ -96,10 +79,18 @@ class LoadRecovery:
             (None,) * len(settled),
         )
 
-    def read(self, loads: Sequence[Array]) -> RecoveredLoads:
+    def read(self, loads: Sequence[Array]) -> tuple[PlanArrays, Array, float]:
         """Return what loads y of all hands say [N].
 
         What may not be negative and is, by rounding, counts as zero.
+
+        Returns
+        -------
+        arrays : PlanArrays
+        used : ndarray, shape (sum of nl,)
+            Utilisation of every limit row, hand by hand.
+        effort : float
+            Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
         """
         known, layout = self._known, self._layout
         y = np.concatenate([ZERO, *loads])
@@ -147,7 +138,7 @@ class LoadRecovery:
             np.maximum(np.maximum.reduceat(used, layout.first_row), 0.0),
             *self._fixed,
         )
-        return RecoveredLoads(arrays, used, float(efforts.dot(efforts)))
+        return arrays, used, float(efforts.dot(efforts))
 
     def hands(self, limbs: Sequence[str], arrays: PlanArrays) -> tuple[HandPlan, ...]:
         """Return what was read, hand by hand; its arrays are parts of those."""

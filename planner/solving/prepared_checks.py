@@ -125,6 +125,6 @@ def _read_hand(
     space, wrist = sets.spaces[index], prepared.hands.wrists[index]
     if wrist is None or search is None:
         recovery = LoadRecovery(HandBatch.of((settled,)), (space,))
-        return recovery.hands((limb,), recovery.read((y,)).arrays)[0]
+        return recovery.hands((limb,), recovery.read((y,))[0])[0]
     pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
     return recover_floating_hand(limb, settled, wrist.hand, space, pose)

@@ -185,10 +185,10 @@ def _winches(reader: LoadRecovery, spaces: Sequence[WrenchSpace]) -> Array:
     """Return the winches' angles without tension and per newton, which no other load changes."""
     tendons = len(FINGERS)
     loads = [np.zeros(len(space.columns)) for space in spaces]
-    at_zero = reader.read(loads).arrays.drives[-1]
+    at_zero = reader.read(loads)[0].drives[-1]
     for y in loads:
         y[:tendons] = 1.0
-    per_newton = reader.read(loads).arrays.drives[-1] - at_zero
+    per_newton = reader.read(loads)[0].drives[-1] - at_zero
     return np.array([at_zero, per_newton]).reshape(2, -1, tendons)
 
 

@@ -99,7 +99,7 @@ class LoadsCheck:
         what is used of half-planes, and of all other limits.
         """
         check, known, question = self._check, self._check.known, self._check.question
-        arrays = self._reader.read([y[: len(names)] for names in self._columns]).arrays
+        arrays = self._reader.read([y[: len(names)] for names in self._columns])[0]
         assert question.body_wrench is not None
         joints = check.joints(self.wrong, arrays.wrenches, question.body_wrench)
         again = check.again.of([], arrays, check.asked_for([], arrays, joints))

@@ -8,12 +8,13 @@ from .dispatch import (
 )
 from .hand_spaces import wrench_space as wrench_space
 from .mesh_files import MeshFiles as MeshFiles
-from .own_hand import read_hand as read_hand, with_hand as with_hand
-from .own_robot import (
+from .own_models import (
     Robots as Robots,
     builder_of as builder_of,
+    read_hand as read_hand,
     read_robot as read_robot,
     robots_of as robots_of,
+    with_hand as with_hand,
     with_robot as with_robot,
 )
 from .questions import route as route, stance as stance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from planner.capability import COMPONENTS, BodySection, BodySpace, End
 from planner.result import Time
 from service import replies
 from service.answering.hand_answers import placed_poses, plain, told
-from service.answering.own_robot import ROBOTS, Robots
+from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
 from service.requests import BodySpaceRequest, PlanRequest
@@ -58,16 +58,15 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)
-    signs = {f"{sign}{axis}": 1.0 if sign == "+" else -1.0 for axis in COMPONENTS for sign in "+-"}
-    ways = {name: sign * np.eye(6)[COMPONENTS.index(name[1:])] for name, sign in signs.items()}
+    ways = _ways(COMPONENTS, np.eye(6))
     extents = {name: space.support(way) for name, way in ways.items()}
     error = space.linearisation_error([end for end in extents.values() if end is not None])
     capability = {
         name: _capability(space.more(way), space.pure(way), extents[name])
         for name, way in ways.items()
     }
-    linear = _accelerations(space, dict(_axes(3)))
-    turning = _accelerations(space, dict(_axes(6))) if space.turns else None
+    linear = _accelerations(space, _ways("xyz", np.eye(3)))
+    turning = _accelerations(space, _ways("xyz", np.eye(6)[3:])) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
     reply = told(
@@ -99,11 +98,10 @@ def _unit(given: Sequence[float], field: str) -> Array:
     return np.asarray(direction / length)
 
 
-def _axes(end: int) -> Iterator[tuple[str, Array]]:
-    """Yield ± the last three of so many axes, by their names."""
-    for axis, unit in zip("xyz", np.eye(end)[end - 3 :], strict=True):
-        yield f"+{axis}", unit
-        yield f"-{axis}", -unit
+def _ways(names: Iterable[str], units: Array) -> dict[str, Array]:
+    """Return unit vectors and their opposites, by sign and name."""
+    pairs = list(zip(names, units, strict=True))
+    return {f"{s}{name}": f * way for name, way in pairs for s, f in (("+", 1.0), ("-", -1.0))}
 
 
 def _capability(more: End | None, pure: End | None, extent: End | None) -> replies.BodyCapability:

@@ -17,14 +17,14 @@ from service.answering.body_space import explore
 from service.answering.hand_answers import placed_poses
 from service.answering.hand_spaces import wrench_space
 from service.answering.mesh_files import MeshFiles
-from service.answering.own_hand import over_default
-from service.answering.own_robot import ROBOTS, Robots
+from service.answering.own_models import ROBOTS, Robots, over_default
 from service.answering.questions import question
 from service.answering.streams import STREAMS, Streams
 from service.replies import BriefPlanReply, PlanReply, Reply
 from service.requests import (
     BodySpaceRequest,
     PlanRequest,
+    Query,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
@@ -96,13 +96,7 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
 class _Service(NamedTuple):
     """What is asked at a key, and who answers, given the request, the robots and the streams."""
 
-    request: (
-        type[PlanRequest]
-        | type[WrenchSpaceRequest]
-        | type[BodySpaceRequest]
-        | type[StreamRequest]
-        | type[SetPointsRequest]
-    )
+    request: type[Query]
     answer: Callable[[Any, Robots, Streams], Reply]
 
 
@@ -160,7 +154,7 @@ def handle(
         form = Format.named(encoding)
         service = SERVICES[key.rpartition("/")[2]]
         kind = service.request
-        request = decode_request(payload, kind, form)
+        request: Any = decode_request(payload, kind, form)
         if files is not None:
             request = files.whole(request)
         if not isinstance(request, SetPointsRequest):

@@ -100,10 +100,14 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[
-            told(
-                replies.Row,
-                row,
+            # there are hundreds: not by name, which takes ten times as long
+            replies.Row(
                 name=row.label,
+                kind=row.kind,
+                finger=row.finger,
+                phalanx=row.phalanx,
+                limit=row.limit,
+                joint=row.joint,
                 coefficients=coefficients,
                 constant=constant,
                 capacity=capacity,

@@ -23,7 +23,7 @@ from service.answering.hand_answers import (
     wrench_set_reply,
     wrist_reply,
 )
-from service.answering.own_robot import ROBOTS, Robots
+from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import stance
 from service.replies import AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest

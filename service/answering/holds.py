@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import blake2b
-from typing import Final, NamedTuple, overload
+from typing import Final, overload
 
 import msgspec
 
@@ -15,7 +15,7 @@ from hand_models.parameters import ParameterTable
 from hand_models.rock import Mesh, Profile
 from service import requests
 
-__all__ = ["Rocks", "SharedRock", "placed", "pose_of", "rocks_of", "within"]
+__all__ = ["Rocks", "placed", "pose_of", "rocks_of", "within"]
 
 KEPT: Final = 8
 """Meshes that are kept, those asked for last: on the same object hands are found settled."""
@@ -24,14 +24,8 @@ MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests",
 """By all that they are built of."""
 
 
-class SharedRock(NamedTuple):
-    """One of a stance's rocks, and its frame in W if that is given."""
-
-    hold: rock.Hold
-    pose: Pose | None
-
-
-Rocks = Mapping[str, SharedRock]
+Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
+"""A stance's rocks by name, and each one's frame in W if that is given."""
 
 
 @contextmanager
@@ -51,7 +45,7 @@ def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
     InvalidInputError
         If one is impossible; the field begins with ``rocks``.
     """
-    found: dict[str, SharedRock] = {}
+    found = {}
     for name, each in message.rocks.items():
         if not name:
             raise InvalidInputError("a rock needs a name, got ''", field="rocks")
@@ -63,7 +57,7 @@ def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
                     field="pose_in_hand",
                 )
             hold = _hold(each, numbers, anywhere=True)
-            found[name] = SharedRock(hold, pose_of(each.pose, "pose"))
+            found[name] = hold, pose_of(each.pose, "pose")
     return found
 
 
@@ -87,12 +81,12 @@ def placed(
         if message.rock not in rocks:
             known = f"known are {', '.join(rocks)}" if rocks else "stance.rocks names none"
             raise InvalidInputError(f"unknown rock {message.rock!r}; {known}", field="rock")
-        shared = rocks[message.rock]
+        hold, place = rocks[message.rock]
         if pose is None and in_hand is None:
-            pose = shared.pose
+            pose = place
             if pose is None and not anywhere:
-                _check_seat(shared.hold)
-        return shared.hold, pose, in_hand
+                _check_seat(hold)
+        return hold, pose, in_hand
 
 
 def _check_seat(shared: rock.Hold) -> None:

@@ -21,7 +21,7 @@ from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objectiv
 from planner.route import Move, Route
 from service import requests
 from service.answering.holds import Rocks, placed, pose_of, rocks_of, within
-from service.answering.own_robot import ROBOTS, Robots, builder_of
+from service.answering.own_models import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]
 

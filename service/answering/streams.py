@@ -14,7 +14,7 @@ from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service.answering.answers import BRIEF, cut_reason
 from service.answering.hand_answers import placed_poses, plain, told
-from service.answering.own_robot import ROBOTS, Robots
+from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
 from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest

@@ -20,7 +20,7 @@ from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterTable, Quantity, hand_table, load_own_hand, own_hand
 from planner.robots import robosimian
 from service.answering import dispatch, read_hand, with_hand
-from service.answering.own_hand import over_default
+from service.answering.own_models import over_default
 from service.answering.questions import question
 from service.commands.cli import run
 from service.replies import PlanReply

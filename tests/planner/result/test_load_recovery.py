@@ -59,14 +59,14 @@ def named(space, y):
 @pytest.mark.parametrize("stance", list(cases()))
 def test_every_number_is_that_of_its_definition(stance):
     settled, spaces, data, loads, reader = read(stance)
-    reading = reader.read(loads)
-    hands = reader.hands([hand.limb for hand in stance.hands], reading.arrays)
+    arrays, told_used, effort = reader.read(loads)
+    hands = reader.hands([hand.limb for hand in stance.hands], arrays)
     used = [space.utilisations(y) for space, y in zip(spaces, loads, strict=True)]
-    np.testing.assert_allclose(reading.used, np.concatenate(used), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(told_used, np.concatenate(used), rtol=1e-12, atol=1e-12)
     efforts = [
         hand.E @ (y / hand.unit) + hand.e0 for hand, y in zip(data.hands, loads, strict=True)
     ]
-    assert reading.effort == pytest.approx(sum(float(e @ e) for e in efforts), rel=1e-12)
+    assert effort == pytest.approx(sum(float(e @ e) for e in efforts), rel=1e-12)
     for place, hand, space, y, plan in zip(
         stance.hands, settled, spaces, loads, hands, strict=True
     ):
@@ -130,11 +130,11 @@ def test_every_number_is_that_of_its_definition(stance):
 def test_hands_are_read_alone_as_together(stance):
     settled, spaces, _, loads, reader = read(stance, seed=1)
     limbs = [hand.limb for hand in stance.hands]
-    carried = reader.read(loads).arrays
+    carried = reader.read(loads)[0]
     alone = []
     for limb, hand, space, y in zip(limbs, settled, spaces, loads, strict=True):
         one = LoadRecovery(HandBatch.of([hand]), [space])
-        alone += one.hands([limb], one.read([y]).arrays)
+        alone += one.hands([limb], one.read([y])[0])
     for got in (PlanArrays.of(alone), PlanArrays.of(reader.hands(limbs, carried))):
         for name, mine, expected in zip(carried._fields, got, carried, strict=True):
             if isinstance(expected, np.ndarray):
@@ -149,7 +149,7 @@ def test_loads_that_are_negative_by_rounding_count_as_zero():
     off = [y.copy() for y in loads]
     for name in ("outer_left/tension", "palm_shear", "palm_pressing", "inner_left/lateral"):
         off[0][names.index(name)] = -1e-9
-    carried = reader.read(off).arrays
+    carried = reader.read(off)[0]
     assert carried.tensions[0] == 0.0
     assert not carried.palms[0].any()
     inner = slice(4, 4 + len(PHALANGES))
@@ -161,7 +161,7 @@ def test_a_reading_of_other_loads_leaves_the_first_as_it_was():
     stance = on_wall()
     _, _, _, loads, reader = read(stance)
     limbs = [hand.limb for hand in stance.hands]
-    first = reader.hands(limbs, reader.read(loads).arrays)
+    first = reader.hands(limbs, reader.read(loads)[0])
     kept = [(hand.loads.copy(), hand.forces.copy(), hand.wrench.copy()) for hand in first]
     reader.read([2.0 * y for y in loads])
     for hand, numbers in zip(first, kept, strict=True):
@@ -174,7 +174,7 @@ def test_the_same_holds_give_the_same_arrays_for_hands_that_are_settled_anew():
     settled, spaces, _, loads, reader = read(stance)
     again = [replace(settle_hand(hand, stance)) for hand in stance.hands]
     assert all(a is not b for a, b in zip(settled, again, strict=True))
-    one, other = (r.read(loads).arrays for r in (reader, LoadRecovery(HandBatch.of(again), spaces)))
+    one, other = (r.read(loads)[0] for r in (reader, LoadRecovery(HandBatch.of(again), spaces)))
     np.testing.assert_array_equal(one.forces, other.forces)
     np.testing.assert_array_equal(one.drives, other.drives)
 
@@ -182,7 +182,7 @@ def test_the_same_holds_give_the_same_arrays_for_hands_that_are_settled_anew():
 def test_what_is_kept_of_hands_cannot_be_written_to():
     stance = on_wall()
     _, _, _, loads, reader = read(stance)
-    hands = reader.hands([hand.limb for hand in stance.hands], reader.read(loads).arrays)
+    hands = reader.hands([hand.limb for hand in stance.hands], reader.read(loads)[0])
     for array in (hands[1].positions, hands[1].axes, hands[1].palm.position):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0

@@ -66,7 +66,7 @@ def complaints(question: Question, points: SetPoints) -> list[str]:
     """What the check of plans says of set-points."""
     known, data, reader, check = checked_by(question)
     loads = [row[: len(names)] for row, names in zip(points.loads, known.columns, strict=True)]
-    told = reader.read(loads).arrays
+    told = reader.read(loads)[0]
     np.testing.assert_allclose(points.wrenches, told.wrenches, rtol=1e-9, atol=1e-7)
     np.testing.assert_allclose(points.tensions.ravel(), told.tensions, atol=1e-9)
     np.testing.assert_allclose(points.motor_torque.ravel(), told.drives[0], rtol=1e-9)

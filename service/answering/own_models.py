@@ -1,0 +1,158 @@
+"""A hand and a robot of the caller's own, on their way into questions.
+
+Entries of a hand travel as ``{section: {entry: {value, unit, source, note}}}``. Whoever is nearer
+to the question has the last word on an entry: the command line over a stance's file, a request over
+the service, which may have a hand of its own, over the bundled hand. A robot's file stays where
+plans are made; over the network only its name travels. A stance that names no robot is for the one
+that is there, and a stance that names another is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import msgspec
+
+from hand_models.base import InvalidInputError
+from hand_models.hand import spiny_hand
+from hand_models.parameters import ParameterTable, load_own_hand, own_hand
+from planner.robots import Robot, RobotFile, robosimian, robot_of
+from service.requests import (
+    BodySpaceRequest,
+    PlanRequest,
+    RouteRequest,
+    StreamRequest,
+    WrenchSpaceRequest,
+)
+from service.wire import DEFAULT_ROBOT
+
+__all__ = [
+    "ROBOTS",
+    "Builder",
+    "Robots",
+    "builder_of",
+    "over_default",
+    "read_hand",
+    "read_robot",
+    "robots_of",
+    "with_hand",
+    "with_robot",
+]
+
+R = TypeVar(
+    "R", bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | StreamRequest | RouteRequest
+)
+
+Builder = Callable[[ParameterTable | None], Robot]
+"""Builds a robot from all numbers of its hands."""
+
+Robots = Mapping[str, Builder]
+"""Robots that stances may be for, by name; the first is that of stances which name none."""
+
+ROBOTS: Final[Robots] = {DEFAULT_ROBOT: robosimian}
+"""The robots that are bundled."""
+
+
+def read_hand(path: Path) -> ParameterTable:
+    """Return a file's entries, which together with the bundled ones make a possible hand.
+
+    Raises
+    ------
+    InvalidInputError
+        In one line that names file, entry and value.
+    """
+    own = load_own_hand(path)
+    try:
+        spiny_hand(own_hand(own))
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error), field=str(path)) from None
+    return own
+
+
+def with_hand(request: R, own: ParameterTable | None) -> R:
+    """Return a request for a hand with these entries, over those that it names itself."""
+    if own is None:
+        return request
+    return _asking_for(request, request.stance.hand or {}, _entries(own))
+
+
+def over_default(request: R, default: ParameterTable | None) -> R:
+    """Return a request in which what it leaves open of its hand is the service's default."""
+    if default is None:
+        return request
+    return _asking_for(request, _entries(default), request.stance.hand or {})
+
+
+def _entries(own: ParameterTable) -> dict[str, dict[str, Any]]:
+    """Return entries as they travel."""
+    entries: dict[str, dict[str, Any]] = msgspec.to_builtins(own.sections)
+    return entries
+
+
+def _asking_for(request: R, low: Mapping[str, Any], high: Mapping[str, Any]) -> R:
+    """Return a request with two hands' entries, the second's in place of the first's."""
+    hand = {**low, **high}
+    for section in low.keys() & high.keys():
+        # what is no section is left for its refusal
+        if isinstance(high[section], Mapping) and isinstance(low[section], Mapping):
+            hand[section] = {**low[section], **high[section]}
+    stance = msgspec.structs.replace(request.stance, hand=hand)
+    return msgspec.structs.replace(request, stance=stance)
+
+
+def read_robot(path: Path) -> RobotFile:
+    """Return the content of a robot's file and of its URDF, which describe a possible robot.
+
+    Raises
+    ------
+    InvalidInputError
+        In one line that names file, entry and value.
+    """
+    file = RobotFile.load(path)
+    robot_of(file)
+    return file
+
+
+def robots_of(file: RobotFile | None) -> Robots:
+    """Return the robots that are planned for: that of a file alone, or those that are bundled."""
+    return ROBOTS if file is None else {file.name: partial(robot_of, file)}
+
+
+def builder_of(name: str | None, robots: Robots) -> Builder:
+    """Return what builds the robot of that name, or the first.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is none of that name.
+    """
+    chosen = next(iter(robots)) if name is None else name
+    if chosen not in robots:
+        raise InvalidInputError(
+            f"unknown robot {chosen!r}; known are {', '.join(robots)}", field="robot"
+        )
+    return robots[chosen]
+
+
+def with_robot(request: R, file: RobotFile | None) -> R:
+    """Return a request for the robot of a file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it names another.
+    """
+    if file is None:
+        return request
+    named = request.stance.robot
+    if named not in (None, file.name):
+        raise InvalidInputError(
+            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; valid "
+            "is that, or no name",
+            field="stance.robot",
+        )
+    stance = msgspec.structs.replace(request.stance, robot=file.name)
+    return msgspec.structs.replace(request, stance=stance)
