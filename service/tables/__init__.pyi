@@ -4,6 +4,7 @@ from .plans import (
     print_plan as print_plan,
     print_wrench_space as print_wrench_space,
     table_of as table_of,
+    unit_of as unit_of,
 )
 from .robust import print_robust as print_robust
 from .routes import print_route as print_route

@@ -11,7 +11,7 @@ from rich.markup import escape
 from planner.capability import COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.plans import table_of
+from service.tables.plans import table_of, unit_of
 
 __all__ = ["print_body_space"]
 
@@ -42,15 +42,12 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
 
 
 def _print_capability(reply: BodySpaceReply, out: Console) -> None:
-    table = table_of("axis")
-    for name in ("more", "pure", "extent"):
-        table.add_column(name, justify="right")
-    table.add_column("first to let go")
+    table = table_of("axis", numbers=("more", "pure", "extent"), words=["first to let go"])
     for name, end in reply.capability.items():
         cells = [
             "-" if cell is None else f"{cell:z.1f}" for cell in (end.more, end.pure, end.extent)
         ]
-        table.add_row(f"{name} {_unit_of(name[1:])}", *cells, _words(end.limiting))
+        table.add_row(f"{name} {unit_of(name[1:])}", *cells, _words(end.limiting))
     out.print("\n[bold]how far body wrenches that are held go along the axes of B[/bold]")
     out.print(table)
     out.print("more: beyond the body wrench asked for, and what lets go there first")
@@ -64,7 +61,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
         return
     corners = np.array(section.inner)
     ranges = ", ".join(
-        f"{axis} {low:z.1f} to {high:z.1f} {_unit_of(axis)}"
+        f"{axis} {low:z.1f} to {high:z.1f} {unit_of(axis)}"
         for axis, low, high in zip(
             section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
         )
@@ -79,9 +76,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
 def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
     if reply.acceleration is None:
         return
-    table = table_of("along")
-    table.add_column("largest", justify="right")
-    table.add_column("first to let go")
+    table = table_of("along", numbers=["largest"], words=["first to let go"])
     turning = reply.angular_acceleration or {}
     for unit, found in (("m/s²", reply.acceleration), ("rad/s²", turning)):
         for name, one in found.items():
@@ -91,10 +86,6 @@ def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
         table.add_row(f"({where}) m/s²", f"{one.acceleration:z.2f}", _words(one.limiting))
     out.print("\n[bold]largest accelerations of the body from rest, in W[/bold]")
     out.print(table)
-
-
-def _unit_of(axis: str) -> str:
-    return "N" if axis.startswith("f") else "N·m"
 
 
 def _words(name: replies.LimitName | None) -> str:

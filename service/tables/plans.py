@@ -29,7 +29,7 @@ from service.replies import (
     WrenchSpaceReply,
 )
 
-__all__ = ["console", "print_plan", "print_wrench_space", "table_of"]
+__all__ = ["console", "print_plan", "print_wrench_space", "table_of", "unit_of"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
@@ -125,8 +125,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     for closing in reply.closing:
         if closing.nearby or closing.nearby_turn > NEARLY:
             out.print(_nearby_sentence(closing))
-    tensions = table_of("finger", "phalanx")
-    tensions.add_column("f_t(max) N", justify="right")
+    tensions = table_of("finger", "phalanx", numbers=["f_t(max) N"])
     for limit in reply.tension_limits:
         tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
         tensions.add_row(limit.finger, limit.phalanx or "-", tension)
@@ -161,16 +160,14 @@ def _print_floating(palm: str, error: float, out: Console) -> None:
 def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
     """Print the least and the most of each component, and those of it alone if there are any."""
     with_pure = any(end.pure is not None for end in capability.values())
-    reaches = table_of("axis")
-    for name in ("least", "most", *(("pure least", "pure most") if with_pure else ())):
-        reaches.add_column(name, justify="right")
+    pures = ("pure least", "pure most") if with_pure else ()
+    reaches = table_of("axis", numbers=("least", "most", *pures))
     for axis in AXES:
         less, more = capability[f"-{axis}"], capability[f"+{axis}"]
-        unit = "N" if axis.startswith("f") else "N·m"
         cells = [-less.extent, more.extent]
         pure = [None if less.pure is None else -less.pure, more.pure] if with_pure else []
         shown = ("-" if cell is None else _fixed(cell, 2) for cell in (*cells, *pure))
-        reaches.add_row(f"{axis} {unit}", *shown)
+        reaches.add_row(f"{axis} {unit_of(axis)}", *shown)
     _show("wrenches on the rock along the axes of H", reaches, out)
     out.print("least, most: with whatever else the hand can carry")
     if with_pure:
@@ -186,9 +183,7 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
         where = "at any utilisation"
         if proof.utilisation is not None:
             where = f"up to a utilisation of {proof.utilisation:g}"
-        table = table_of("")
-        for axis in AXES:
-            table.add_column(axis, justify="right")
+        table = table_of("", numbers=AXES)
         parts = {"needed": needed, "nearest held": proof.nearest, "missing": proof.shortfall}
         for name, wrench in parts.items():
             table.add_row(name, *(_fixed(value, 1) for value in wrench))
@@ -229,8 +224,7 @@ def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
 
 def _barrier_table(names: Iterable[LimitName]) -> Table:
     """Return limits by hand and kind, in their order."""
-    table = table_of("hand", "limit")
-    table.add_column("of")
+    table = table_of("hand", "limit", words=["of"])
     for (limb, limit), owners in _alike(names).items():
         table.add_row(limb, limit, ", ".join(owners) or "-")
     return table
@@ -242,11 +236,9 @@ def _planned(name: LimitName) -> PlannedLimit:
 
 def _closing_table(reply: WrenchSpaceReply) -> Table:
     """Return what of each finger touches, and when it stopped moving."""
-    table = table_of("finger", "base")
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
-    for part in (stage.part for stage in reply.closing[0].stages):
-        table.add_column(part, justify="right")
-    table.add_column("ends")
+    parts = [stage.part for stage in reply.closing[0].stages]
+    table = table_of("finger", "base", numbers=parts, words=["ends"])
     for closing in reply.closing:
         cells = [
             f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
@@ -304,18 +296,25 @@ def _show(title: str, table: Table, out: Console) -> None:
     out.print(table)
 
 
-def table_of(*names: str) -> Table:
-    """Return a table with left-justified columns of names."""
+def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
+    """Return a table with columns of names, then of numbers, then of words, which may wrap."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in names:
         table.add_column(name, no_wrap=True)
+    for name in numbers:
+        table.add_column(name, justify="right")
+    for name in words:
+        table.add_column(name)
     return table
 
 
+def unit_of(axis: str) -> str:
+    """Return the unit of a component of a wrench."""
+    return "N" if axis.startswith("f") else "N·m"
+
+
 def _hand_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand")
-    for name in (*AXES, "hand\nutil", "palm\nshear", "palm\npress"):
-        table.add_column(name, justify="right")
+    table = table_of("hand", numbers=(*AXES, "hand\nutil", "palm\nshear", "palm\npress"))
     for hand in hands:
         force = hand.palm.force
         cells = [_fixed(value, 0) for value in hand.wrench[:3]]
@@ -326,10 +325,7 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
 
 
 def _wrist_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand")
-    for name in ("vx", "vy", "vz", "wx", "wy", "wz"):
-        table.add_column(name, justify="right")
-    table.add_column("palm")
+    table = table_of("hand", numbers=("vx", "vy", "vz", "wx", "wy", "wz"), words=["palm"])
     for hand in hands:
         cells = [_fixed(1e3 * value, 2) for value in hand.wrist.twist or ()]
         table.add_row(hand.limb, *cells, (hand.wrist.palm or "-").replace("_", " "))
@@ -337,10 +333,7 @@ def _wrist_table(hands: Iterable[Hand]) -> Table:
 
 
 def _tendon_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand", "finger")
-    for name in ("tension N", "current A"):
-        table.add_column(name, justify="right")
-    table.add_column("tile")
+    table = table_of("hand", "finger", numbers=("tension N", "current A"), words=["tile"])
     table.add_column("util", justify="right")
     for hand in hands:
         for finger in hand.fingers:
@@ -361,12 +354,9 @@ def _joint_table(
     """
     most = max((len(row) for row in torques.values()), default=0)
     columns = min(most, JOINTS_A_LINE)
-    table = table_of("limb")
+    heads = [str(i + 1) if most <= columns else f"+{i + 1}" for i in range(columns)]
+    table = table_of("limb", numbers=(*heads, "of", "util"))
     table.padding = 0  # otherwise seven torques do not fit
-    for i in range(columns):
-        table.add_column(str(i + 1) if most <= columns else f"+{i + 1}", justify="right")
-    for name in ("of", "util"):
-        table.add_column(name, justify="right")
     for limb, row in torques.items():
         used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
         worst = used.index(max(used))
@@ -390,8 +380,7 @@ def _worst(finger: Finger) -> Tile | None:
 
 
 def _price_table(prices: Iterable[Price]) -> Table:
-    table = table_of("hand", "finger, joint", "tile", "limit")
-    table.add_column("price", justify="right")
+    table = table_of("hand", "finger, joint", "tile", "limit", numbers=["price"])
     for price in prices:
         part = price.finger or price.joint or "-"
         names = (price.limb, part, price.phalanx or "-", price.limit)

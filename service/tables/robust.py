@@ -5,16 +5,15 @@ from __future__ import annotations
 from rich.console import Console
 
 from service.replies import AXES, RobustCapability
-from service.tables.plans import table_of
+from service.tables.plans import table_of, unit_of
 
 __all__ = ["print_robust"]
 
 
 def print_robust(robust: RobustCapability, out: Console) -> None:
     """Print what is left of each component where the hand is a little elsewhere."""
-    table = table_of("axis")
-    for name in ("worst least", "worst most", "9 in 10 least", "9 in 10 most"):
-        table.add_column(name, justify="right")
+    numbers = ("worst least", "worst most", "9 in 10 least", "9 in 10 most")
+    table = table_of("axis", numbers=numbers)
     for axis in AXES:
         ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
         cells = [
@@ -22,7 +21,7 @@ def print_robust(robust: RobustCapability, out: Console) -> None:
             for pair in ends
             for sign, end in zip((-1.0, 1.0), pair, strict=True)
         ]
-        table.add_row(f"{axis} {'N' if axis.startswith('f') else 'N·m'}", *cells)
+        table.add_row(f"{axis} {unit_of(axis)}", *cells)
     out.print(
         f"\n[bold]what is left of that at {robust.draws - robust.without} of {robust.draws} places "
         f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad[/bold]"

@@ -18,12 +18,9 @@ __all__ = ["print_route"]
 def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) -> None:
     """Print a climb, stage by stage, its crux, and where its files are."""
     out.print(f"[bold]{escape(result.route.name)}[/bold]: {len(result.route.moves)} moves")
-    table = table_of("", "move", "phase", "limb", "status")
-    table.add_column("util", justify="right")
-    table.add_column("load factor", justify="right")
     joints = any(plan.joint_utilisation is not None for plan in result.plans)
-    if joints:
-        table.add_column("joints", justify="right")
+    heads = ("util", "load factor", "joints") if joints else ("util", "load factor")
+    table = table_of("", "move", "phase", "limb", "status", numbers=heads)
     for stage, plan in zip(result.stages, result.plans, strict=True):
         numbers = [plan.utilisation, plan.load_factor]
         if joints:
