@@ -4,7 +4,6 @@ from .clock import (
     check as check,
     expired as expired,
     left as left,
-    possible as possible,
     seconds as seconds,
     within as within,
 )

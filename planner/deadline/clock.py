@@ -6,16 +6,15 @@ it at each of their iterations, searches before each of their steps, hands while
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
-from hand_models.base import CruxError, InvalidInputError, broken_off_by
+from hand_models.base import CruxError, broken_off_by
 
-__all__ = ["DeadlineError", "check", "expired", "left", "possible", "seconds", "within"]
+__all__ = ["DeadlineError", "check", "expired", "left", "seconds", "within"]
 
 
 class _Clock(NamedTuple):
@@ -51,19 +50,6 @@ class DeadlineError(CruxError):
         )
         self.seconds = seconds
         self.missing = missing
-
-
-def possible(seconds: float | None) -> float | None:
-    """Return a deadline that can be kept.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is not above zero and finite.
-    """
-    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
-        raise InvalidInputError(f"must be above 0 s, got {seconds:g}", field="deadline")
-    return seconds
 
 
 @contextmanager

@@ -11,7 +11,6 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
-from planner import deadline
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
 __all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
@@ -221,7 +220,8 @@ class Question:
                 field="want",
             )
         object.__setattr__(self, "want", frozenset(self.want))
-        deadline.possible(self.deadline)
+        if self.deadline is not None and not 0.0 < self.deadline < math.inf:
+            raise InvalidInputError(f"must be above 0 s, got {self.deadline:g}", field="deadline")
         self._check_limits()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         if "robust" in self.want and "floating" in wrists.values():

@@ -294,9 +294,7 @@ def _summary(told: Sequence[_Told], elapsed: float) -> dict[str, object]:
 def _print(told: Sequence[_Told], before: int, elapsed: float, file: Path | None) -> None:
     out = console()
     statuses, kinds = _counts(told)
-    table = table_of("answer")
-    for name in ("requests", "median ms", "longest ms"):
-        table.add_column(name, justify="right")
+    table = table_of("answer", numbers=("requests", "median ms", "longest ms"))
     for status in (*EXIT_STATUS, "failed"):
         times = [1e3 * one.time.total for one in told if one.status == status and one.time]
         shown = [f"{statistics.median(times):.1f}", f"{max(times):.1f}"] if times else ["-", "-"]

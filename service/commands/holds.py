@@ -284,9 +284,8 @@ def _print(
     out: Console,
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
-    table = table_of("x, y, z mm")
-    for title in ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst"):
-        table.add_column(title, justify="right")
+    numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst")
+    table = table_of("x, y, z mm", numbers=numbers)
     for trial, each in found[:SHOWN]:
         left = [
             "-" if values is None or not math.isfinite(values[0]) else f"{values[0]:.1f}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import textwrap
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
     from planner.streaming import WrenchStream
 
-__all__ = ["stream", "wrenches"]
+__all__ = ["stream"]
 
 WORST_FIRST: Final = (BAD_INPUT, FAILED, OVERLOADED, DONE)
 """Exit statuses: that of a stream is the worst of its lines'."""
@@ -77,12 +77,12 @@ def stream(
     with opened(request, robots_of(robot)) as source:
         if not as_json:
             _say_columns(source)
-        for number, wrench in wrenches(sys.stdin.buffer):
+        for number, line in enumerate(sys.stdin.buffer, start=1):
+            if not line.strip():
+                continue
             start = time.perf_counter()
             try:
-                if isinstance(wrench, MalformedError):
-                    raise wrench
-                points = source.set_points(wrench)
+                points = source.set_points(_body_wrench(line))
             except InvalidInputError as error:
                 worst = BAD_INPUT
                 if as_json:
@@ -116,29 +116,14 @@ def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
     )
 
 
-def wrenches(lines: Iterable[bytes]) -> Iterator[tuple[int, Wrench | MalformedError]]:
-    """Yield the number of each line that is not blank, and its wrench, as soon as it is there.
-
-    Parameters
-    ----------
-    lines : iterable of bytes
-        Of JSON.
-
-    Yields
-    ------
-    number : int
-        From 1.
-    wrench : Wrench or MalformedError
-        What is wrong, where the line is no body wrench.
-    """
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        try:
-            yield number, msgspec.json.decode(line, type=Wrench)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"
-            yield number, MalformedError(f"{wanted}: {error}")
+def _body_wrench(line: bytes) -> Wrench:
+    """Return the body wrench of a line of JSON."""
+    try:
+        wrench: Wrench = msgspec.json.decode(line, type=Wrench)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"
+        raise MalformedError(f"{wanted}: {error}") from None
+    return wrench
 
 
 def _refused(error: InvalidInputError, number: int) -> ErrorReply:

@@ -14,7 +14,7 @@ from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
 from planner.capability import Survey
 from service.replies import AXES
-from service.tables import table_of
+from service.tables import table_of, unit_of
 
 __all__ = ["print_survey", "survey_json"]
 
@@ -78,11 +78,9 @@ def print_survey(survey: Survey, out: Console) -> None:
 
 def _print_ends(survey: Survey, out: Console) -> None:
     """Print where the hand lets go along each axis."""
-    table = table_of("axis", ">reach")
-    for name in ("finger", "phalanx", "limit"):
-        table.add_column(name)
+    table = table_of("axis", numbers=["reach"], words=("finger", "phalanx", "limit"))
     for name, end in zip(_names(), survey.ends, strict=True):
-        unit = "N" if name[1] == "f" else "N·m"
+        unit = unit_of(name[1:])
         if end is None:
             table.add_row(f"{name} {unit}", "-", "", "", "")
             continue
@@ -104,7 +102,7 @@ def failures_table(limiting: Sequence[Row | None]) -> Table:
     """Return how often each tile of each finger lets go first, and what is no finger's."""
     counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
     parts = [part for part in ORDER if any(finger and name == part for finger, name in counts)]
-    table = table_of("", *(f">{name}" for name in (*parts, "all")))
+    table = table_of("", numbers=(*parts, "all"))
     for finger in FINGERS:
         own = [counts[finger, part] for part in parts]
         table.add_row(finger, *(str(count or "-") for count in own), str(sum(own)))

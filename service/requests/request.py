@@ -17,18 +17,19 @@ __all__ = [
     "Coordinate",
     "Detail",
     "Force",
+    "FourTensions",
     "Identifier",
     "Later",
     "Name",
     "Pose",
     "Position",
-    "PreloadEntry",
     "Query",
     "Request",
     "Strict",
     "Tension",
     "Tensions",
     "Wrench",
+    "WrenchEntries",
     "WrenchEntry",
 ]
 
@@ -45,16 +46,14 @@ Acceleration = Annotated[
     Meta(description="in W [m/s²]"),
 ]
 WrenchEntry = Annotated[float, Meta(ge=-1e6, le=1e6)]
+WrenchEntries = tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry]
 Wrench = Annotated[
-    tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry],
-    Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]"),
+    WrenchEntries, Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]")
 ]
 Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
 PreloadEntry = Annotated[float, Meta(ge=0.0, le=1e4)]
-Tensions = Annotated[
-    tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry],
-    Meta(description="of a hand's tendons [N]"),
-]
+FourTensions = tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry]
+Tensions = Annotated[FourTensions, Meta(description="of a hand's tendons [N]")]
 Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]

@@ -11,12 +11,13 @@ from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import (
     Acceleration,
     Coordinate,
+    FourTensions,
     Name,
     Pose,
     Position,
-    PreloadEntry,
     Strict,
     Tension,
+    WrenchEntries,
     WrenchEntry,
 )
 
@@ -29,12 +30,13 @@ __all__ = [
 
 OuterRotation = Annotated[float, Meta(ge=0.0, le=math.pi + 1e-6, description="[rad]")]
 Preload = Annotated[
-    tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry],
+    FourTensions,
     Meta(
         description="tensions that the tendons of a floating hand hold at rest [N]; by default the "
         "closing tension"
     ),
 ]
+Planned = WrenchEntry | None
 Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
 Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="not zero")]
 Angles = Annotated[
@@ -110,15 +112,7 @@ class Hand(Strict, frozen=True, kw_only=True):
     ] = "fixed"
     tendon_preload: Preload | None = None
     wrench: Annotated[
-        tuple[
-            WrenchEntry | None,
-            WrenchEntry | None,
-            WrenchEntry | None,
-            WrenchEntry | None,
-            WrenchEntry | None,
-            WrenchEntry | None,
-        ]
-        | None,
+        tuple[Planned, Planned, Planned, Planned, Planned, Planned] | None,
         Meta(
             description="what the hand must exert on the rock, in H [N, N·m]; null components are "
             "the plan's"
@@ -132,7 +126,7 @@ class Hand(Strict, frozen=True, kw_only=True):
         ),
     ] = "rest"
     seat_direction: Annotated[
-        tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry] | None,
+        WrenchEntries | None,
         Meta(
             description="in which wrench on the rock, in H, the best seat is to hold most; by "
             "default the pull-off"

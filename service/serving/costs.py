@@ -30,7 +30,7 @@ class _Stance:
     """Which processes know a stance, and what it took when it was new and since [s]."""
 
     def __init__(self, first: float) -> None:
-        self.known_to: set[int] = set()
+        self.known_to: set[object] = set()
         self.first = first
         self.again: float | None = None
 
@@ -42,7 +42,7 @@ class Costs:
         self._stances: OrderedDict[int | None, _Stance] = OrderedDict()
         self._clients: OrderedDict[str, float] = OrderedDict()
 
-    def took(self, client: str, stance: int | None, process: int | None, seconds: float) -> None:
+    def took(self, client: str, stance: int | None, process: object | None, seconds: float) -> None:
         """Remember what an answer took.
 
         Parameters
@@ -50,7 +50,7 @@ class Costs:
         client : str
         stance : int or None
             A hash of it, where it can be known from now on.
-        process : int or None
+        process : object or None
             That answered.
         seconds : float
         """
@@ -66,7 +66,7 @@ class Costs:
         seen.known_to.add(process)
         _forget(self._stances)
 
-    def lost(self, process: int) -> None:
+    def lost(self, process: object) -> None:
         """Forget a process that has ended."""
         for seen in self._stances.values():
             seen.known_to.discard(process)
@@ -83,7 +83,7 @@ class Costs:
         seen = self._stances.get(stance)
         return seen is not None and (seen.first if seen.again is None else seen.again) <= DEAR
 
-    def knows(self, process: int, stance: int | None) -> bool:
+    def knows(self, process: object, stance: int | None) -> bool:
         """Whether a process knows a stance."""
         seen = self._stances.get(stance)
         return seen is not None and process in seen.known_to

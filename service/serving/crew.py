@@ -29,9 +29,6 @@ LONGEST_REST: Final = 30.0
 GROWN: Final = 700 * 2**20
 """Resident memory of a process that is replaced when it has nothing to do [bytes]."""
 
-LOOKED_AT: Final = 1.0
-"""How often that is looked at, at most [s]."""
-
 STREAMS_LANES: Final = 2
 """Of the process that has the streams: one for set-points, one for what else is short."""
 
@@ -67,7 +64,6 @@ class Crew:
         self.rests_until = 0.0
         self.stillborn = 0
         self._streams: Station[Job, Answer] | None = None
-        self._looked_at: dict[Station[Job, Answer], float] = {}
 
     @property
     def stations(self) -> list[Station[Job, Answer]]:
@@ -130,11 +126,7 @@ class Crew:
 
     def has_grown(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane's process is seen to have so much memory that a new one is better."""
-        station, now = lane.station, time.perf_counter()
-        if station is self._streams or now < self._looked_at.get(station, 0.0) + LOOKED_AT:
-            return False
-        self._looked_at[station] = now
-        size = resident(station.process.pid)
+        size = None if self.has_streams(lane) else resident(lane.station.process.pid)
         return size is not None and size > GROWN
 
     def dismiss(
@@ -150,7 +142,6 @@ class Crew:
             That it had, and nobody has replied to.
         """
         asked = [self.work.pop(lane) for lane in station.lanes]
-        self._looked_at.pop(station, None)
         if station is self._streams:
             self._streams = None
         if station.ready:

@@ -287,7 +287,7 @@ class Dispatcher:
                 self._give(lane, question)
 
     def _knows(self, lane: Lane[Job, Answer], question: Question) -> bool:
-        return self._costs.knows(_number(lane.station), question.stance)
+        return self._costs.knows(lane.station, question.stance)
 
     def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
         question.begun = time.perf_counter()
@@ -320,7 +320,7 @@ class Dispatcher:
         assert asked is not None
         self._mean += (done.seconds - self._mean) / AVERAGED
         stance = asked.stance if asked.name == PLAN else None
-        self._costs.took(asked.client, stance, _number(lane.station), done.seconds)
+        self._costs.took(asked.client, stance, lane.station, done.seconds)
         if asked.name == STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._waiting.put(Kind.DECLARED, asked)
@@ -352,7 +352,7 @@ class Dispatcher:
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
         how, left = self._crew.dismiss(station, dead=why is None)
-        self._costs.lost(_number(station))
+        self._costs.lost(station)
         self.watch.ended(station.process.pid, why or how)
         return how, left
 
@@ -398,7 +398,3 @@ class Dispatcher:
         for question in left:
             self._refuse(question, LostError("the service ended before there was an answer"))
         return True
-
-
-def _number(station: Station[Job, Answer]) -> int:
-    return station.process.pid or 0

@@ -5,5 +5,6 @@ from .plans import (
     print_robust as print_robust,
     print_wrench_space as print_wrench_space,
     table_of as table_of,
+    unit_of as unit_of,
 )
 from .routes import print_route as print_route

@@ -43,8 +43,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
 
 
 def _print_capability(reply: BodySpaceReply, out: Console) -> None:
-    table = table_of("axis", ">more", ">pure", ">extent")
-    table.add_column("first to let go")
+    table = table_of("axis", numbers=("more", "pure", "extent"), words=["first to let go"])
     for name, end in reply.capability.items():
         cells = [
             "-" if cell is None else f"{cell:z.1f}" for cell in (end.more, end.pure, end.extent)
@@ -77,8 +76,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
 def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
     if reply.acceleration is None:
         return
-    table = table_of("along", ">largest")
-    table.add_column("first to let go")
+    table = table_of("along", numbers=["largest"], words=["first to let go"])
     turning = reply.angular_acceleration or {}
     for unit, found in (("m/s²", reply.acceleration), ("rad/s²", turning)):
         for name, one in found.items():

@@ -128,7 +128,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     for closing in reply.closing:
         if closing.nearby or closing.nearby_turn > NEARLY:
             out.print(_nearby_sentence(closing))
-    tensions = table_of("finger", "phalanx", ">f_t(max) N")
+    tensions = table_of("finger", "phalanx", numbers=["f_t(max) N"])
     for limit in reply.tension_limits:
         tension = "none" if limit.tension is None else f"{limit.tension:.1f}"
         tensions.add_row(limit.finger, limit.phalanx or "-", tension)
@@ -150,7 +150,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
 def print_robust(robust: RobustCapability, out: Console) -> None:
     """Print what is left of each component where the hand is a little elsewhere."""
     names = ("worst least", "worst most", "9 in 10 least", "9 in 10 most")
-    table = table_of("axis", *(f">{name}" for name in names))
+    table = table_of("axis", numbers=names)
     for axis in AXES:
         ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
         table.add_row(f"{axis} {unit_of(axis)}", *_ends_of(ends))
@@ -176,8 +176,8 @@ def _print_floating(palm: str, error: float, out: Console) -> None:
 def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
     """Print the least and the most of each component, and those of it alone if there are any."""
     with_pure = any(end.pure is not None for end in capability.values())
-    pure = (">pure least", ">pure most") if with_pure else ()
-    reaches = table_of("axis", ">least", ">most", *pure)
+    pure = ("pure least", "pure most") if with_pure else ()
+    reaches = table_of("axis", numbers=("least", "most", *pure))
     for axis in AXES:
         less, more = capability[f"-{axis}"], capability[f"+{axis}"]
         ways = [(less.extent, more.extent), (less.pure, more.pure)][: 1 + with_pure]
@@ -197,7 +197,7 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
         where = "at any utilisation"
         if proof.utilisation is not None:
             where = f"up to a utilisation of {proof.utilisation:g}"
-        table = table_of("", *(f">{axis}" for axis in AXES))
+        table = table_of("", numbers=AXES)
         parts = {"needed": needed, "nearest held": proof.nearest, "missing": proof.shortfall}
         for name, wrench in parts.items():
             table.add_row(name, *(f"{value:z.1f}" for value in wrench))
@@ -238,8 +238,7 @@ def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
 
 def _barrier_table(names: Iterable[LimitName]) -> Table:
     """Return limits by hand and kind, in their order."""
-    table = table_of("hand", "limit")
-    table.add_column("of")
+    table = table_of("hand", "limit", words=["of"])
     for (limb, limit), owners in _alike(names).items():
         table.add_row(limb, limit, ", ".join(owners) or "-")
     return table
@@ -248,8 +247,8 @@ def _barrier_table(names: Iterable[LimitName]) -> Table:
 def _closing_table(reply: WrenchSpaceReply) -> Table:
     """Return what of each finger touches, and when it stopped moving."""
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
-    table = table_of("finger", "base", *(f">{stage.part}" for stage in reply.closing[0].stages))
-    table.add_column("ends")
+    parts = [stage.part for stage in reply.closing[0].stages]
+    table = table_of("finger", "base", numbers=parts, words=["ends"])
     for closing in reply.closing:
         cells = [
             f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
@@ -302,14 +301,15 @@ def show(title: str, table: Table, out: Console) -> None:
     out.print(table)
 
 
-def table_of(*names: str) -> Table:
-    """Return a table with columns of names; those that begin with ``>`` are of numbers."""
+def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
+    """Return a table with columns of names, then of numbers, then of words, which may wrap."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in names:
-        if name.startswith(">"):
-            table.add_column(name[1:], justify="right")
-        else:
-            table.add_column(name, no_wrap=True)
+        table.add_column(name, no_wrap=True)
+    for name in numbers:
+        table.add_column(name, justify="right")
+    for name in words:
+        table.add_column(name)
     return table
 
 
@@ -327,7 +327,7 @@ def _ends_of(ways: Iterable[tuple[float | None, float | None]]) -> Iterator[str]
 
 def _hand_table(hands: Iterable[Hand]) -> Table:
     parts = ("hand\nutil", "palm\nshear", "palm\npress")
-    table = table_of("hand", *(f">{name}" for name in (*AXES, *parts)))
+    table = table_of("hand", numbers=(*AXES, *parts))
     for hand in hands:
         shear, _, press = hand.palm.force
         cells = [f"{value:z.0f}" for value in hand.wrench[:3]]
@@ -338,7 +338,7 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
 
 
 def _wrist_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand", ">vx", ">vy", ">vz", ">wx", ">wy", ">wz")
+    table = table_of("hand", numbers=("vx", "vy", "vz", "wx", "wy", "wz"))
     table.add_column("palm")
     for hand in hands:
         cells = [f"{1e3 * value:z.2f}" for value in hand.wrist.twist or ()]
@@ -347,7 +347,7 @@ def _wrist_table(hands: Iterable[Hand]) -> Table:
 
 
 def _tendon_table(hands: Iterable[Hand]) -> Table:
-    table = table_of("hand", "finger", ">tension N", ">current A")
+    table = table_of("hand", "finger", numbers=("tension N", "current A"))
     table.add_column("tile")
     table.add_column("util", justify="right")
     for hand in hands:
@@ -371,7 +371,7 @@ def _joint_table(
     most = max((len(row) for row in torques.values()), default=0)
     columns = min(most, JOINTS_A_LINE)
     more = "+" if most > columns else ""
-    table = table_of("limb", *(f">{more}{i + 1}" for i in range(columns)), ">of", ">util")
+    table = table_of("limb", numbers=(*(f"{more}{i + 1}" for i in range(columns)), "of", "util"))
     table.padding = 0  # otherwise seven torques do not fit
     for limb, row in torques.items():
         used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
@@ -390,7 +390,7 @@ def _joint_table(
 
 
 def _price_table(prices: Iterable[Price]) -> Table:
-    table = table_of("hand", "finger, joint", "tile", "limit", ">price")
+    table = table_of("hand", "finger, joint", "tile", "limit", numbers=["price"])
     for price in prices:
         part = price.finger or price.joint or "-"
         names = (price.limb, part, price.phalanx or "-", price.limit)

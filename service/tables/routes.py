@@ -19,8 +19,8 @@ def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) ->
     """Print a climb, stage by stage, its crux, and where its files are."""
     out.print(f"[bold]{escape(result.route.name)}[/bold]: {len(result.route.moves)} moves")
     joints = any(plan.joint_utilisation is not None for plan in result.plans)
-    numbers = (">util", ">load factor", ">joints")[: 2 + joints]
-    table = table_of("", "move", "phase", "limb", "status", *numbers)
+    numbers = ("util", "load factor", "joints")[: 2 + joints]
+    table = table_of("", "move", "phase", "limb", "status", numbers=numbers)
     for stage, plan in zip(result.stages, result.plans, strict=True):
         of_plan = (plan.utilisation, plan.load_factor, plan.joint_utilisation)[: 2 + joints]
         shown = ("-" if number is None else f"{number:.2f}" for number in of_plan)

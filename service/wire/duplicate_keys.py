@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, Final
 
 import msgspec
@@ -34,57 +35,17 @@ def refuse_in_json(payload: bytes) -> None:
         With the key's path.
     """
     short = BULK.sub(b":[]", payload) if len(payload) > LONG else payload
-    known: list[_Repeated] = []
-
-    def kept(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        whole = dict(pairs)
-        if len(whole) == len(pairs):
-            return whole
-        known.append(_Repeated(pairs))
-        return known[-1]
-
+    found: list[_Repeated] = []
     # numbers stay text: those of thousands of digits, too
     read = json.JSONDecoder(
-        object_pairs_hook=kept, parse_int=str, parse_float=str, strict=False
+        object_pairs_hook=partial(_object, found), parse_int=str, parse_float=str, strict=False
     ).decode
     try:
         document = read(short.decode())
     except ValueError:
         document = read(payload.decode())
-    if known:
-        path, first = next(_repeated(document, ""))
-        raise _twice(path, first.key)
-
-
-class _Repeated(dict[str, Any]):
-    """An object that has a key twice.
-
-    Attributes
-    ----------
-    key : str
-        The first such.
-    """
-
-    def __init__(self, pairs: list[tuple[str, Any]]) -> None:
-        super().__init__()
-        names = iter(pairs)
-        for self.key, value in names:
-            if self.key in self:
-                break
-            self[self.key] = value
-        self.update(names)
-
-
-def _repeated(document: Any, path: str) -> Iterator[tuple[str, _Repeated]]:
-    """Yield the objects that have a key twice, and where they are."""
-    if isinstance(document, _Repeated):
-        yield path, document
-    if isinstance(document, dict):
-        for key, part in document.items():
-            yield from _repeated(part, f"{path}.{key}")
-    elif isinstance(document, list):
-        for i, part in enumerate(document):
-            yield from _repeated(part, f"{path}[{i}]")
+    if found:
+        _refuse(document, "")
 
 
 def refuse_in_msgpack(payload: bytes) -> None:
@@ -99,24 +60,60 @@ def refuse_in_msgpack(payload: bytes) -> None:
         again = msgspec.msgpack.encode(msgspec.msgpack.decode(payload))
         if again == payload:
             return
-    _look(payload, "")
+    found: list[_Repeated] = []
+    document = _maps(payload, found)
+    if found:
+        _refuse(document, "")
 
 
-def _look(value: bytes, path: str) -> None:
-    """Look into a map, and into a list whose first item is one."""
+class _Repeated(dict[str, Any]):
+    """An object that has a key twice."""
+
+    key: str
+
+
+def _object(found: list[_Repeated], pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of these keys and values; if it has a key twice, it is found."""
+    whole = dict(pairs)
+    if len(whole) < len(pairs):
+        whole = _Repeated(whole)
+        known: set[str] = set()
+        for whole.key, _ in pairs:
+            if whole.key in known:
+                break
+            known.add(whole.key)
+        found.append(whole)
+    return whole
+
+
+def _refuse(document: Any, path: str) -> None:
+    """Refuse a document in which an object has a key twice."""
+    if isinstance(document, _Repeated):
+        key = document.key
+        raise MalformedError(
+            f"the key {key[:80]!r} is given twice", field=f"{path}.{key}".removeprefix(".")
+        )
+    if isinstance(document, dict):
+        for key, part in document.items():
+            _refuse(part, f"{path}.{key}")
+    elif isinstance(document, list):
+        for i, part in enumerate(document):
+            _refuse(part, f"{path}[{i}]")
+
+
+def _maps(value: bytes, found: list[_Repeated]) -> Any:
+    """Return a map with the maps in it, and a list whose first item is one; else nothing."""
     if value[0] in MAPS:
-        keys, parts = set(), _parts(value, 2)
-        for key, part in zip(parts, parts, strict=True):
-            name = msgspec.msgpack.decode(key)
-            if name in keys:
-                raise _twice(path, str(name))
-            keys.add(name)
-            _look(part, f"{path}.{name}")
-    elif value[0] in LISTS:
+        parts = _parts(value, 2)
+        pairs = zip(parts, parts, strict=True)
+        return _object(
+            found, [(str(msgspec.msgpack.decode(key)), _maps(part, found)) for key, part in pairs]
+        )
+    if value[0] in LISTS:
         head, count = _header(value)
         if count and value[head] in MAPS:
-            for i, part in enumerate(_parts(value, 1)):
-                _look(part, f"{path}[{i}]")
+            return [_maps(part, found) for part in _parts(value, 1)]
+    return None
 
 
 def _parts(value: bytes, each: int) -> Iterator[bytes]:
@@ -132,9 +129,3 @@ def _header(value: bytes) -> tuple[int, int]:
     if size is None:
         return 1, value[0] & 0x0F
     return 1 + size, int.from_bytes(value[1 : 1 + size], "big")
-
-
-def _twice(path: str, key: str) -> MalformedError:
-    return MalformedError(
-        f"the key {key[:80]!r} is given twice", field=f"{path}.{key}".removeprefix(".")
-    )

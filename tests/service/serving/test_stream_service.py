@@ -18,7 +18,6 @@ from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
 from service.answering import Streams, dispatch, streams
 from service.answering.streams import KEPT
 from service.commands.cli import run
-from service.commands.stream import wrenches
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
@@ -357,8 +356,6 @@ def test_another_objective_is_refused(stance_file, monkeypatch, capfd) -> None:
 
 def test_a_line_is_answered_before_the_next_is_there() -> None:
     """As a control loop asks: through pipes, one at a time."""
-    lines = iter([json.dumps(WRENCH).encode() + b"\n"])
-    assert list(wrenches(lines)) == [(1, tuple(WRENCH))]
     light = json.dumps([0.8 * part for part in WRENCH])
     asked = process("stream", "wall", "--json", given=(light + "\n").encode() * 3)
     assert (asked.returncode, asked.stderr) == (0, b"")
