@@ -1,18 +1,15 @@
-"""Fits of the spine array to what is published, and of the planner's limit laws to the spine array.
+"""What is published of tiles' strengths, and fits of the planner's limit laws to the spine array.
 
-What asperities hold is not printed; it is fitted to the tile strengths of Wang, Jiang, Cutkosky
-(IJRR 2017), Fig. 7, for 20 spines or more. All random numbers are common to all evaluations of a
-fit, so that least squares see a smooth function and anyone gets the same numbers again.
+The tile strengths are those of Wang, Jiang, Cutkosky (IJRR 2017), Fig. 7. What asperities hold is
+not printed; ``parameters/spines.toml`` has what meets those of tiles with 20 spines or more.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import spine_table
@@ -22,23 +19,11 @@ __all__ = [
     "LateralFit",
     "LineFit",
     "TileShear",
-    "fit_asperity_friction",
     "fit_lateral",
     "fit_line",
-    "fit_strength",
     "measured_tile_shear",
-    "scale_strength",
     "within_law",
 ]
-
-TRIALS: Final = 2000
-"""Simulated tiles for each evaluation of a fit; means are then known to about 1 %."""
-
-SEED: Final = 2017
-"""Of the random numbers common to all evaluations."""
-
-STEP: Final = (1e-3, 1e-3)
-"""Of the logarithms of the strengths, for their derivatives."""
 
 ANGLE_ROUNDING: Final = 1e-9
 """How far an angle may be beyond φ_max and count as φ_max [rad]."""
@@ -127,77 +112,6 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
     )
 
 
-def fit_strength(array: SpineArray, cells: tuple[TileShear, ...]) -> SpineArray:
-    """Return the array with the asperity strengths that measured tiles ask for.
-
-    Least squares of the simulated means, each weighted by the length of its bar.
-
-    Parameters
-    ----------
-    array : SpineArray
-        Its strengths are where the search begins.
-    cells : tuple of TileShear
-        Those with fewer than `LEAST_SPINES` spines are left out.
-    """
-    cells = tuple(cell for cell in cells if cell.spines >= LEAST_SPINES)
-
-    def with_strength(logarithms: Array) -> SpineArray:
-        mean, deviation = np.exp(logarithms).tolist()
-        return replace(array, strength_mean=mean, strength_deviation=deviation)
-
-    def residuals(logarithms: Array) -> Array:
-        trial = with_strength(logarithms)
-        return np.array([(_mean(trial, cell) - cell.mean) / cell.error for cell in cells])
-
-    start = np.log([array.strength_mean, array.strength_deviation])
-    return with_strength(least_squares(residuals, start, diff_step=STEP).x)
-
-
-def scale_strength(array: SpineArray, shear_limit: float) -> SpineArray:
-    """Return the array with asperity strengths scaled to a tile's mean strength in shear [N].
-
-    Mean and deviation grow by one factor, so that the asperities differ as much as before.
-    """
-
-    def scaled(factor: float) -> SpineArray:
-        return replace(
-            array,
-            strength_mean=factor * array.strength_mean,
-            strength_deviation=factor * array.strength_deviation,
-        )
-
-    cell = TileShear(array.spines, array.backlash, shear_limit, 1.0)
-    factor = brentq(lambda x: _mean(scaled(x), cell) - shear_limit, 0.1, 10.0, xtol=1e-6)
-    return scaled(float(factor))
-
-
-def fit_asperity_friction(array: SpineArray, ratio: float, angle: float) -> float:
-    """Return the μ with which F(angle) / F(0) in the finger plane is a given ratio.
-
-    Parameters
-    ----------
-    array : SpineArray
-    ratio : float
-        Such as ``pull_off_ratio`` of ``parameters/surfaces.toml``.
-    angle : float
-        The loading angle φ of the ratio [rad].
-
-    Raises
-    ------
-    InvalidInputError
-        If no friction gives it.
-    """
-
-    def excess(friction: float) -> float:
-        return float(replace(array, asperity_friction=friction).share(angle)) - ratio
-
-    # from where shear just holds on the mean slope to where any slope holds at that angle
-    low, high = 1.0 / math.tan(0.5 * (array.slope_min + math.pi / 2)), math.tan(1.5)
-    if excess(low) * excess(high) > 0.0:
-        raise InvalidInputError(f"no friction gives {ratio:g} at {angle:g} rad", field="ratio")
-    return float(brentq(excess, low, high, xtol=1e-9))
-
-
 def within_law(angles: Array, pull_off_angle: float) -> Array:
     """Return which loading angles are in [0, φ_max], where Eq. 21 is published."""
     return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + ANGLE_ROUNDING))
@@ -261,9 +175,3 @@ def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> La
         rms=float(np.sqrt(np.mean(error**2))),
         worst=float(np.abs(error).max()),
     )
-
-
-def _mean(array: SpineArray, cell: TileShear) -> float:
-    """Return the mean strength in drag of tiles like a measured one, with common numbers [N]."""
-    tile = replace(array, spines=cell.spines, backlash=cell.backlash)
-    return float(tile.simulate_drag(np.random.default_rng(SEED), TRIALS).mean())

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.stats import truncnorm
 
 from hand_models import InvalidInputError, Surface
-from hand_models.parameters import spine_table, surface_table
+from hand_models.parameters import surface_table
 from hand_models.tile import (
     LEAST_SPINES,
     SpineArray,
@@ -23,9 +23,6 @@ from hand_models.tile import (
 from hand_models.tile.spine_array import spine_forces
 from hand_models.tile.spine_calibration import (
     TileShear,
-    fit_asperity_friction,
-    fit_strength,
-    scale_strength,
 )
 
 FINE = SpineArray.named("concrete-fine")
@@ -237,35 +234,14 @@ def test_the_table_is_that_of_the_figure():
 # Fits -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("concrete", "array"), [("fine", FINE), ("coarse", COARSE)])
-def test_the_fit_to_the_table_gives_the_strengths_of_the_file(concrete, array):
-    start = replace(array, strength_mean=4.0, strength_deviation=2.5)
-    fitted = fit_strength(start, measured_tile_shear(concrete))
-    assert fitted.strength_mean == pytest.approx(array.strength_mean, rel=2e-3)
-    assert fitted.strength_deviation == pytest.approx(array.strength_deviation, rel=2e-3)
-
-
-def test_the_fit_finds_strengths_again():
-    """From other random numbers than its own: 8 ± 3 N come back."""
-    true = replace(COARSE, strength_mean=8.0, strength_deviation=3.0)
-    cells = tuple(
-        TileShear(n, b, replace(true, spines=n, backlash=b).simulate_drag(rng(1), 50_000).mean(), 1)
-        for n in (20, 40, 60)
-        for b in (1e-4, 5e-4)
-    )
-    fitted = fit_strength(COARSE, cells)
-    assert fitted.strength_mean == pytest.approx(8.0, rel=0.03)
-    assert fitted.strength_deviation == pytest.approx(3.0, rel=0.05)
-
-
 @pytest.mark.parametrize(
     ("surface", "like"), [("sandpaper-36", "concrete-fine"), ("rock", "concrete-coarse")]
 )
 def test_unmeasured_surfaces_are_scaled_to_their_shear_limit(surface, like):
     limit, array = Surface.named(surface).shear_limit, SpineArray.named(surface)
-    scaled = scale_strength(SpineArray.named(like), limit)
-    assert scaled.strength_mean == pytest.approx(array.strength_mean, rel=1e-3)
-    assert scaled.strength_deviation == pytest.approx(array.strength_deviation, rel=1e-3)
+    measured = SpineArray.named(like)
+    factor = array.strength_mean / measured.strength_mean
+    assert array.strength_deviation == pytest.approx(factor * measured.strength_deviation, rel=1e-3)
     assert array.simulate_drag(rng(5), 20_000).mean() == pytest.approx(limit, rel=0.02)
 
 
@@ -274,10 +250,6 @@ def test_the_friction_of_the_file_meets_the_pull_off_ratio(surface):
     ratio = surface_table().scalar("defaults", "pull_off_ratio")
     array = SpineArray.named(surface)
     assert float(array.share(PULL_OFF_ANGLE)) == pytest.approx(ratio, rel=1e-3)
-    friction = fit_asperity_friction(replace(array, asperity_friction=0.7), ratio, PULL_OFF_ANGLE)
-    assert friction == pytest.approx(spine_table().scalar("array", "asperity_friction"), rel=1e-3)
-    with pytest.raises(InvalidInputError, match=r"no friction gives 0\.99"):
-        fit_asperity_friction(array, 0.99, PULL_OFF_ANGLE)
 
 
 def test_the_lateral_law_of_the_surfaces_is_the_arrays():
