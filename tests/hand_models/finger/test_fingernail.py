@@ -469,7 +469,7 @@ def test_a_nail_that_touches_nothing_may_carry_nothing():
     idle = answer.hands[0].fingers[3].tiles[-1]
     assert (idle.contact, idle.utilisation) == ("none", 0.0)
     assert not any(idle.force)
-    tampered = spoilt(answer, "outer_right", force=-idle.normal_axis, normal=-1.0)
+    tampered = spoilt(answer, "outer_right", force=-np.array(idle.normal_axis), normal=-1.0)
     assert "nail of outer_right carries a load but touches nothing" in complaints(
         tampered, question
     )
