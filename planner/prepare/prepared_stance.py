@@ -132,13 +132,10 @@ def assemble(
     def made() -> tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
         fixed = [hand for hand, wrist in zip(settled, wrists, strict=True) if wrist is None]
         of_fixed = iter(wrench_spaces(fixed, cap))
-        spaces = tuple(
-            [
-                rows.on(next(of_fixed) if wrist is None else wrist.linearised())
-                for wrist, rows in zip(wrists, added, strict=True)
-            ]
-        )
-        return HandBatch.of(settled), spaces, tuple([scaled_rows(space) for space in spaces])
+        plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
+        pairs = zip(plain, added, strict=True)
+        spaces = tuple([each if rows is NOTHING else rows.on(each) for each, rows in pairs])
+        return HandBatch.of(settled), spaces, tuple([scaled_rows(each) for each in spaces])
 
     own = are_own(wrists, added)
     batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)

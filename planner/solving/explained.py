@@ -193,11 +193,12 @@ def _warnings(
     question, seconds = prepared.question, deadline.seconds()
     if unfinished and seconds is not None:
         yield late_sentence(seconds, unfinished)
-    yield from _idle_preloads(prepared)
-    cap = question.limits.tendon_tension
-    yield from strained_preloads(prepared.limbs, prepared.hands.wrists, cap)
-    if found.outcome.solved and found.reading is not None:
-        yield from far_wrists(found.reading.hands)
+    if prepared.hands.floating:
+        yield from _idle_preloads(prepared)
+        cap = question.limits.tendon_tension
+        yield from strained_preloads(prepared.limbs, prepared.hands.wrists, cap)
+        if found.outcome.solved and found.reading is not None:
+            yield from far_wrists(found.reading.hands)
     if found.unproven:
         yield UNPROVEN
     if told.path is not None and not told.path.safe:
