@@ -1,2 +1,2 @@
-from .check import Check as Check, problems as problems
+from .check import Check as Check
 from .loads_check import LoadsCheck as LoadsCheck

@@ -20,59 +20,21 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, BoundedStore
-from hand_models.hand import SettledHand
+from hand_models.base import SKEW, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, Question
-from planner.result import HandPlan, PlanArrays
-from planner.verification.joint_balance import CROSS
+from planner.result import PlanArrays
 from planner.verification.limbs import check_asked, check_limbs, force_use
 from planner.verification.recomputation import Recomputing
 from planner.verification.sentences import COUNT, UTILISATION
 
-__all__ = ["BALANCE", "Check", "problems"]
+__all__ = ["BALANCE", "Check"]
 
 BALANCE: Final = 1e-6
 """Largest error of the balance, relative to the body wrench (moments over a metre)."""
 
 EFFORT: Final = 1e-6
 """How far the effort may be from what the plan says, relative."""
-
-
-def problems(
-    question: Question,
-    settled: Sequence[SettledHand],
-    hands: Sequence[HandPlan],
-    utilisation: float,
-    body_wrench: Array,
-    where: Posture | None = None,
-    effort: float | None = None,
-) -> list[str]:
-    """Return what is wrong with a plan, each in a sentence; nothing if it may leave.
-
-    Parameters
-    ----------
-    question : Question
-    settled : sequence of SettledHand
-        The hands on their holds.
-    hands : sequence of HandPlan
-        The plan's numbers.
-    utilisation : float
-        The plan's.
-    body_wrench : ndarray, shape (6,)
-        The one planned for, in B.
-    where : Posture, optional
-        The joints; None if the question says nothing of them.
-    effort : float, optional
-        The plan's.
-    """
-    check = Check(question, HandBatch.of(settled), where)
-    found = [
-        f"{place.limb}: the plan is of {hand.limb}"
-        for place, hand in zip(question.stance.hands, hands, strict=True)
-        if place.limb != hand.limb
-    ]
-    return found + check.problems(PlanArrays.of(hands), utilisation, body_wrench, effort)
 
 
 class Check:
@@ -86,6 +48,11 @@ class Check:
         The hands on their holds.
     where : Posture, optional
         The joints; None if the question says nothing of them.
+
+    Attributes
+    ----------
+    carry : ndarray, shape (6, 6 H)
+        From the hands' wrenches on the rock, each in its H, to the rock's reaction in B.
     """
 
     def __init__(self, question: Question, known: HandBatch, where: Posture | None = None) -> None:
@@ -102,11 +69,13 @@ class Check:
             if place.wrench or place.limb in question.present or place.limb in limits.per_hand
         ]
         poses = [place.pose for place in stance.hands]
-        into_body = stance.body.rotation
-        turns = np.concatenate([pose.rotation for pose in poses])
-        self.turns = turns.reshape(-1, 3, 3).transpose(0, 2, 1) @ into_body
-        at = np.array([pose.position for pose in poses]) - stance.body.position
-        self.at = (at @ into_body).T
+        into_body = stance.body.rotation.T
+        turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+        levers = (np.array([pose.position for pose in poses]) - stance.body.position) @ into_body.T
+        carry = np.zeros((len(poses), 6, 6))
+        carry[:, :3, :3] = carry[:, 3:, 3:] = turns
+        carry[:, 3:, :3] = (levers @ SKEW.reshape(3, 9)).reshape(-1, 3, 3) @ turns
+        self.carry = -carry.transpose(1, 0, 2).reshape(6, -1)
 
     # Checking -----------------------------------------------------------------------------------
 
@@ -140,8 +109,8 @@ class Check:
             worst = max([float(np.maximum.reduce(again.hands)), *used])
             if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
-            off, size = self.reaction(arrays.wrenches) - body_wrench, math.hypot(*body_wrench)
-            error = math.hypot(*off)
+            reaction = self.carry @ arrays.wrenches.ravel()
+            error, size = math.hypot(*(reaction - body_wrench)), math.hypot(*body_wrench)
             if not error <= BALANCE * max(size, 1.0):
                 found.append(f"balance is off by {error:.3g} of {size:.3g}")
             if effort is not None:
@@ -158,13 +127,6 @@ class Check:
             return {}
         told = dict(zip(self.limbs, wrenches, strict=True))
         return check_limbs(found, self.question, told, body_wrench, self.where)
-
-    def reaction(self, wrenches: Array) -> Array:
-        """Return the rock's reaction to the hands' wrenches on it (H, 6), in B, shape (6,)."""
-        in_body = wrenches.reshape(-1, 2, 3) @ self.turns
-        total = np.add.reduce(in_body)
-        total[1] += (self.at @ in_body[:, 0]).ravel() @ CROSS
-        return np.asarray(-total.ravel())
 
     def asked_for(
         self, found: list[str], arrays: PlanArrays, joints: Mapping[str, Array]

@@ -4,9 +4,9 @@ Nothing here is shared with the way the plan was found, which settles every fing
 and knows the tendon by its regimes. The postures that the plan tells are held against the chain of
 phalanges and the rock; slips are measured along the rock between a tile's contacts before and
 after, and where its bed of springs bears between them is integrated; stick and slip of the tendon
-are solved as one complementarity problem (`FingerTendon.held`), and the normals from the balance of
-the free joints; what tiles do across the finger and the palm against the rock is put into their own
-laws (Section 5.3).
+are solved as one complementarity problem (`FingerTendon.held`), the normals by the balance of the
+free joints (`JointBalance.solved`); what tiles do across the finger and the palm against the rock
+is put into their own laws (Section 5.3).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.finger import PHALANGES, SettledFinger
+from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
 from hand_models.tendon import FingerTendon, TendonState, share_load
 from planner.result import WristPlan
 from planner.verification.rolling_contacts import Face, slip_of
 
-__all__ = ["ClaimedFinger", "FingerCheck", "check_finger", "check_palm", "moved"]
+__all__ = ["MovedFinger", "check_finger", "check_palm"]
 
 PLACE: Final = 1e-9
 """How far a contact may be above its phalanx, or below [m]."""
@@ -33,46 +33,23 @@ BEARS: Final = 1e-7
 """How far along it a contact may be from where its tile bears [m]."""
 
 
-class ClaimedFinger(NamedTuple):
-    """What a plan says of one finger.
+class MovedFinger(NamedTuple):
+    """A finger of a floating hand, where its wrist goes.
 
     Attributes
     ----------
-    loads, positions : ndarray, shape (n, 3)
-    axes : ndarray, shape (n, 3, 3)
-        As `HandPlan` has them, of its tiles.
-    tension : float
-    """
-
-    loads: Array
-    positions: Array
-    axes: Array
-    tension: float
-
-
-class FingerCheck(NamedTuple):
-    """A floating finger as recomputed.
-
-    Attributes
-    ----------
-    shear, normal : ndarray, shape (n,)
+    shear : ndarray, shape (n,)
         Of each tile, the base tile's first if there is one [N].
-    lateral : ndarray, shape (n,)
-        [N]
-    stop : ndarray, shape (3,)
-        Torque with which each joint presses on its stop [N·m].
-    tension : float
-        Of the tendon where it leaves its motor [N].
-    wrong : tuple of str
-        What of its posture cannot be.
+    torques : ndarray, shape (3,), or None
+        What the tendon leaves of each joint's spring [N·m]; None where only the model knows how far
+        the tiles slip.
+    joints : ndarray, shape (3, 2)
+        Along the straight finger and into the rock, from its proximal joint at rest [m].
     """
 
     shear: Array
-    normal: Array
-    lateral: Array
-    stop: Array
-    tension: float
-    wrong: tuple[str, ...]
+    torques: Array | None
+    joints: Array
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:
@@ -86,40 +63,45 @@ def moved(place: Array, wrist: WristPlan) -> Array:
 
 
 def check_finger(
+    found: list[str],
+    name: str,
     hand: SettledHand,
     index: int,
-    planned: ClaimedFinger,
+    planned: tuple[Array, Array, Array, float],
     wrist: WristPlan,
-    preload: float,
-    at_rest: Array,
-) -> FingerCheck:
-    """Recompute one finger of a floating hand.
+    at_rest: tuple[float, Array],
+    allowed: float,
+) -> MovedFinger:
+    """Check what a plan says of one finger of a floating hand, but for its normals.
 
     Parameters
     ----------
+    found : list of str
+        What is wrong so far; what cannot be is appended.
+    name : str
     hand : SettledHand
         At rest.
     index : int
         Of the finger.
-    planned : ClaimedFinger
+    planned : (ndarray, ndarray, ndarray, float)
+        Loads, points and axes of its tiles as `PlanArrays` has them; its tension.
     wrist : WristPlan
-    preload : float
-        Of its tendon at rest [N].
-    at_rest : ndarray, shape (n,)
-        Shears of its tiles at rest [N].
+    at_rest : (float, ndarray)
+        Its tendon's tension and its tiles' shears [N].
+    allowed : float
+        Error that its loads may have [N].
     """
     finger, model = hand.fingers[index], hand.fingers[index].model
     frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
     own = np.flatnonzero(hand.finger_of == index)
     outer = len(own) > len(PHALANGES)
-    loads = planned.loads[-len(PHALANGES) :]
-    positions, axes = planned.positions[-len(PHALANGES) :], planned.axes[-len(PHALANGES) :]
+    loads, *places, tension = planned
+    positions, axes = (part[-len(PHALANGES) :] for part in places)
     step = moved(frame.joint, wrist)
     turned = -float(wrist.twist[3:] @ frame.across)
     joint = np.array([step @ frame.along, step[2]])
     section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
-    wrong: list[str] = []
-    angles, joints, points, slips = [], [], [], []
+    angles, joints, slips = [], [], []
     exact = True
     depths = model.depths(outer) * hand.closing_tension
     for j, (position, (drag, _, _), contact) in enumerate(
@@ -132,12 +114,11 @@ def check_finger(
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
         if not abs(rise - face.height) <= PLACE:
-            wrong.append(f"{PHALANGES[j]} contact is {rise:.6g} m above its joint")
+            found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
         dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
         u = np.array([dragged.real, dragged.imag])
         angles.append(cmath.phase(dragged))
         joints.append(joint)
-        points.append(point)
         slip = 0.0
         if contact.kind in ("face", "edge") and section is not None:
             before = np.array(contact.point(model.tile_height))
@@ -145,34 +126,33 @@ def check_finger(
             exact &= slipped is not None
             slip = slipped or 0.0
             if not abs(off) <= BEARS:
-                wrong.append(f"{PHALANGES[j]} contact is {off:.3g} m from where its tile bears")
+                found.append(
+                    f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
+                )
         slips.append(slip)
         joint = joint + model.joint_spacing * u
     rest = np.array([contact.angle for contact in finger.contacts])
     change = np.array(angles) - rest
     change = change - math.tau * np.round(change / math.tau)
     turns = np.diff(change, prepend=turned)
-    shear = planned.loads[:, 0].copy()
-    tendon, state = _tendon(hand, index, preload, at_rest)
-    tension, local = planned.tension, None
+    shear, torques = loads[:, 0].copy(), None
+    off = np.abs(_laterals(hand, frame, own, wrist) - loads[:, 2]).max()
     if exact:
+        tendon, state = _tendon(hand, index, *at_rest)
         base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
         held = tendon.held(
             state,
             [base, *slips] if outer else slips,
             [0.0, *turns] if outer else turns,
         )
-        shear, local = held.shears, held.tensions[-len(PHALANGES) :]
-        tension = float(held.tensions[0])
-    normal, stop = _normals(finger, shear, local, np.array(joints), np.array(points), angles, turns)
-    if local is None:
-        normal = loads[:, 1]
-        stop = np.zeros(len(PHALANGES))
-    if outer:
-        normal = np.append(0.0, normal)
-    return FingerCheck(
-        shear, normal, _laterals(hand, frame, own, wrist), stop, tension, tuple(wrong)
-    )
+        shear = held.shears
+        springs = np.array(model.joint_stiffness) * (np.diff(rest, prepend=0.0) + turns)
+        torques = held.tensions[-len(PHALANGES) :] * model.pulley_radii
+        torques -= np.array(model.joint_preload) + springs
+        off = max(off, abs(held.tensions[0] - tension))
+    if not off <= allowed:
+        found.append(f"{name} does not hold what the plan says")
+    return MovedFinger(shear, torques, np.array(joints))
 
 
 def _tendon(
@@ -197,44 +177,6 @@ def _tendon(
     return tendon, TendonState(preload, np.asarray(preload * losses), at_rest)
 
 
-def _normals(
-    finger: SettledFinger,
-    shear: Array,
-    local: Array | None,
-    joints: Array,
-    points: Array,
-    angles: list[float],
-    turns: Array,
-) -> tuple[Array, Array]:
-    """Return normals by the balance of the free joints, and what presses on the others' stops."""
-    model, count = finger.model, len(PHALANGES)
-    normals, stop = np.zeros(count), np.zeros(count)
-    if local is None:
-        return normals, stop
-    rest = np.array([contact.angle for contact in finger.contacts])
-    bends = np.diff(rest, prepend=0.0) + turns
-    A, b = np.zeros((count, count)), np.zeros(count)
-    for i in range(count):
-        b[i] = local[i] * model.pulley_radii[i] - model.joint_preload[i]
-        b[i] -= model.joint_stiffness[i] * bends[i]
-        for j in range(i, count):
-            arm = points[j] - joints[i]
-            way = angles[j] + finger.contacts[j].tilt
-            u = np.array([math.cos(way), math.sin(way)])
-            # the rock's forces on the phalanx: shear along u, the normal against (−u_z, u_x)
-            b[i] += (arm[0] * u[1] - arm[1] * u[0]) * shear[j - count]
-            A[i, j] = arm[0] * u[0] + arm[1] * u[1]
-    free = [i for i, contact in enumerate(finger.contacts) if contact.stop is None]
-    bears = [i for i, contact in enumerate(finger.contacts) if contact.kind != "none"]
-    if free:
-        normals[bears] = np.linalg.solve(A[np.ix_(free, bears)], b[free])
-    left = b - A @ normals
-    sides = {"upper": 1.0, "lower": -1.0}
-    for i, contact in enumerate(finger.contacts):
-        stop[i] = sides.get(str(contact.stop), 0.0) * left[i]
-    return normals, stop
-
-
 def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristPlan) -> Array:
     """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
     found = np.zeros(len(own))
@@ -257,11 +199,16 @@ def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristP
 
 
 def check_palm(
-    hand: SettledHand, limb: str, force: Array, wrist: WristPlan, allowed: float
-) -> list[str]:
-    """Return what is wrong with the force of the palm of a floating hand."""
+    found: list[str],
+    limb: str,
+    hand: SettledHand,
+    force: Array,
+    wrist: WristPlan,
+    allowed: float,
+) -> None:
+    """Check the force of the palm of a floating hand."""
     if not hand.palm.engaged:
-        return []
+        return
     body, stiffness, whole = hand.hand, 0.0, 0.0
     for share, engaged in hand.palm.layers:
         sharing = share_load(
@@ -276,6 +223,7 @@ def check_palm(
     shear = max(-stiffness * step[0], 0.0)
     pressing = max(body.palm_pressing_stiffness * whole * step[2], 0.0)
     off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
-    if off <= allowed:
-        return []
-    return [f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"]
+    if not off <= allowed:
+        found.append(
+            f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"
+        )

@@ -27,7 +27,7 @@ from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
 from planner.prepare import KEPT, NONE, NOTHING, HandBatch, TileIndex
 
-__all__ = ["CROSS", "LEVER", "JointBalance", "TendonEffects", "tendons_of", "wrenches_of"]
+__all__ = ["LEVER", "Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
 JOINTS: Final = len(PHALANGES)
 
@@ -57,63 +57,51 @@ def wrenches_of(points: Array, forces: Array) -> Array:
     return np.concatenate((forces, moments), axis=1)
 
 
-class TendonEffects(NamedTuple):
-    """What the fingers' tendons do at their joints and tiles, all of which touch.
+@lru_cache(maxsize=KEPT)
+def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array]:
+    """Return what the tendons of hands do, all of one model whose tiles all touch.
 
-    Attributes
-    ----------
-    stiffness, preload : ndarray, shape (3,)
-        Of the joints' springs [N·m/rad], [N·m].
-    radii : ndarray, shape (3,)
-        Of the pulleys [m].
-    travel : float
-        How much tendon a tile draws in per newton of its spring [m/N].
-    drawn : ndarray, shape (F,)
-        How much tiles without shear draw in per newton of tension [m/N].
+    Returns
+    -------
     pull : ndarray, shape (F, 3)
         M r of the joints [m].
     gain, engaged : ndarray, shape (T,)
         Shear of each tile per newton of tension, and at zero tension per newton of closing tension;
         of nails zero.
     """
-
-    stiffness: Array
-    preload: Array
-    radii: Array
-    travel: float
-    drawn: Array
-    pull: Array
-    gain: Array
-    engaged: Array
-
-
-@lru_cache(maxsize=KEPT)
-def tendons_of(places: TileIndex, hand: HandModel) -> TendonEffects:
-    """Return what the tendons of hands do, all of one model."""
-    model, drive = hand.finger, hand.drive
+    model = hand.finger
     loss = 1.0 - model.friction
     # what is left of the tension at each phalanx's tile; a base tile comes first
     local: Array = np.full((len(places.phalanges), JOINTS), loss) ** np.arange(JOINTS)
     local[places.base_fingers] *= loss
-    radii = np.array(model.pulley_radii)
     gain, engaged = np.zeros((2, len(places.hand)))
     gain[places.phalanges] = local * model.shear_gain
     gain[places.bases] = model.shear_gain
     engaged[places.phalanges] = local * (np.array(model.engagement) - model.shear_gain)
     engaged[places.bases] = model.base_engagement - model.shear_gain
-    travel = drive.pulley_ratio / drive.tile_stiffness
-    strands = local.sum(axis=1)
-    strands[places.base_fingers] += 1.0
-    return TendonEffects(
-        stiffness=np.array(model.joint_stiffness),
-        preload=np.array(model.joint_preload),
-        radii=radii,
-        travel=travel,
-        drawn=travel * drive.pulley_ratio * strands,
-        pull=local * radii,
-        gain=gain,
-        engaged=engaged,
-    )
+    return local * model.pulley_radii, gain, engaged
+
+
+class Fingers(NamedTuple):
+    """Fingers on their holds, and what they carry but for their tiles' normals.
+
+    Attributes
+    ----------
+    shear : ndarray, shape (T,)
+        Of each tile [N].
+    torques : ndarray, shape (F, 3)
+        What tendons leave of the joints' springs [N·m].
+    joints : ndarray, shape (F, 3, 2)
+        Along each straight finger and into the rock, from its proximal joint [m].
+    points, axes : ndarray, shapes (T + …, 3), (T, 3, 3)
+        Of the tiles.
+    """
+
+    shear: Array
+    torques: Array
+    joints: Array
+    points: Array
+    axes: Array
 
 
 class JointBalance:
@@ -134,17 +122,20 @@ class JointBalance:
     def __init__(self, known: HandBatch) -> None:
         hands, places, touch = known.hands, known.places, known.touch
         self._known, body = known, hands[0].hand
-        self._tendons = tendons = tendons_of(places, body)
+        self._pull, gain, engaged = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
-        self._shear = tendons.engaged * closing.take(places.hand) * known.engagement
-        self._gain = tendons.gain * known.engagement
-        self._rest = known.bends * -tendons.stiffness - tendons.preload
-        planes = _planes_of(body, tuple([hand.grasp.outer_rotation for hand in hands]))
+        self._shear = engaged * closing.take(places.hand) * known.engagement
+        self._gain = gain * known.engagement
+        self._rest = known.bends * -np.array(body.finger.joint_stiffness)
+        self._rest -= body.finger.joint_preload
+        self._planes = planes = _planes_of(
+            body, tuple([hand.grasp.outer_rotation for hand in hands])
+        )
         directions = np.empty((*known.angles.shape, 2))
         np.cos(known.angles, out=directions[:, :, 0])
         np.sin(known.angles, out=directions[:, :, 1])
-        self._axes = planes.chain @ directions @ planes.turns
-        self._axes += planes.axes
+        self._joints = planes.chain @ directions
+        self._axes = self._axes_of(self._joints)
 
         self.held: NDArray[np.bool_] | None = None
         self.stop_fingers = self.stop_joints = NONE
@@ -172,10 +163,9 @@ class JointBalance:
         wrenches : ndarray, shape (T + …, 6)
             Of each tile on the rock about the origin of H, first those of the tiles.
         """
-        outward = OUTWARD @ wrenches.take(self._known.places.phalanges, 0)
-        found = self._tendons.pull * tensions[:, None]
+        found = self._pull * tensions[:, None]
         found += self._rest
-        found -= np.add.reduce(self._axes * outward, axis=2)
+        found -= _turned(self._axes, wrenches.take(self._known.places.phalanges, 0))
         return found
 
     def stops(self, left: Array) -> Array:
@@ -184,12 +174,12 @@ class JointBalance:
             return NOWHERE
         return np.asarray(left[self.stop_fingers, self.stop_joints] * self._sides)
 
-    def solved(self, tensions: Array) -> tuple[Array, Array, Array]:
+    def solved(self, fingers: Fingers) -> tuple[Array, Array]:
         """Solve the balance of the joints that are free for the normals.
 
         Returns
         -------
-        shear, normal : ndarray, shape (T,)
+        normal : ndarray, shape (T,)
             Of each tile [N]; of nails zero.
         left : ndarray, shape (F, 3)
             As of `left`.
@@ -199,12 +189,12 @@ class JointBalance:
         numpy.linalg.LinAlgError
             If contacts do not hold the joints that are free.
         """
-        known, places = self._known, self._known.places
-        shear, normal = self.shears(tensions), np.zeros(len(places.hand))
-        points, axes = known.points[: len(shear)], known.axes
-        along, into = wrenches_of(points, axes[:, 0]), wrenches_of(points, axes[:, 1])
-        left = self.left(tensions, along * shear[:, None])
-        turns = self._axes @ into[places.phalanges].transpose(0, 2, 1) * OUTWARD
+        phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.shear)]
+        along = wrenches_of(points, fingers.axes[:, 0] * fingers.shear[:, None])
+        into = wrenches_of(points, fingers.axes[:, 1])
+        rows = self._axes_of(fingers.joints)
+        left = fingers.torques - _turned(rows, along[phalanges])
+        turns = rows @ into[phalanges].transpose(0, 2, 1) * OUTWARD
         A, b = turns.copy(), left.copy()
         if self.held is not None:
             which, held = self.held.nonzero()
@@ -215,8 +205,24 @@ class JointBalance:
             A[which, held], b[which, held] = 0.0, 0.0
             A[which, held, phalanx] = 1.0
         normals = np.linalg.solve(A, b[:, :, None])
-        normal[places.phalanges] = normals[:, :, 0]
-        return shear, normal, left - (turns @ normals)[:, :, 0]
+        normal = np.zeros(len(fingers.shear))
+        normal[phalanges] = normals[:, :, 0]
+        return normal, left - (turns @ normals)[:, :, 0]
+
+    def fingers(self, tensions: Array) -> Fingers:
+        """Return the fingers at rest, with their tendons' tensions (F,)."""
+        known = self._known
+        torques = self._pull * tensions[:, None] + self._rest
+        return Fingers(self.shears(tensions), torques, self._joints, known.points, known.axes)
+
+    def _axes_of(self, joints: Array) -> Array:
+        """Return the joints' axes where these are, as rows for wrenches, shape (F, 3, 6)."""
+        return np.asarray(joints @ self._planes.turns + self._planes.axes)
+
+
+def _turned(axes: Array, wrenches: Array) -> Array:
+    """Return what wrenches of each finger's phalanges turn its joints with, shape (F, 3) [N·m]."""
+    return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=2))
 
 
 class _Planes(NamedTuple):

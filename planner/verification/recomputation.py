@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from hand_models.hand import FINGERS, HELD, HandModel
 from planner.prepare import KEPT, HandBatch, TileIndex
 from planner.question import HandOnHold
 from planner.result import PlanArrays
-from planner.verification.floating import ClaimedFinger, check_finger, check_palm
-from planner.verification.joint_balance import JointBalance, tendons_of, wrenches_of
+from planner.verification.floating import check_finger, check_palm
+from planner.verification.joint_balance import Fingers, JointBalance, tendons_of, wrenches_of
 from planner.verification.limit_surface import LimitCurves, planes_of
 from planner.verification.nails import NO_NAILS, Nails
 from planner.verification.sentences import COUNT, LOAD, PALM_SIGNS, UTILISATION, Recomputed
@@ -32,47 +32,49 @@ PULLING: Final = np.array([np.inf, np.inf, 0.0])
 """Of a hand's force, what does not press."""
 
 WINCH, DRIVEN, SHEAR, TIP = 2, 3, 6, 7
-"""Rows of `Uses`: winch angles, the first that is a utilisation, of fingers' shears and tips."""
+"""Rows of `_uses_of`: winches, the first that is a utilisation, shears and tips of fingers."""
 
 most = np.maximum.reduce
 
 
-class Uses(NamedTuple):
-    """What tensions do to tendons, motors and fingers, in rows over all fingers.
+@lru_cache(maxsize=KEPT)
+def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> tuple[Array, Array, Array]:
+    """Return what tensions do to tendons, motors and fingers, in rows over all fingers.
 
     Torque and current of the motors, angle of the winches; then utilisations of tendons, by the
     motors' torque and current, of the shears of fingers, and of their tips.
 
-    Attributes
+    Parameters
     ----------
-    per_newton : ndarray, shape (8, F)
-    at_zero : ndarray, shape (8, F)
-        Of straight fingers.
+    places : TileIndex
+    hand : HandModel
+        Which all hands are.
+    strength : float
+        What every tendon may hold [N].
+
+    Returns
+    -------
+    per_newton, at_zero : ndarray, shape (8, F)
+        Of tension; of straight fingers without any.
     per_shear : ndarray, shape (8, 1)
         Per newton of the shears of a finger's tiles together, which pull them away from the winch.
     """
-
-    per_newton: Array
-    at_zero: Array
-    per_shear: Array
-
-
-@lru_cache(maxsize=KEPT)
-def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> Uses:
-    """Return what tensions do, where all hands are of one model; ``strength``: of a tendon [N]."""
-    drive, tendons = hand.drive, tendons_of(places, hand)
+    drive, (_, gain, _) = hand.drive, tendons_of(places, hand)
+    # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
+    travel = drive.pulley_ratio / drive.tile_stiffness / drive.winch_radius
+    strands = np.add.reduceat(gain, places.first_of_finger) / hand.finger.shear_gain
     torque = drive.winch_radius / drive.gear_ratio / drive.efficiency
     current, idle = torque / drive.torque_constant, drive.no_load_current
     driven = [torque / drive.maximum_torque, current / drive.maximum_current]
-    per_newton, at_zero = np.zeros((2, TIP + 1, len(tendons.pull)))
+    per_newton, at_zero = np.zeros((2, TIP + 1, len(strands)))
     per_newton[:SHEAR] = np.array([torque, current, 0.0, 1.0 / strength, *driven])[:, None]
-    per_newton[WINCH] = tendons.drawn / drive.winch_radius
+    per_newton[WINCH] = travel * drive.pulley_ratio * strands
     at_zero[1], at_zero[SHEAR - 1] = idle, idle / drive.maximum_current
     at_zero[WINCH] = hand.nail.pulley_radius * hand.nail.retraction / drive.winch_radius
     per_shear = np.zeros((TIP + 1, 1))
-    per_shear[WINCH] = -tendons.travel / drive.winch_radius
+    per_shear[WINCH] = -travel
     per_shear[SHEAR] = 1.0 / hand.structure.finger_shear
-    return Uses(per_newton, at_zero, per_shear)
+    return per_newton, at_zero, per_shear
 
 
 class Recomputing:
@@ -99,9 +101,9 @@ class Recomputing:
         self._whole = known.touch.touches / shares
         self._curves = LimitCurves([hand.surface for hand in hands], index.hand, shares)
         self._palm_shares = PALM_SIGNS / known.palm_limits
-        self._uses = uses = _uses_of(index, body, strength)
-        self._at_zero = uses.at_zero.copy()
-        self._at_zero[WINCH] += known.bends @ (tendons_of(index, body).radii / self._winch)
+        self._per_newton, straight, self._per_shear = _uses_of(index, body, strength)
+        self._at_zero = straight.copy()
+        self._at_zero[WINCH] += known.bends @ (np.array(body.finger.pulley_radii) / self._winch)
         self._nails = Nails(known) if len(index.nails) else None
         drawing = [
             i
@@ -144,19 +146,17 @@ class Recomputing:
         if floats:
             # the motors of hands that float stand still where they have tightened their tendons
             wound = self._wound(f, floats)
-            drawn, normal, at_rest = balance.solved(wound)
-            shear, stops = drawn.copy(), balance.stops(at_rest)
-            for h in floats:
-                self._float(found, arrays, h, (wound, shear, normal, stops))
+            drawn = balance.shears(wound)
+            shear, normal, stops = self._floated(found, arrays, floats, wound)
             again = np.column_stack((shear, normal, again[:, 2]))
-        uses = self._uses.per_newton * f
+        uses = self._per_newton * f
         uses += self._at_zero
-        uses += self._uses.per_shear * np.add.reduceat(drawn, places.first_of_finger)
+        uses += self._per_shear * np.add.reduceat(drawn, places.first_of_finger)
         uses[TIP] = normal.take(places.tips) / self._body.structure.fingertip_force
         if floats:
-            uses[WINCH] += self._uses.per_newton[WINCH] * (wound - f)
+            uses[WINCH] += self._per_newton[WINCH] * (wound - f)
             sums = np.add.reduceat(shear, places.first_of_finger)
-            uses[SHEAR] = self._uses.per_shear[SHEAR] * sums
+            uses[SHEAR] = self._per_shear[SHEAR] * sums
 
         planes = (planes_of(arrays.half_planes, places) @ again[:, :, None])[:, :, 0]
         used = most(planes, axis=1)
@@ -164,7 +164,7 @@ class Recomputing:
         curve = self._curves.excess(again[:, 0], again[:, 1], again[:, 2], UTILISATION)
         if not most(curve) <= LOAD:
             # beyond its half-planes a tile may be outside the surface, too
-            curve[(used > 1.0) | known.touch.away] = -np.inf
+            curve[(used > 1.0) | known.touch.away] = 0.0
         hooked = NO_NAILS
         if self._nails is not None:
             hooked = self._nails.loads(arrays)
@@ -199,7 +199,7 @@ class Recomputing:
             stops=stops,
             stop_fingers=balance.stop_fingers,
             drawing=self._drawing,
-            slackened=f.take(self._drawing) - self._closing,
+            slackened=f[self._drawing] - self._closing,
             nails=hooked,
             curves=curve,
             forces=arrays.forces[:tiles] - (arrays.loads[:, None] @ arrays.axes)[:, 0],
@@ -218,8 +218,8 @@ class Recomputing:
         """Return the numbers with the loads that fixed hands' tensions give by Eq. 6."""
         if again.floats:
             return again
-        shear, normal, _ = self._balance.solved(again.arrays.tensions)
-        return again._replace(shear=shear, normal=normal)
+        fingers = self._balance.fingers(again.arrays.tensions)
+        return again._replace(shear=fingers.shear, normal=self._balance.solved(fingers)[0])
 
     # Floating wrists ----------------------------------------------------------------------------
 
@@ -232,36 +232,42 @@ class Recomputing:
             own[:] = self.known.hands[h].closing_tension if preload is None else preload
         return wound
 
-    def _float(
-        self,
-        found: list[str],
-        arrays: PlanArrays,
-        h: int,
-        loads: tuple[Array, Array, Array, Array],
-    ) -> None:
-        """Put what a floating hand carries where its wrist goes in place of that at rest.
+    def _floated(
+        self, found: list[str], arrays: PlanArrays, floats: Sequence[int], wound: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return shears, normals and what presses on stops of hands of which some float.
 
-        ``loads``: the preloads, shears, normals and what presses on stops.
+        ``wound``: to which tensions winches have drawn the tendons.
         """
-        hand, limb, wrist = self.known.hands[h], self.limbs[h], arrays.wrists[h]
-        assert wrist is not None
-        (preloads, shear, normal, stops), balance = loads, self._balance
-        allowed = float(self.allowed(arrays)[h])
-        for i, name in enumerate(FINGERS):
-            finger = COUNT * h + i
-            own = np.flatnonzero(self.known.places.finger == finger)
-            said = ClaimedFinger(
-                arrays.loads[own],
-                arrays.points[own],
-                arrays.axes[own],
-                float(arrays.tensions[finger]),
-            )
-            check = check_finger(hand, i, said, wrist, float(preloads[finger]), shear[own])
-            shear[own], normal[own] = check.shear, check.normal
-            mine = balance.stop_fingers == finger
-            stops[mine] = check.stop[balance.stop_joints[mine]]
-            found.extend(f"{limb}: {name}: {sentence}" for sentence in check.wrong)
-            off = float(np.abs(check.lateral - said.loads[:, 2]).max())
-            if not max(off, abs(check.tension - said.tension)) <= allowed:
-                found.append(f"{limb}: {name} does not hold what the plan says")
-        found.extend(check_palm(hand, limb, arrays.palms[h], wrist, allowed))
+        known, allowed, balance = self.known, self.allowed(arrays), self._balance
+        places, fingers = known.places, balance.fingers(wound)
+        unknown: list[int] = []
+        fingers = Fingers(*(part.copy() for part in fingers))
+        for h in floats:
+            hand, limb, wrist = known.hands[h], self.limbs[h], arrays.wrists[h]
+            assert wrist is not None
+            for i, name in enumerate(FINGERS):
+                finger = COUNT * h + i
+                own = np.flatnonzero(places.finger == finger)
+                fingers.points[own], fingers.axes[own] = arrays.points[own], arrays.axes[own]
+                planned = arrays.loads[own], arrays.points[own], arrays.axes[own]
+                there = check_finger(
+                    found,
+                    f"{limb}: {name}",
+                    hand,
+                    i,
+                    (*planned, float(arrays.tensions[finger])),
+                    wrist,
+                    (float(wound[finger]), fingers.shear[own]),
+                    float(allowed[h]),
+                )
+                fingers.shear[own], fingers.joints[finger] = there.shear, there.joints
+                if there.torques is None:
+                    unknown.append(finger)
+                else:
+                    fingers.torques[finger] = there.torques
+            check_palm(found, limb, hand, arrays.palms[h], wrist, float(allowed[h]))
+        normal, left = balance.solved(fingers)
+        told = places.phalanges[unknown]
+        normal[told], left[unknown] = arrays.loads[told, 1], 0.0
+        return fingers.shear, normal, balance.stops(left)

@@ -91,16 +91,13 @@ def slip_of(
     radius = _radius(section, before)
     if radius is None:
         return None, 0.0
-    if not (face.lies and radius < FLATTEST):
+    rolls, touches = face.lies and radius < FLATTEST, [face.along, along]
+    if rolls:
+        touches[0] += _beside(section, radius, before, face.way)
+        touches[1] += _beside(section, radius, there, way)
+    if not (rolls and face.near <= touches[0] <= face.far):
         off = along - face.along
         return off - _arc(section, before, there, way, face.way if face.lies else None), off
-    touches = [
-        place + _beside(section, radius, point, axis)
-        for place, point, axis in ((face.along, before, face.way), (along, there, way))
-    ]
-    if not face.near <= touches[0] <= face.far:
-        off = along - face.along
-        return off - _arc(section, before, there, way, face.way), off
     touches[1] = min(max(touches[1], face.near), face.far)
     went = face.bears(touches[1], radius) - face.bears(touches[0], radius)
     first = before + (touches[0] - face.along) * face.way

@@ -24,7 +24,6 @@ __all__ = [
     "STOP",
     "STOPS",
     "UTILISATION",
-    "Claim",
     "Recomputed",
 ]
 
@@ -78,15 +77,6 @@ STOPS: Final = len(SIGNED) - 1
 
 BOUNDED: Final = (("curve", "tiles"), ("holds", "hands"), ("slips", "nails"))
 """The same of `Recomputed.bounded`."""
-
-
-class Claim(NamedTuple):
-    """Drives or utilisations of one kind: what they are, what the plan says, and their names."""
-
-    used: Array
-    told: Array
-    relative: float
-    name: Callable[[int], str]
 
 
 class Recomputed(NamedTuple):
@@ -170,17 +160,14 @@ class Recomputed(NamedTuple):
 
     def signed(self) -> tuple[Array, ...]:
         """Return what may not be below zero, and is affine in the loads."""
-        f, palms, nails = self.arrays.tensions, self.arrays.palms[:, ::2], self.nails
-        # NaN, and so off, where a tension is infinite
-        tensions, framed = f + 0.0 * f, self.normal * self.known.touch.framed
         return (
-            tensions,
+            self.arrays.tensions,
             self.shear,
-            framed,
-            palms * PALM_SIGNS,
+            self.normal * self.known.touch.framed,
+            self.arrays.palms[:, ::2] * PALM_SIGNS,
             self.slackened,
-            nails.opening,
-            nails.grips,
+            self.nails.opening,
+            self.nails.grips,
             self.stops,
         )
 
@@ -188,14 +175,14 @@ class Recomputed(NamedTuple):
         """Return what may not be below zero, and is not affine in the loads."""
         return -self.curves, self.by_rows - self.held, self.nails.within
 
-    def claims(self) -> tuple[Claim, ...]:
-        """Return what the plan says of drives and utilisations, and what they are."""
+    def claims(self) -> tuple[tuple[Array, Array, float, Callable[[int], str]], ...]:
+        """Return drives and utilisations, what the plan says of them, errors, and their names."""
         told = self.arrays
         return (
-            Claim(self.drives, told.drives, DRIVE, self.drive),
-            Claim(self.tiles, told.tile_utilisations, UTILISATION, self.tile_share),
-            Claim(self.palms, told.palm_utilisations, UTILISATION, self.palm_share),
-            Claim(self.hands, told.utilisations, UTILISATION, self.share),
+            (self.drives, told.drives, DRIVE, self.drive),
+            (self.tiles, told.tile_utilisations, UTILISATION, self.tile_share),
+            (self.palms, told.palm_utilisations, UTILISATION, self.palm_share),
+            (self.hands, told.utilisations, UTILISATION, self.share),
         )
 
     def owners(self) -> dict[str, Indices]:
@@ -215,35 +202,20 @@ class Recomputed(NamedTuple):
     @property
     def error(self) -> float:
         """The Euclidean norm of all that is zero; none of it exceeds that. Of fixed hands."""
-        told = self.arrays
-        parts = (
-            self.left,
-            self.normal.take(self.known.places.bases),
-            *self.zero(),
-            self.drives - told.drives,
-            self.tiles - told.tile_utilisations,
-            self.palms - told.palm_utilisations,
-            self.hands - told.utilisations,
-        )
-        off = np.concatenate(parts, axis=None)
+        bases = self.normal.take(self.known.places.bases)
+        claims = [used - told for used, told, _, _ in self.claims()]
+        off = np.concatenate((self.left, bases, *self.zero(), *claims), axis=None)
         return math.sqrt(off.dot(off))
 
     def near(self) -> bool:
         """Whether all numbers of fixed hands are so near that none can be off by what it may.
 
-        Numbers that are not finite are not near, nor are those of a plan that has tiles elsewhere
-        than the hands, or turned.
+        Numbers that are not finite are not near.
         """
-        arrays, known = self.arrays, self.known
         if self.floats or not self.error <= NEAR:
             return False
         signed = np.concatenate((*self.signed(), *self.bounded()), axis=None)
-        pairs = (arrays.points, known.points), (arrays.axes, known.axes)
-        return bool(
-            np.minimum.reduce(signed) >= -NEAR
-            and all(told is own or np.array_equal(told, own) for told, own in pairs)
-            and not any(self.contacts())
-        )
+        return bool(np.minimum.reduce(signed) >= -NEAR) and not any(self.contacts())
 
     def off(self, allowed: Array) -> Iterator[str]:
         """Yield what is off by more than it may be.
@@ -260,7 +232,7 @@ class Recomputed(NamedTuple):
         for values, (say, whose) in kinds:
             most = STOP if whose == "stops" else allowed.take(owners[whose])
             # numbers that are not finite are off, too
-            wrong = ~((values.T + most).T >= 0.0)
+            wrong = ~((values.T + most).T >= 0.0) | np.isinf(values)
             yield from map(getattr(self, say), np.flatnonzero(wrong).tolist())
         for used, told, relative, name in self.claims():
             right = np.abs(used - told) <= relative * np.maximum(np.abs(used), 1.0)
@@ -277,6 +249,11 @@ class Recomputed(NamedTuple):
         tile = self.known.hands[h].tiles[t - int(places.first[h])]
         what = NAIL if tile.phalanx == NAIL else f"{tile.phalanx} tile"
         return f"{self.limbs[h]}: {what} of {tile.finger}"
+
+    def contact(self, i: int) -> str:
+        """Return the name of a tile, or after them all of a palm."""
+        palm = i - len(self.known.places.hand)
+        return self.tile(i) if palm < 0 else f"{self.limbs[palm]}: palm"
 
     def of_finger(self, kind: str, finger: int) -> str:
         """Return the name of something of a finger: ``front_left: tendon of inner_right``."""
@@ -357,23 +334,29 @@ class Recomputed(NamedTuple):
     def contacts(self) -> Iterator[str]:
         """Yield what carries a load that cannot, and contacts that are not as the plan says."""
         known, arrays, palms = self.known, self.arrays, self.arrays.palms
+        for own, told in ((known.points, arrays.points), (known.axes, arrays.axes)):
+            if not (told is own or np.array_equal(told, own)):
+                hands = np.concatenate((known.places.hand, np.arange(len(palms))))
+                elsewhere = (told != own).reshape(len(own), -1).any(axis=1)
+                for i in np.flatnonzero(elsewhere).tolist():
+                    if arrays.wrists[hands[i]] is None:
+                        yield f"{self.contact(i)} is elsewhere, or turned"
         for t in known.touch.idle.tolist():
             if arrays.forces[t].any():
                 yield f"{self.tile(t)} carries a load but touches nothing"
         for h in np.flatnonzero(palms[:, 1]).tolist():
             yield self.palm(2 * h)
-        shares = known.engagement, arrays.engagement
-        if shares[0] is not shares[1]:
-            for t in np.flatnonzero(shares[0] != shares[1]).tolist():
-                share, told = shares[0][t], shares[1][t]
-                yield f"{self.tile(t)}: {share:.6g} of its spines hold, not {told:.6g}"
+        shares, said = known.engagement, arrays.engagement
+        if said is not shares:
+            for t in np.flatnonzero(said != shares).tolist():
+                yield f"{self.tile(t)}: {shares[t]:.6g} of its spines hold, not {said[t]:.6g}"
         for h, hand in enumerate(known.hands):
             engaged, told_engaged = hand.palm.engaged, arrays.engaged[h]
             if not (engaged and told_engaged) and palms[h].any():
                 yield f"{self.limbs[h]}: the palm carries a load but touches nothing"
             if engaged != told_engaged:
-                told = list(told_engaged)
-                yield f"{self.limbs[h]}: the palm touches with tiles {list(engaged)}, not {told}"
+                touching = f"{list(engaged)}, not {list(told_engaged)}"
+                yield f"{self.limbs[h]}: the palm touches with tiles {touching}"
             if hand.tiles != arrays.tiles[h]:
                 yield from self.tiles_told(h)
 

@@ -33,11 +33,11 @@ from planner.prepare import HandBatch, settle_hand
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
-from planner.verification import problems
 from service.answering import dispatch, questions
 from service.commands.stances import read_request
 from service.replies import PlanReply
 from service.wire import Format, schema
+from tests.suite.helpers.checks import problems
 from tests.suite.helpers.fingernails import PIN, STRONG, hung, nail_rows, one_hand, step
 from tests.suite.helpers.hands import HAND, ROCK, changed_hand, pinch, without_hand_load
 from tests.suite.helpers.requests import HEAVY, JSON, MSGPACK, at, put, wall_request
@@ -418,10 +418,7 @@ def spoilt(answer: Plan, finger: str = "inner_left", **changes) -> Plan:
 
 
 def complaints(answer: Plan, question: Question) -> str:
-    hands = [settle_hand(hand, question.stance) for hand in question.stance.hands]
-    return "; ".join(
-        problems(question, hands, answer.hands, answer.utilisation, answer.body_wrench)
-    )
+    return "; ".join(problems(question, answer))
 
 
 def test_a_tampered_nail_is_caught():

@@ -16,12 +16,12 @@ from planner.programs import TWIST_UNIT
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
-from planner.verification import problems
 from service.answering import handle, questions
 from service.commands.stances import read_request
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
 from service.wire import decode_request
+from tests.suite.helpers.checks import problems
 from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import LIGHT, spoil, wall_request
@@ -245,10 +245,9 @@ def test_check_finds_what_is_wrong(spoilt):
         numbers = getattr(hand, name).copy()
         numbers[index] += 0.01
         hand = replace(hand, **{name: numbers})
-    settled = [settle_hand(place, question.stance) for place in question.stance.hands]
     hands = (answer.hands[0], hand, *answer.hands[2:])
-    assert problems(question, settled, hands, answer.utilisation, answer.body_wrench)
-    assert not problems(question, settled, answer.hands, answer.utilisation, answer.body_wrench)
+    assert problems(question, replace(answer, hands=hands))
+    assert not problems(question, answer)
 
 
 def test_no_plan_is_dressed_up():

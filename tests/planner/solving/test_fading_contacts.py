@@ -14,9 +14,9 @@ from planner.question import Question, Stance
 from planner.result import Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
-from planner.verification import problems
 from service.answering import questions
 from service.commands.stances import read_request
+from tests.suite.helpers.checks import problems
 from tests.suite.helpers.hands import partly
 from tests.suite.helpers.stances import CALIBRATION_LOAD, PLACES, ask, on_wall
 
@@ -140,7 +140,7 @@ QUESTION = ask(on_wall(outer_rotation=2.0))
 
 
 def complaints(question: Question, hands: list[SettledHand], answer: Plan) -> list[str]:
-    return problems(question, hands, answer.hands, answer.utilisation, answer.body_wrench)
+    return problems(question, answer, settled=hands)
 
 
 def test_a_plan_with_half_a_tiles_spines_is_that_of_its_loads(half):

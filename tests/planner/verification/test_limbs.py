@@ -7,11 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from planner.prepare import Posture, posture, settle_hand
+from planner.prepare import Posture, posture
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
-from planner.verification import limbs, problems
+from planner.verification import limbs
+from tests.suite.helpers.checks import problems
 from tests.suite.helpers.stances import on_wall
 from tests.suite.helpers.stances_with_joints import random_question_with_joints
 
@@ -48,15 +49,7 @@ def complaints(
     question = asked() if question is None else question
     answer, there = honest()
     answer = replace(answer, **changes)
-    return problems(
-        question,
-        [settle_hand(hand, question.stance) for hand in question.stance.hands],
-        answer.hands,
-        answer.utilisation,
-        answer.body_wrench,
-        there if where is None else where,
-        answer.effort,
-    )
+    return problems(question, answer, where=there if where is None else where)
 
 
 def with_joints(**changes: Callable) -> Posture:
@@ -114,8 +107,7 @@ def test_joints_that_were_found_must_put_hands_where_they_are():
 
 def test_joints_that_are_left_out_are_found():
     answer, _ = honest()
-    settled = [settle_hand(hand, asked().stance) for hand in asked().stance.hands]
-    found = problems(asked(), settled, answer.hands, answer.utilisation, answer.body_wrench)
+    found = problems(asked(), answer)
     assert any("the joints are not what" in each for each in found)
 
 
