@@ -22,7 +22,7 @@ from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
 from hand_models.sections import RoundSection
-from hand_models.tendon import FingerTendon, MotorScheme
+from hand_models.tendon import FingerTendon
 from hand_models.tile import Surface, inner_half_planes
 
 __all__ = ["PLANE", "SIDES", "Gripper", "gripper_table"]
@@ -82,8 +82,6 @@ class Gripper(CompliantGrasp):
         What a tile holds; the experiment's sandpaper by default.
     table : ParameterTable, optional
         From `gripper_table`.
-    scheme : {'tension', 'held'}
-        Whether springs keep the tension, as in the experiments, or motors stand still.
 
     Raises
     ------
@@ -99,7 +97,6 @@ class Gripper(CompliantGrasp):
         tension: float,
         surface: Surface | None = None,
         table: ParameterTable | None = None,
-        scheme: MotorScheme = "tension",
     ) -> None:
         if not (math.isfinite(diameter) and diameter > 0.0):
             raise InvalidInputError(f"must be above 0 m, got {diameter:g}", field="diameter")
@@ -136,7 +133,7 @@ class Gripper(CompliantGrasp):
                 entry_friction=table.scalar("gripper", "entry_friction"),
             ),
             tendon.closed(tension, shears),
-            scheme,
+            "tension",
         )
 
     @cached_property

@@ -230,13 +230,6 @@ def test_the_farthest_wrench_is_a_local_maximum():
         assert -other.fun <= found.reach + 1e-3 * abs(found.reach)
 
 
-def test_only_wrenches_below_are_taken():
-    level = (planar([0.0, 1.0, 0.0])[None], np.array([-5.0]))
-    found = farthest(GRIPPER, planar([1.0, 0.0, 0.0]), below=level)
-    assert found.wrench[2] <= -5.0 + 1e-2
-    assert found.reach <= farthest(GRIPPER, planar([1.0, 0.0, 0.0])).reach + 1e-6
-
-
 def test_a_pull_lets_go_where_bisection_says():
     """A symmetric pull along −z: one unknown, so a root of the utilisation tells the pose."""
 
