@@ -13,13 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array
 from hand_models.compliance.rolling import Numbers, RollingContact
 from hand_models.finger import PHALANGES, FingerModel, SettledFinger
 from hand_models.sections import Section
@@ -105,7 +103,7 @@ class CompliantFinger:
         section: Section | None,
         tendon: FingerTendon,
         state: TendonState,
-        scheme: MotorScheme = "held",
+        scheme: MotorScheme,
         depths: Sequence[float] = (0.0,) * len(PHALANGES),
     ) -> None:
         self.finger = finger
@@ -146,7 +144,7 @@ class CompliantFinger:
         normals, torques = self._balance(
             response.shears[:, -3:],
             response.tensions[:, -3:],
-            self._rest_angles + posture.turns,
+            self.finger.joint_angles + posture.turns,
             u,
             posture.joints,
             posture.points,
@@ -160,10 +158,6 @@ class CompliantFinger:
             directions=u,
             reached=posture.reached,
         )
-
-    @cached_property
-    def _rest_angles(self) -> Array:
-        return self.finger.joint_angles
 
     def _balance(
         self,

@@ -30,7 +30,7 @@ from hand_models.compliance.compliant_finger import STEP, CompliantFinger, Finge
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
-from hand_models.tendon import FingerTendon, MotorScheme, share_load
+from hand_models.tendon import FingerTendon, share_load
 
 __all__ = ["CompliantHand", "HandLoads"]
 
@@ -86,8 +86,6 @@ class CompliantHand:
         Not one that clings with its nails.
     preload : array_like, shape (4,), optional
         Tensions that the tendons hold before the wrist moves [N]; the closing tension by default.
-    scheme : {'held', 'tension'}
-        Whether the motors stand still, or keep their tension.
 
     Raises
     ------
@@ -101,7 +99,6 @@ class CompliantHand:
         self,
         settled: SettledHand,
         preload: ArrayLike | None = None,
-        scheme: MotorScheme = "held",
     ) -> None:
         if settled.grasp.fingernail:
             raise UnsupportedError("a hand that clings with its nails cannot float")
@@ -109,7 +106,7 @@ class CompliantHand:
         self.settled = settled
         self.preload = _preload(preload, settled)
         self.frames = hand.frames(settled.grasp.outer_rotation)
-        self.fingers = tuple(self._finger(i, name, scheme) for i, name in enumerate(FINGERS))
+        self.fingers = tuple(self._finger(i, name) for i, name in enumerate(FINGERS))
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
         self.palm_stiffness = np.zeros(2)
@@ -123,7 +120,7 @@ class CompliantHand:
             each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
             self.palm_stiffness += share * np.array(each)
 
-    def _finger(self, i: int, name: str, scheme: MotorScheme) -> CompliantFinger:
+    def _finger(self, i: int, name: str) -> CompliantFinger:
         settled, hand = self.settled, self.settled.hand
         base_tile = name.startswith("outer")
         own = settled.finger_of == i
@@ -138,7 +135,7 @@ class CompliantHand:
                 friction=max(tendon.friction, hand.tendon_friction),
             ),
             tendon.closed(tension, shears),
-            scheme,
+            "held",
             # as it has closed: where tiles bear does not change with tension (Eq. 14)
             [each * settled.closing_tension for each in hand.depths[base_tile]],
         )
@@ -234,17 +231,13 @@ class CompliantHand:
         ]
         return np.stack(pushing, axis=-1) if pushing else np.zeros((m, 0), dtype=torques[0].dtype)
 
-    def palm_travel(self, twists: Numbers) -> Numbers:
-        """Return how far the palm moves toward −x and into the rock, shape (m, 2) [m]."""
-        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
-        return moved[:, ::2] * (-1.0, 1.0)
-
     def palm_loads(self, twists: Numbers) -> Numbers:
         """Return what the palm's shear and pressing would be as two-sided springs, (m, 2) [N].
 
         Negative where the palm moves away and so carries nothing.
         """
-        return self.palm_travel(twists) * self.palm_stiffness
+        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
+        return moved[:, ::2] * (-1.0, 1.0) * self.palm_stiffness
 
     def wrenches(self, loads: HandLoads) -> Numbers:
         """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""

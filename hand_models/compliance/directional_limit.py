@@ -55,15 +55,12 @@ class Farthest:
         d · w.
     limiting : Row or None
         The limit that is nearest; None if hard rows alone end the way.
-    rounds : int
-        Linear programs solved.
     """
 
     twist: Array
     wrench: Array
     reach: float
     limiting: Row | None
-    rounds: int
 
 
 def pose_units(columns: tuple[str, ...]) -> Array:
@@ -72,10 +69,7 @@ def pose_units(columns: tuple[str, ...]) -> Array:
 
 
 def farthest(
-    grasp: CompliantGrasp,
-    direction: ArrayLike,
-    start: ArrayLike | None = None,
-    below: tuple[Array, Array] | None = None,
+    grasp: CompliantGrasp, direction: ArrayLike, start: ArrayLike | None = None
 ) -> Farthest:
     """Return the wrench farthest in a direction at which nothing lets go.
 
@@ -86,8 +80,6 @@ def farthest(
         d.
     start : array_like, shape (d,), optional
         Pose to begin at; rest by default.
-    below : tuple of ndarray, shapes (k, 6) and (k,), optional
-        (G, g): only wrenches with G w ≤ g.
 
     Raises
     ------
@@ -97,21 +89,15 @@ def farthest(
         If a linear program fails.
     """
     d = np.asarray(direction, dtype=float)
-    units = pose_units(grasp.linearised(start).columns)
-    at = np.zeros(len(units)) if start is None else np.asarray(start, dtype=float)
-    rounds, excess = 0, np.inf
-    for weight in WEIGHTS:
-        at, found, taken = _climb(grasp, d, at, units, below, weight)
-        rounds += taken
-        excess = _excess(found, below)
+    at = np.zeros(len(grasp.columns)) if start is None else np.asarray(start, dtype=float)
+    found, excess = grasp.evaluate(at[None]), np.inf
+    # at last the nearest that holds
+    for goal, weight in (*((d, weight) for weight in WEIGHTS), (0.0 * d, WEIGHTS[-1])):
+        at, found = _climb(grasp, goal, at, weight)
+        excess = _excess(found)
         if excess <= KEPT:
             break
-    if excess > KEPT:
-        # the nearest that holds
-        at, found, taken = _climb(grasp, np.zeros(6), at, units, below, WEIGHTS[-1])
-        rounds += taken
-        excess = _excess(found, below)
-    if excess > KEPT:
+    else:
         raise EmptySetError(
             "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"
@@ -122,7 +108,6 @@ def farthest(
         wrench=found.wrenches[0],
         reach=float(d @ found.wrenches[0]),
         limiting=grasp.limits[int(found.limiting[0])] if binding else None,
-        rounds=rounds,
     )
 
 
@@ -143,27 +128,21 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
     return pose, float(direction @ space.wrench(pose))
 
 
-def _climb(
-    grasp: CompliantGrasp,
-    d: Array,
-    at: Array,
-    units: Array,
-    below: tuple[Array, Array] | None,
-    weight: float,
-) -> tuple[Array, Evaluation, int]:
-    """Follow linear programs from a pose until they promise nothing more; also their number."""
+def _climb(grasp: CompliantGrasp, d: Array, at: Array, weight: float) -> tuple[Array, Evaluation]:
+    """Follow linear programs from a pose until they promise nothing more."""
+    units = pose_units(grasp.columns)
     space = grasp.linearised(at)
     found = grasp.evaluate(at[None])
-    merit = _merit(found, d, below, weight)
+    merit = _merit(found, d, weight)
     box, rounds = FIRST_BOX, 0
     while rounds < ROUNDS and box > SMALLEST_BOX:
         rounds += 1
-        step, foretold = _step(space, d, at, box * units, units, below, weight)
+        step, foretold = _step(space, d, at, box, weight)
         promised = foretold - merit
         if promised <= CLOSE * max(1.0, abs(merit)):
             break
         there = grasp.evaluate((at + step)[None])
-        gained = _merit(there, d, below, weight) - merit
+        gained = _merit(there, d, weight) - merit
         size = float(np.abs(step / units).max())
         if gained <= 0.0:
             box = 0.25 * min(box, size)
@@ -172,51 +151,35 @@ def _climb(
             box = min(2.0 * max(box, size), LARGEST_BOX)
         at, found, merit = at + step, there, merit + gained
         space = grasp.linearised(at)
-    return at, found, rounds
+    return at, found
 
 
-def _excess(found: Evaluation, below: tuple[Array, Array] | None) -> float:
+def _excess(found: Evaluation) -> float:
     """Return by what share a limit is exceeded, or a hard row in newtons; the most of all."""
-    excess = max(float(found.utilisation[0]) - 1.0, float(found.violation[0]), 0.0)
-    if below is not None:
-        G, g = below
-        excess = max(excess, float(np.max(G @ found.wrenches[0] - g, initial=0.0)))
-    return excess
+    return max(float(found.utilisation[0]) - 1.0, float(found.violation[0]), 0.0)
 
 
-def _merit(found: Evaluation, d: Array, below: tuple[Array, Array] | None, weight: float) -> float:
+def _merit(found: Evaluation, d: Array, weight: float) -> float:
     """Return d · w less what is exceeded."""
-    excess = _excess(found, below)
+    excess = _excess(found)
     return float(d @ found.wrenches[0]) - weight * excess if np.isfinite(excess) else -np.inf
 
 
 def _step(
-    space: WrenchSpace,
-    d: Array,
-    at: Array,
-    half_widths: Array,
-    units: Array,
-    below: tuple[Array, Array] | None,
-    weight: float,
+    space: WrenchSpace, d: Array, at: Array, box: float, weight: float
 ) -> tuple[Array, float]:
     """Return the best step within a box by the linear model, and the merit that it foretells."""
+    units = pose_units(space.columns)
     # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
-    rows = [space.L / space.s[:, None], space.H]
-    most: list[Array] = [np.asarray(1.0 - space.l0 / space.s), space.h]
-    if below is not None:
-        G, g = below
-        rows.append(np.asarray(G @ space.generators))
-        most.append(np.asarray(g - G @ space.origin))
-    A: Array = np.vstack(rows)
-    b: Array = np.concatenate(most) - A @ at
+    A: Array = np.vstack([space.L / space.s[:, None], space.H])
+    b: Array = np.concatenate([1.0 - space.l0 / space.s, space.h]) - A @ at
     cost = np.append(-(d @ space.generators) * units, weight)
-    widths = half_widths / units
     found = linear_program(
         cost,
         np.column_stack([A * units, -np.ones(len(b))]),
         b,
         "farthest",
-        bounds=[*zip(-widths, widths, strict=True), (0.0, None)],
+        bounds=[*[(-box, box)] * len(units), (0.0, None)],
     )
     assert found is not None  # the slack exceeds whatever is exceeded
     return found[:-1] * units, float(d @ space.wrench(at)) - float(cost @ found)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, Indices
 from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
-from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps
+from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import RowLayout, layout_of
@@ -177,15 +177,13 @@ class FloatingWrist(CompliantGrasp):
         """
         at, palm = self._pose(twist), palm or self.palm
         carries = next(np.array(ways) for ways, mode in PALM_MODES.items() if mode == palm)
-        steps, rows = complex_steps(at), self.load_rows
-        travel = self.hand.palm_travel(steps)
-        loads = self.hand.loads(steps)._replace(palm=travel * self.hand.palm_stiffness * carries)
-        found = self._grasp_loads(loads)
+        steps = complex_steps(at)
+        free, stiffness = self.hand.palm_loads(steps), self.hand.palm_stiffness
+        loads = self.hand.loads(steps)._replace(palm=free * carries)
+        H, h = np.zeros((0, 6)), np.zeros(0)
         if self.hand.settled.palm.engaged:
             # a palm that carries moves against the rock; one that does not, away from it
-            Q = np.zeros((len(rows.Q) + 2, rows.Q.shape[1] + 2))
-            Q[:-2, :-2], Q[-2:, -2:] = rows.Q, np.diag(np.where(carries, -PALM_ROWS, PALM_ROWS))
-            P = np.pad(rows.P, ((0, 0), (0, 2)))
-            found = found._replace(elements=np.hstack([found.elements, travel]))
-            rows = rows._replace(P=P, Q=Q)
-        return self._about(at, found, rows, within)
+            signs = np.where(carries, -PALM_ROWS, PALM_ROWS)
+            slope = slopes(free) / stiffness[:, None]
+            H, h = signs[:, None] * slope, signs * (slope @ at - free[0].real / stiffness)
+        return self._about(at, self._grasp_loads(loads), H, h, within)

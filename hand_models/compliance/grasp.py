@@ -60,7 +60,7 @@ class LoadRows(NamedTuple):
     Attributes
     ----------
     names : tuple of Row
-        Limit rows, then hard rows.
+        Limit rows, then hard rows: those of the loads first.
     P, p : ndarray, shapes (n, k), (n,)
         Loads of the limit rows P e + p.
     D : ndarray, shape (nd, 6)
@@ -158,7 +158,8 @@ class CompliantGrasp(ABC):
             How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
         """
         at = self._pose(twist)
-        return self._about(at, self.loads_at(complex_steps(at)), self.load_rows, within)
+        none = np.zeros((0, len(at))), np.zeros(0)
+        return self._about(at, self.loads_at(complex_steps(at)), *none, within)
 
     def _pose(self, twist: ArrayLike | None) -> Array:
         if twist is None:
@@ -166,12 +167,17 @@ class CompliantGrasp(ABC):
         return np.asarray(twist, dtype=float)
 
     def _about(
-        self, at: Array, found: GraspLoads, rows: LoadRows, within: ArrayLike | None
+        self, at: Array, found: GraspLoads, more: Array, most: Array, within: ArrayLike | None
     ) -> WrenchSpace:
-        """Return the set about a pose, of what `complex_steps` from it give."""
+        """Return the set about a pose, of what `complex_steps` from it give.
+
+        With the hard rows ``more ξ ≤ most`` besides those of the loads.
+        """
+        rows = self.load_rows
         start, slope = _affine(found.elements, at)
         origin, generators = _affine(found.wrenches, at)
-        H, h, names = rows.Q @ slope, -rows.Q @ start, rows.names
+        H, h = np.vstack([rows.Q @ slope, more]), np.concatenate([-rows.Q @ start, most])
+        names = rows.names
         if within is not None:
             inverse = np.diag(1.0 / np.asarray(within, dtype=float))
             sides = np.vstack([inverse, -inverse])

@@ -243,14 +243,10 @@ class RollingContact:
         turn : ndarray, shape (...)
             ψ of the base, from x toward z [rad].
         """
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self._move(np.asarray(x), np.asarray(z), np.asarray(turn))
-
-    def _move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
         contacts, spacing = self.finger.contacts, self.finger.model.joint_spacing
         nothing = 0.0 * (x + z + turn)
         jx, jz = x + nothing, z + nothing
-        turned = turn + nothing
+        base = turned = turn + nothing
         angles: list[Numbers] = []
         rolled: list[Numbers] = [nothing] * len(contacts)
         slips: list[Numbers] = [nothing] * len(contacts)
@@ -258,7 +254,8 @@ class RollingContact:
         for i, rest in enumerate(self._angles):
             if i in self._links:
                 link = self._links[i]
-                turned, rolled[link.bearing], slips[link.bearing] = link.turn(jx, jz)
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    turned, rolled[link.bearing], slips[link.bearing] = link.turn(jx, jz)
             angle = rest + turned
             angles.append(angle)
             joints.append((jx, jz))
@@ -275,7 +272,7 @@ class RollingContact:
             [c * cosine - height * sine, c * sine + height * cosine], axis=-1
         )
         change = theta - np.array(self._angles)
-        before = np.concatenate([(turn + nothing)[..., None], change[..., :-1]], axis=-1)
+        before = np.concatenate([base[..., None], change[..., :-1]], axis=-1)
         return MovedPosture(
             angles=theta,
             turns=change - before,

@@ -19,7 +19,7 @@ from planner import programs
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import SLACK, Outcome, StanceData
 
-__all__ = ["BINDING", "RANK", "Goal", "LeastUse", "bent_root"]
+__all__ = ["BINDING", "LEAST_USE", "RANK", "Goal", "LeastUse", "bent_root"]
 
 NEAR: Final = 0.002
 """Weight with which later rounds of `LeastUse` stay near the point, for one unit of z."""
@@ -153,6 +153,9 @@ class LeastUse(Goal):
 
     def restore(self, data: StanceData) -> Outcome:
         return programs.nearest(data)
+
+
+LEAST_USE: Final = LeastUse()
 
 
 def bent_root(curvature: Array, rows: Array, near: float) -> Array:

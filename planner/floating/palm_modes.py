@@ -16,7 +16,7 @@ from hand_models.compliance import PALM_MODES, PalmMode
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
 from planner.deadline import Budget
-from planner.floating.goals import Goal, LeastUse
+from planner.floating.goals import LEAST_USE, Goal
 from planner.floating.wrist_iteration import ROUNDS, WristSolution, solve_wrists
 from planner.prepare import HandSets
 from planner.programs import SLACK
@@ -99,13 +99,9 @@ def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
 
 
 def exchanged(
-    hands: HandSets, found: WristSolution, budget: Budget, goal: Goal | None = None
+    hands: HandSets, found: WristSolution, budget: Budget, goal: Goal = LEAST_USE
 ) -> WristSolution:
-    """Return a better point that is had by turning palms that their mode holds back.
-
-    The goal is the least utilisation if none is given.
-    """
-    goal = LeastUse() if goal is None else goal
+    """Return a better point that is had by turning palms that their mode holds back."""
     tried: set[Palms] = {found.point.palms}
     for _ in range(EXCHANGES):
         new = next((p for p in _turned(found) if p not in tried), None)

@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple
+from functools import cached_property
+from typing import Final, Literal
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -31,7 +32,7 @@ from hand_models.base import Array
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import deadline, programs
 from planner.deadline import Budget
-from planner.floating.goals import RANK, Goal, LeastUse
+from planner.floating.goals import LEAST_USE, RANK, Goal
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import Outcome
 
@@ -124,36 +125,25 @@ class WristSolution:
         """Whether the point is a plan."""
         return self.found != "nothing"
 
-    @property
+    @cached_property
     def measure(self) -> ExactMeasure:
         """What the model says of the point."""
         return self.sets.measure(self.point.loads)
 
 
-class _State(NamedTuple):
-    """A point, the sets about it, what the model says of it, and how far off its step was [N]."""
-
-    point: LinearisationPoint
-    sets: Sets
-    measure: ExactMeasure
-    error: float
-
-    @classmethod
-    def of(
-        cls,
-        hands: HandSets,
-        goal: Goal,
-        point: LinearisationPoint,
-        within: float,
-        before: Sets | None = None,
-    ) -> _State:
-        sets = hands.sets(point, within, goal.farthest)
-        error = (
-            0.0
-            if before is None
-            else max(disagreements(hands, before.spaces, sets.spaces, point.loads))
-        )
-        return cls(point, sets, sets.measure(point.loads), error)
+def _searching(
+    hands: HandSets,
+    goal: Goal,
+    point: LinearisationPoint,
+    within: float,
+    before: Sets | None = None,
+    error: float = 0.0,
+) -> WristSolution:
+    """Return a point with the sets about it, of which nothing is solved yet."""
+    sets = hands.sets(point, within, goal.farthest)
+    if before is not None:
+        error = max(disagreements(hands, before.spaces, sets.spaces, point.loads))
+    return WristSolution("nothing", point, sets, UNSOLVED, 0, error)
 
 
 def solve_wrists(
@@ -161,16 +151,14 @@ def solve_wrists(
     start: LinearisationPoint,
     budget: Budget,
     most: int = ROUNDS,
-    goal: Goal | None = None,
+    goal: Goal = LEAST_USE,
 ) -> WristSolution:
     """Find the best point for a goal, from a start and with the start's palm modes.
 
-    The goal is the least utilisation if none is given. Where the search ends without proof, or its
-    budget does, the point is made exact there. At a deadline the best exact point on the way is
-    what was found.
+    Where the search ends without proof, or its budget does, the point is made exact there. At a
+    deadline the best exact point on the way is what was found.
     """
-    goal = LeastUse() if goal is None else goal
-    now = _State.of(hands, goal, start, START)
+    now = _searching(hands, goal, start, START)
     passed: WristSolution | None = None
     within, penalty, stalled = START, goal.least_penalty, 0
     weights, root, rounds = UNSOLVED, None, 0
@@ -181,7 +169,7 @@ def solve_wrists(
         budget.spend(2)
         if outcome.solved:
             if goal.exact(now.measure, hands):
-                here = WristSolution("least", now.point, now.sets, outcome, rounds, now.error)
+                here = replace(now, found="least", outcome=outcome, rounds=rounds)
                 if _gap(goal, now, outcome) <= CLOSE:
                     return here
                 passed = replace(here, found="unproven")
@@ -202,7 +190,7 @@ def solve_wrists(
             if not step.solved or stalled > STALLED:
                 break
         size = hands.step(now.point, step.loads)
-        there = _State.of(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
+        there = _searching(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
         before, after = (goal.merit(state.measure, penalty) for state in (now, there))
         if not outcome.solved:
             stalled += not after < before - 0.02 * abs(before)
@@ -215,19 +203,19 @@ def solve_wrists(
                 direct = before - after >= goal.promised * (before - outcome.value)
             if direct and size > 0.8 * within:
                 within = min(WIDEN * within, WIDEST)
-                there = _State.of(hands, goal, there.point, within)._replace(error=there.error)
+                there = _searching(hands, goal, there.point, within, error=there.error)
             now, root = there, None
         else:
             within = SHRINK * min(within, size)
             if within < KINK:
                 break
-            now = _State.of(hands, goal, now.point, within)._replace(error=now.error)
+            now = _searching(hands, goal, now.point, within, error=now.error)
     if passed is not None and deadline.expired():
         return replace(passed, rounds=rounds)
     return _made_exact(hands, goal, now, rounds, budget)
 
 
-def _repaired(hands: HandSets, goal: Goal, state: _State, within: float) -> _State:
+def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -> WristSolution:
     """Return a point with less missing and broken, hardly moving: a second-order correction.
 
     The smallest step that balances, and puts hard rows that are broken on their limits; those that
@@ -252,14 +240,14 @@ def _repaired(hands: HandSets, goal: Goal, state: _State, within: float) -> _Sta
     moved = tuple(
         y + hand.unit * part for hand, y, part in zip(data.hands, loads, parts, strict=True)
     )
-    return _State.of(hands, goal, replace(state.point, loads=moved), within, state.sets)
+    return _searching(hands, goal, replace(state.point, loads=moved), within, state.sets)
 
 
 def _made_exact(
-    hands: HandSets, goal: Goal, start: _State, rounds: int, budget: Budget
+    hands: HandSets, goal: Goal, start: WristSolution, rounds: int, budget: Budget
 ) -> WristSolution:
     """Make the point exact at which a search ended without proof."""
-    now = start = _State.of(hands, goal, start.point, START)._replace(error=start.error)
+    now = start = _searching(hands, goal, start.point, START, error=start.error)
     for _ in range(REPAIRS):
         if deadline.expired():
             break
@@ -268,16 +256,16 @@ def _made_exact(
         if goal.exact(now.measure, hands) and outcome.solved:
             value = goal.value(start.measure)
             if goal.value(now.measure) - value <= GIVEN * max(1.0, value):
-                return WristSolution("unproven", now.point, now.sets, outcome, rounds, now.error)
+                return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
         before, now, rounds = now, _repaired(hands, goal, now, START), rounds + 1
         lost, left = (goal.wrong(state.measure) for state in (before, now))
         if not now.sets.finite or not left < 0.5 * lost:
             break
-    return WristSolution("nothing", start.point, start.sets, UNSOLVED, rounds, start.error)
+    return replace(start, rounds=rounds)
 
 
-def _gap(goal: Goal, state: _State, outcome: Outcome) -> float:
+def _gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
     """Return how far a point is above the best of its sets, relative."""
     value = goal.value(state.measure)
     return (value - outcome.value) / max(1.0, value)

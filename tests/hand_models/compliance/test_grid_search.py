@@ -233,13 +233,6 @@ def test_the_farthest_wrench_is_a_local_maximum():
         assert -other.fun <= found.reach + 1e-3 * abs(found.reach)
 
 
-def test_only_wrenches_below_are_taken():
-    level = (planar([0.0, 1.0, 0.0])[None], np.array([-5.0]))
-    found = farthest(GRIPPER, planar([1.0, 0.0, 0.0]), below=level)
-    assert found.wrench[2] <= -5.0 + 1e-2
-    assert found.reach <= farthest(GRIPPER, planar([1.0, 0.0, 0.0])).reach + 1e-6
-
-
 def test_a_pull_lets_go_where_bisection_says():
     """A symmetric pull along −z: one unknown, so a root of the utilisation tells the pose."""
 
@@ -314,17 +307,10 @@ def wrenches_inside(wrist, count):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", GRASPS)
-def test_newton_finds_the_pose_of_a_thousand_wrenches(name, capsys):
+def test_newton_finds_the_pose_of_a_thousand_wrenches(name):
     hold, rotation, palm = GRASPS[name]
     wrist = floating(hold, Grasp(outer_rotation=rotation), palm=palm)
     found = [wrist_pose(wrist.hand, w) for w in wrenches_inside(wrist, 250)]
-    steps = np.array([pose.steps for pose in found])
-    with capsys.disabled():
-        print(
-            f"\n{name}: {sum(p.converged for p in found)} of {len(found)} converge, "
-            f"steps median {np.median(steps):g}, 95 % {np.quantile(steps, 0.95):g}, "
-            f"most {steps.max()}"
-        )
     assert all(pose.converged for pose in found)
 
 
@@ -343,7 +329,8 @@ def test_newton_finds_the_pose_of_every_wrench_inside(name):
 def test_the_rest_wrench_needs_no_step():
     wrist = floating()
     pose = wrist_pose(wrist.hand, wrist.evaluate(np.zeros((1, 6))).wrenches[0])
-    assert (pose.steps, pose.converged) == (0, True)
+    assert pose.converged
+    np.testing.assert_array_equal(pose.twist, 0.0)
 
 
 def test_a_wrench_beyond_reach_is_said_to_be_so():
