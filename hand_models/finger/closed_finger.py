@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,13 +13,13 @@ from hand_models.finger.model import (
     BALANCE,
     FREE,
     LOWER,
+    PHALANGES,
     STOPS,
     UPPER,
     Contact,
     FingerModel,
     SettledFinger,
 )
-from hand_models.finger.open_finger import ClosedFinger, OpenFinger, Refused
 from hand_models.finger.path_state import (
     CAUGHT,
     JOINTS,
@@ -27,12 +27,13 @@ from hand_models.finger.path_state import (
     Around,
     Codes,
     Drive,
+    OpenFinger,
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
 from hand_models.sections import Complexes, Face, Flags, Outlines, Section
 
-__all__ = ["cling", "close_all"]
+__all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
 
 FLUSH: Final = 4.0
 """How deep rock may be in a finger that clings, in parts of a gap's fineness."""
@@ -42,6 +43,41 @@ SAMPLES: Final = 24
 
 HALVINGS: Final = 24
 """Of the search for a lift."""
+
+
+class ClosedFinger(NamedTuple):
+    """A finger at rest, and its loads as affine functions of tension.
+
+    Attributes
+    ----------
+    finger : SettledFinger
+    shears, normals, torques : ndarray, shape (3, 2)
+        Of `SettledFinger.shears`, `normals` and `stop_torques`.
+    touches : tuple of float
+        Tensions at which phalanges first came to the rock; NaN for those that did not [N].
+    """
+
+    finger: SettledFinger
+    shears: Array
+    normals: Array
+    torques: Array
+    touches: tuple[float, ...] = (np.nan,) * len(PHALANGES)
+
+
+class Refused(NamedTuple):
+    """A finger that cannot be where it is.
+
+    Attributes
+    ----------
+    depth : float
+        Of the rock in the open finger [m]; zero where it does not come to rest.
+    lift : float
+        Of the finger out of the rock, along −z of F, that would clear it; infinite if none up to
+        the length of a finger does, NaN where it is not looked for [m].
+    """
+
+    depth: float
+    lift: float
 
 
 def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:

@@ -21,7 +21,7 @@ from hand_models.fixed_wrist import (
 from hand_models.hand import Placement, settle_hands
 from hand_models.rock import Mesh
 from hand_models.rock.smoothing import Scale, smoothed_outline
-from hand_models.rock.triangle_cells import TriangleCells
+from hand_models.rock.triangles import TriangleCells
 from hand_models.sections import Section
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Line, Table, span, times
