@@ -5,7 +5,7 @@ from .closed_finger import (
     close_all as close_all,
 )
 from .closure import settle_finger as settle_finger
-from .closure_loads import ClosureLoads as ClosureLoads, TendonLoads as TendonLoads, stays as stays
+from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .fingernail import Fingernail as Fingernail
 from .model import (
     BALANCE as BALANCE,

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
-from hand_models.rock.outlined import OutlinedHold
+from hand_models.rock.smoothing import OutlinedHold
 from hand_models.rock.triangles import (
     TriangleCells,
     Triangles,
