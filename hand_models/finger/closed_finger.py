@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
-from hand_models.finger.closing import Path
+from hand_models.base import Array
+from hand_models.finger.closing import follow
 from hand_models.finger.model import (
     BALANCE,
     FREE,
@@ -28,6 +28,7 @@ from hand_models.finger.path_state import (
     Codes,
     Drive,
     OpenFinger,
+    State,
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
@@ -128,9 +129,8 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     start = np.where(blocked[:, None], lower, straight)[going]
     rock, drive = take(rock, going), take(drive, going)
     with np.errstate(invalid="ignore", divide="ignore"):
-        path = Path(rock, shape, drive, start)
-        path.follow()
-    closed = _closed(path, model, closings, going)
+        path = follow(rock, shape, drive, start)
+    closed = _closed(model, [closings[i] for i in going.tolist()], *path)
     return [next(closed) if each is None else each for each in found]
 
 
@@ -183,15 +183,19 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
 
 
 def _closed(
-    path: Path, model: FingerModel, closings: Sequence[OpenFinger], going: Indices
+    model: FingerModel,
+    closings: Sequence[OpenFinger],
+    state: State,
+    around: Around,
+    rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:
     """Yield fingers as they are at the ends of their paths."""
-    state, share, places = path.end, path.around.share, path.around.place
+    share, places = around.share, around.place
     joints, _ = fan_out(state.q, model.joint_spacing)
     angles = np.cumsum(state.q, axis=1)
-    tilts = np.angle(path.around.push) - 0.5 * np.pi
-    for row, of in enumerate(going.tolist()):
-        if not path.rests[row]:
+    tilts = np.angle(around.push) - 0.5 * np.pi
+    for row, closing in enumerate(closings):
+        if not rests[row]:
             yield Refused(0.0, np.nan)
             continue
         mode, stop = state.mode[row], state.stop[row]
@@ -220,8 +224,8 @@ def _closed(
                     phi,
                 )
             )
-        finger, of_tile = SettledFinger(model, tuple(contacts)), closings[of].base_tile
-        shears = finger.shears(closings[of].tension, of_tile)
+        finger, of_tile = SettledFinger(model, tuple(contacts)), closing.base_tile
+        shears = finger.shears(closing.tension, of_tile)
         normals = finger.normals(shears, of_tile)
         torques = finger.stop_torques(shears, normals, of_tile)
         yield ClosedFinger(finger, shears, normals, torques, tuple(state.touches[row].tolist()))

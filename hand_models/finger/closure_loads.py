@@ -75,6 +75,6 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
         # a tile that slips under shear keeps its contact
         if shear > surface.shear_limit:
             continue
-        if math.hypot(shear, normal) > surface.pulled(math.atan2(-normal, shear)):
+        if math.hypot(shear, normal) > surface.strength(math.atan2(-normal, shear)):
             return False
     return True

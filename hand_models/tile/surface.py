@@ -200,11 +200,6 @@ class Surface:
             pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
         return np.where(phi >= 0.0, pulling, pressing)
 
-    def pulled(self, angle: float) -> float:
-        """Return f_s(φ) of Eq. 21 under pull-off, φ ≥ 0 [N]."""
-        ratio = min(angle / self.pull_off_angle, 1.0)
-        return self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
-
 
 def pull_strength(
     shear_limit: ArrayLike, pull_off_limit: ArrayLike, pull_off_angle: ArrayLike, angle: ArrayLike
