@@ -1,6 +1,11 @@
-from .closed_finger import cling as cling, close_all as close_all
+from .closed_finger import (
+    ClosedFinger as ClosedFinger,
+    Refused as Refused,
+    cling as cling,
+    close_all as close_all,
+)
 from .closure import settle_finger as settle_finger
-from .closure_loads import ClosureLoads as ClosureLoads, TendonLoads as TendonLoads, stays as stays
+from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .fingernail import Fingernail as Fingernail
 from .model import (
     BALANCE as BALANCE,
@@ -11,11 +16,7 @@ from .model import (
     FingerModel as FingerModel,
     SettledFinger as SettledFinger,
 )
-from .open_finger import (
-    ClosedFinger as ClosedFinger,
-    OpenFinger as OpenFinger,
-    Refused as Refused,
-)
+from .path_state import OpenFinger as OpenFinger
 from .phalanx_gaps import middle_of_bed as middle_of_bed
 from .sequential_closure import (
     FACE as FACE,

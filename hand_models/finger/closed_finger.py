@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
-from hand_models.finger.closing import Path
+from hand_models.base import Array
+from hand_models.finger.closing import follow
 from hand_models.finger.model import (
     BALANCE,
     FREE,
     LOWER,
+    PHALANGES,
     STOPS,
     UPPER,
     Contact,
     FingerModel,
     SettledFinger,
 )
-from hand_models.finger.open_finger import ClosedFinger, OpenFinger, Refused
 from hand_models.finger.path_state import (
     CAUGHT,
     JOINTS,
@@ -27,12 +27,14 @@ from hand_models.finger.path_state import (
     Around,
     Codes,
     Drive,
+    OpenFinger,
+    State,
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
 from hand_models.sections import Complexes, Face, Flags, Outlines, Section
 
-__all__ = ["cling", "close_all"]
+__all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
 
 FLUSH: Final = 4.0
 """How deep rock may be in a finger that clings, in parts of a gap's fineness."""
@@ -42,6 +44,41 @@ SAMPLES: Final = 24
 
 HALVINGS: Final = 24
 """Of the search for a lift."""
+
+
+class ClosedFinger(NamedTuple):
+    """A finger at rest, and its loads as affine functions of tension.
+
+    Attributes
+    ----------
+    finger : SettledFinger
+    shears, normals, torques : ndarray, shape (3, 2)
+        Of `SettledFinger.shears`, `normals` and `stop_torques`.
+    touches : tuple of float
+        Tensions at which phalanges first came to the rock; NaN for those that did not [N].
+    """
+
+    finger: SettledFinger
+    shears: Array
+    normals: Array
+    torques: Array
+    touches: tuple[float, ...] = (np.nan,) * len(PHALANGES)
+
+
+class Refused(NamedTuple):
+    """A finger that cannot be where it is.
+
+    Attributes
+    ----------
+    depth : float
+        Of the rock in the open finger [m]; zero where it does not come to rest.
+    lift : float
+        Of the finger out of the rock, along −z of F, that would clear it; infinite if none up to
+        the length of a finger does, NaN where it is not looked for [m].
+    """
+
+    depth: float
+    lift: float
 
 
 def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:
@@ -92,9 +129,8 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     start = np.where(blocked[:, None], lower, straight)[going]
     rock, drive = take(rock, going), take(drive, going)
     with np.errstate(invalid="ignore", divide="ignore"):
-        path = Path(rock, shape, drive, start)
-        path.follow()
-    closed = _closed(path, model, closings, going)
+        path = follow(rock, shape, drive, start)
+    closed = _closed(model, [closings[i] for i in going.tolist()], *path)
     return [next(closed) if each is None else each for each in found]
 
 
@@ -147,15 +183,19 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
 
 
 def _closed(
-    path: Path, model: FingerModel, closings: Sequence[OpenFinger], going: Indices
+    model: FingerModel,
+    closings: Sequence[OpenFinger],
+    state: State,
+    around: Around,
+    rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:
     """Yield fingers as they are at the ends of their paths."""
-    state, share, places = path.end, path.around.share, path.around.place
+    share, places = around.share, around.place
     joints, _ = fan_out(state.q, model.joint_spacing)
     angles = np.cumsum(state.q, axis=1)
-    tilts = np.angle(path.around.push) - 0.5 * np.pi
-    for row, of in enumerate(going.tolist()):
-        if not path.rests[row]:
+    tilts = np.angle(around.push) - 0.5 * np.pi
+    for row, closing in enumerate(closings):
+        if not rests[row]:
             yield Refused(0.0, np.nan)
             continue
         mode, stop = state.mode[row], state.stop[row]
@@ -184,8 +224,8 @@ def _closed(
                     phi,
                 )
             )
-        finger, of_tile = SettledFinger(model, tuple(contacts)), closings[of].base_tile
-        shears = finger.shears(closings[of].tension, of_tile)
+        finger, of_tile = SettledFinger(model, tuple(contacts)), closing.base_tile
+        shears = finger.shears(closing.tension, of_tile)
         normals = finger.normals(shears, of_tile)
         torques = finger.stop_torques(shears, normals, of_tile)
         yield ClosedFinger(finger, shears, normals, torques, tuple(state.touches[row].tolist()))

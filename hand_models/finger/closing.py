@@ -57,7 +57,7 @@ from hand_models.finger.path_state import (
 from hand_models.finger.phalanx_gaps import PhalanxShape
 from hand_models.sections import Flags, Outlines
 
-__all__ = ["Path"]
+__all__ = ["follow"]
 
 MOST_STEPS, LONG = 1200, 600
 """Increments on a path, and from which on it is a long one; of 9,940 fingers on rough walls that
@@ -97,8 +97,10 @@ BALANCED: Final = 1e-8, 5e-7
 """Torque left by damping at the end, in the same parts: as a rule, and where rest takes long."""
 
 
-class Path:
-    """Fingers that close.
+def follow(
+    rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array
+) -> tuple[State, Around, Flags]:
+    """Follow the paths of fingers that close, to the closing tension.
 
     Parameters
     ----------
@@ -107,142 +109,139 @@ class Path:
     drive : Drive
     q : ndarray, shape (n, 3)
         Where they begin [rad].
+
+    Returns
+    -------
+    State, Around
+        Of fingers at the ends of their paths.
+    ndarray of bool, shape (n,)
+        Which of them have come to rest.
     """
+    end, beside = state, around = State.at(q), Around.of(rock, shape, drive, q)
+    resting, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
+    slow = np.zeros(len(q), dtype=np.intp)
+    for step in range(MOST_STEPS):
+        go_on()
+        after, rests = _increment(shape, drive, state, around, BALANCED[step > LONG])
+        slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)
+        ends = rests | (slow > PATIENCE)
+        if ends.any():
+            resting[going[rests]] = True
+            put(end, going[ends], take(after, ends))
+            put(beside, going[ends], take(around, ends))
+            going, slow = going[~ends], slow[~ends]
+            rock, drive, around = take(rock, ~ends), take(drive, ~ends), take(around, ~ends)
+            state, after = take(state, ~ends), take(after, ~ends)
+            if not len(going):
+                break
+        there = Around.of(rock, shape, drive, after.q)
+        state, around = _judged(shape, drive, state, around, after, there)
+    return end, beside, resting
 
-    def __init__(self, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> None:
-        self._rock, self._shape, self._drive = rock, shape, drive
-        self._length = shape.far - shape.near
-        self.end = State.at(q)
-        self.around = Around.of(rock, shape, drive, q)
-        self.rests = np.zeros(len(q), dtype=bool)
 
-    def follow(self) -> None:
-        """Follow the paths to the closing tension."""
-        going = np.arange(len(self.rests))
-        rock, drive, state, around = self._rock, self._drive, self.end, self.around
-        slow = np.zeros(len(going), dtype=np.intp)
-        for step in range(MOST_STEPS):
-            go_on()
-            balanced = BALANCED[step > LONG]
-            after, rests = self._increment(drive, state, around, balanced)
-            slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)
-            ends = rests | (slow > PATIENCE)
-            if ends.any():
-                self.rests[going[rests]] = True
-                put(self.end, going[ends], take(after, ends))
-                put(self.around, going[ends], take(around, ends))
-                going, slow = going[~ends], slow[~ends]
-                rock, drive, around = take(rock, ~ends), take(drive, ~ends), take(around, ~ends)
-                state, after = take(state, ~ends), take(after, ~ends)
-                if not len(going):
-                    return
-            there = Around.of(rock, self._shape, drive, after.q)
-            state, around = self._judged(drive, state, around, after, there)
+def _increment(
+    shape: PhalanxShape, drive: Drive, state: State, around: Around, balanced: float
+) -> tuple[State, Flags]:
+    """Return where fingers come to next, and which of them are at their ends."""
+    stride, slack = state.stride, shape.closes
+    caught = (state.spines == CAUGHT) & (around.share > 0.0)
+    # how far a phalanx may be off the rock
+    near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
+    least = np.where(caught, np.minimum(state.least, near), np.inf)
+    # spines hold no longer than rock is within their travel
+    mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
+    kept = np.where(state.spines == CAUGHT, least, state.least)
+    state = state._replace(least=kept)
+    begun = state._replace(mode=mode)
+    now = contact_states(drive, begun, around, least, shape.length, slack)
+    mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
+    damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
+    move, grow = turn[..., 0], turn[..., 1]
+    # spines that were pulled off, and where
+    pulled = (spines == PULLED) & (state.spines != PULLED)
+    least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
+    lost = (spines == PULLED) & (around.gap > least + LIFTED * shape.length)
+    spines = np.where(lost, LOST, spines).astype(np.int8)
+    curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
+    waits = curved | ~now.settled
+    waits &= state.damping < MOST_DAMPING * drive.torque
+    turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
+    turns_back &= (size > 100.0 * RESTS) & ~waits
+    # as far as the joints may turn, whose arms are of one, two and three phalanges
+    air = ~active.any(axis=1)
+    clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * shape.end)
+    most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
+    rate = times(around.d_gap, grow)
+    until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
+    end = drive.end
+    target = np.where(state.s < drive.closing, drive.closing, end)
+    more = np.minimum(target - state.s, INCREMENT * drive.closing)
+    more = np.minimum(more, (most - size).clip(0.0) / np.abs(grow).max(axis=1).clip(ROUNDING))
+    more = np.minimum(more, until.clip(0.0))
+    # and no contact pushes across a gap, or pulls where nothing holds it
+    force, rate = normals[..., 0], normals[..., 1]
+    ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
+    until = np.where(ends, -force / rate, np.inf).min(axis=1)
+    more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
+    more = np.where(waits | turns_back | (size > most), 0.0, more)
+    part = np.minimum(1.0, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
+    step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
+    normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
+    left = now.torque + more[:, None] * now.slope
+    left -= times(now.stiffness, step) + times(around.b, normals)
+    floor = LEAST_DAMPING * drive.torque
+    shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
+    damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
+    tougher = _grows(state.damping, DAMPING, drive)
+    rests = (state.s >= end) & ~waits & now.settled
+    rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
+    rests &= state.damping * size < balanced * drive.torque
+    s = state.s + more
+    first = (mode == ON) & np.isnan(state.touches)
+    touches = np.where(first, state.s[:, None], state.touches)
+    after = State(
+        q=state.q + np.where(rests[:, None], 0.0, step),
+        s=np.where(np.abs(target - s) < ROUNDING, target, s),
+        mode=mode,
+        stop=stop,
+        spines=spines,
+        been=(state.been | (mode == ON)) & (spines == CAUGHT),
+        least=least,
+        normals=normals,
+        touches=touches,
+        damping=np.where(waits | turns_back, tougher, damping),
+        stride=stride,
+        step=step,
+        left=np.where(stop != 0, 0.0, left),
+    )
+    stays = state._replace(damping=tougher, step=step, spines=spines, least=least)
+    return choose(waits, stays, after), rests
 
-    def _increment(
-        self, drive: Drive, state: State, around: Around, balanced: float
-    ) -> tuple[State, Flags]:
-        """Return where fingers come to next, and which of them are at their ends."""
-        stride, slack = state.stride, self._shape.closes
-        caught = (state.spines == CAUGHT) & (around.share > 0.0)
-        # how far a phalanx may be off the rock
-        near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
-        least = np.where(caught, np.minimum(state.least, near), np.inf)
-        # spines hold no longer than rock is within their travel
-        mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
-        kept = np.where(state.spines == CAUGHT, least, state.least)
-        state = state._replace(least=kept)
-        begun = state._replace(mode=mode)
-        now = contact_states(drive, begun, around, least, self._length, slack)
-        mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
-        damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
-        move, grow = turn[..., 0], turn[..., 1]
-        # spines that were pulled off, and where
-        pulled = (spines == PULLED) & (state.spines != PULLED)
-        least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
-        lost = (spines == PULLED) & (around.gap > least + LIFTED * self._length)
-        spines = np.where(lost, LOST, spines).astype(np.int8)
-        curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
-        waits = curved | ~now.settled
-        waits &= state.damping < MOST_DAMPING * drive.torque
-        turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
-        turns_back &= (size > 100.0 * RESTS) & ~waits
-        # as far as the joints may turn, whose arms are of one, two and three phalanges
-        air = ~active.any(axis=1)
-        clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * self._shape.end)
-        most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
-        rate = times(around.d_gap, grow)
-        until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(
-            axis=1
-        )
-        end = drive.end
-        target = np.where(state.s < drive.closing, drive.closing, end)
-        more = np.minimum(target - state.s, INCREMENT * drive.closing)
-        more = np.minimum(more, (most - size).clip(0.0) / np.abs(grow).max(axis=1).clip(ROUNDING))
-        more = np.minimum(more, until.clip(0.0))
-        # and no contact pushes across a gap, or pulls where nothing holds it
-        force, rate = normals[..., 0], normals[..., 1]
-        ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
-        until = np.where(ends, -force / rate, np.inf).min(axis=1)
-        more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
-        more = np.where(waits | turns_back | (size > most), 0.0, more)
-        part = np.minimum(1.0, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
-        step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
-        normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
-        left = now.torque + more[:, None] * now.slope
-        left -= times(now.stiffness, step) + times(around.b, normals)
-        floor = LEAST_DAMPING * drive.torque
-        shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
-        damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
-        tougher = _grows(state.damping, DAMPING, drive)
-        rests = (state.s >= end) & ~waits & now.settled
-        rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
-        rests &= state.damping * size < balanced * drive.torque
-        s = state.s + more
-        first = (mode == ON) & np.isnan(state.touches)
-        touches = np.where(first, state.s[:, None], state.touches)
-        after = State(
-            q=state.q + np.where(rests[:, None], 0.0, step),
-            s=np.where(np.abs(target - s) < ROUNDING, target, s),
-            mode=mode,
-            stop=stop,
-            spines=spines,
-            been=(state.been | (mode == ON)) & (spines == CAUGHT),
-            least=least,
-            normals=normals,
-            touches=touches,
-            damping=np.where(waits | turns_back, tougher, damping),
-            stride=stride,
-            step=step,
-            left=np.where(stop != 0, 0.0, left),
-        )
-        stays = state._replace(damping=tougher, step=step, spines=spines, least=least)
-        return choose(waits, stays, after), rests
 
-    def _judged(
-        self, drive: Drive, state: State, around: Around, after: State, there: Around
-    ) -> tuple[State, Around]:
-        """Return fingers after an increment, or before it where its linearisation does not hold."""
-        forces = forces_on(drive, after, there)
-        left = forces.torque - times(there.b, after.normals)
-        left = np.where(after.stop != 0, 0.0, left)
-        wrong = np.abs(left - after.left).max(axis=1)
-        damped, moved = np.abs(after.left).max(axis=1), np.abs(after.step).max(axis=1)
-        deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
-        too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
-        too_far |= deeper.max(axis=1) > DEEPEST * self._length
-        too_far &= moved > 2.0 * LEAST_STRIDE
-        stride = np.where(wrong < EXACT * drive.torque, 2.0, 1.3) * after.stride
-        # a damped increment that was as foreseen may be damped less
-        falls = (wrong <= 0.05 * damped + ROUNDING * drive.torque) & (moved > 0.0)
-        falls &= (after.s >= drive.end) & (after.damping <= state.damping)
-        less = _falls(after.damping, LEAST_DAMPING * drive.torque)
-        damping = np.where(falls, less, after.damping)
-        good = after._replace(stride=np.minimum(stride, MOST_STRIDE), damping=damping)
-        tougher = _grows(after.damping, 0.5 * DAMPING, drive)
-        damping = np.where(after.s > state.s, after.damping, tougher)
-        back = state._replace(stride=np.maximum(0.3 * moved, LEAST_STRIDE), damping=damping)
-        return choose(too_far, back, good), choose(too_far, around, there)
+def _judged(
+    shape: PhalanxShape, drive: Drive, state: State, around: Around, after: State, there: Around
+) -> tuple[State, Around]:
+    """Return fingers after an increment, or before it where its linearisation does not hold."""
+    forces = forces_on(drive, after, there)
+    left = forces.torque - times(there.b, after.normals)
+    left = np.where(after.stop != 0, 0.0, left)
+    wrong = np.abs(left - after.left).max(axis=1)
+    damped, moved = np.abs(after.left).max(axis=1), np.abs(after.step).max(axis=1)
+    deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
+    too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
+    too_far |= deeper.max(axis=1) > DEEPEST * shape.length
+    too_far &= moved > 2.0 * LEAST_STRIDE
+    stride = np.where(wrong < EXACT * drive.torque, 2.0, 1.3) * after.stride
+    # a damped increment that was as foreseen may be damped less
+    falls = (wrong <= 0.05 * damped + ROUNDING * drive.torque) & (moved > 0.0)
+    falls &= (after.s >= drive.end) & (after.damping <= state.damping)
+    less = _falls(after.damping, LEAST_DAMPING * drive.torque)
+    damping = np.where(falls, less, after.damping)
+    good = after._replace(stride=np.minimum(stride, MOST_STRIDE), damping=damping)
+    tougher = _grows(after.damping, 0.5 * DAMPING, drive)
+    damping = np.where(after.s > state.s, after.damping, tougher)
+    back = state._replace(stride=np.maximum(0.3 * moved, LEAST_STRIDE), damping=damping)
+    return choose(too_far, back, good), choose(too_far, around, there)
 
 
 def _grows(damping: Array, least: float, drive: Drive) -> Array:

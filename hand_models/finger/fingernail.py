@@ -23,7 +23,7 @@ So a straight finger is much like a rope: it pulls toward its base, but hardly o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -135,20 +135,10 @@ class Fingernail:
         InvalidInputError
             If a number is missing or impossible.
         """
-        numbers = {
-            name: table.scalar("nail", name)
-            for name in (
-                "length",
-                "pulley_radius",
-                "stiffness",
-                "preload",
-                "retraction",
-                "friction",
-            )
-        }
+        numbers = {field.name: table.scalar("nail", field.name) for field in fields(cls)}
         for name, value in numbers.items():
-            if name in ("length", "pulley_radius", "retraction") and not value > 0.0:
-                raise InvalidInputError(f"must be above 0, got {value:g}", field=f"nail.{name}")
+            if name in ("length", "pulley_radius", "retraction"):
+                table.positive("nail", name)
             if not value >= 0.0:
                 raise InvalidInputError(f"must be at least 0, got {value:g}", field=f"nail.{name}")
         return cls(**numbers)
@@ -215,7 +205,7 @@ class Fingernail:
         if hook is None:
             return None
         model = finger.model
-        losses = finger.losses(base_tile)
+        losses = model.losses(base_tile)
         arm = self.pulley_radius * float(losses[-1]) * (1.0 - model.friction)
         held = self.preload + self.stiffness * hook.angle
         at_zero, per_newton = -held / hook.distance, arm / hook.distance

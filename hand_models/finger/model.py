@@ -304,10 +304,6 @@ class SettledFinger:
         """The finger's joints and its end in (x, z) of F, shape (4, 2) [m]."""
         return np.array([*(contact.joint for contact in self.contacts), self.pin])
 
-    def losses(self, base_tile: bool) -> Array:
-        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,)."""
-        return self.model.losses(base_tile)
-
     def shears(self, closing_tension: float, base_tile: bool = False) -> Array:
         """Return each tile's shear as an affine function of tension.
 
@@ -317,7 +313,7 @@ class SettledFinger:
             Columns: at zero tension [N], per newton of tension. Zero where nothing is touched.
         """
         model = self.model
-        local = self.engagement * self.losses(base_tile)
+        local = self.engagement * model.losses(base_tile)
         at_zero = (np.asarray(model.engagement) - model.shear_gain) * closing_tension
         return np.column_stack([local * at_zero, local * model.shear_gain])
 
@@ -376,5 +372,5 @@ class SettledFinger:
         rest = shear_arms @ shears
         rest[:, 0] -= np.asarray(model.joint_stiffness) * self.joint_angles
         rest[:, 0] -= np.asarray(model.joint_preload)
-        rest[:, 1] += self.losses(base_tile) * np.asarray(model.pulley_radii)
+        rest[:, 1] += model.losses(base_tile) * np.asarray(model.pulley_radii)
         return normal_arms, rest

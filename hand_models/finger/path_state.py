@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import PHALANGES, FingerModel
-from hand_models.finger.open_finger import OpenFinger
 from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
-from hand_models.sections import Complexes, Flags, Outlines
-from hand_models.tile import engaged_share
+from hand_models.sections import Complexes, Flags, Outlines, Section
+from hand_models.tile import Surface, engaged_share
 
 __all__ = [
     "CATCHING",
@@ -31,6 +30,7 @@ __all__ = [
     "Around",
     "Codes",
     "Drive",
+    "OpenFinger",
     "State",
     "choose",
     "largest",
@@ -70,6 +70,27 @@ LATER: Final = np.triu(np.ones((JOINTS, JOINTS)))
 """Which phalanges turn a joint, (i, j): its own and those beyond."""
 
 EYE: Final = np.eye(JOINTS)
+
+
+class OpenFinger(NamedTuple):
+    """A finger that is to close.
+
+    Attributes
+    ----------
+    section : Section or None
+        Rock in the finger's plane, the proximal joint at its origin.
+    surface : Surface
+        What the tiles hold.
+    tension : float
+        At which the tiles catch the rock [N].
+    base_tile : bool
+        Whether a base tile comes first on the tendon.
+    """
+
+    section: Section | None
+    surface: Surface
+    tension: float
+    base_tile: bool = False
 
 
 class Drive(NamedTuple):

@@ -168,19 +168,24 @@ class PhalanxShape(NamedTuple):
         return cls(*model.tile_range, model.joint_spacing, lift, radius, model.spine_travel)
 
     @property
+    def length(self) -> float:
+        """Of the tile [m]."""
+        return self.far - self.near
+
+    @property
     def spacing(self) -> float:
         """Of the points that rock is made of, at most [m]."""
-        return (self.far - self.near) / POINTS
+        return self.length / POINTS
 
     @property
     def fine(self) -> float:
         """How far the gap may be from the least distance, about [m]."""
-        return (self.far - self.near) / FINENESS
+        return self.length / FINENESS
 
     @property
     def closes(self) -> float:
         """By how much a gap may be negative without being closed [m]."""
-        return (self.far - self.near) / ROUNDINGS
+        return self.length / ROUNDINGS
 
     def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
         """Return how phalanges are beside rock.
@@ -251,7 +256,7 @@ class PhalanxShape(NamedTuple):
     @property
     def _root(self) -> float:
         """Of the energy that sinks a bed to its level."""
-        return self.fine * math.sqrt(self.far - self.near)
+        return self.fine * math.sqrt(self.length)
 
     def _level(self, depths: Array, near: NearPoints) -> Array:
         """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""

@@ -23,12 +23,12 @@ from hand_models.finger import (
     STOPS,
     ClosedFinger,
     ClosedPhalanx,
-    ClosureLoads,
     OpenFinger,
     Refused,
     cling,
     close_all,
     stays,
+    tendon_loads,
 )
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
@@ -190,10 +190,10 @@ def _row_laid(
         each.pressed(hand.sequential_closure.tile, depth * tension)
         for each, depth in zip(laid, depths, strict=True)
     ]
-    loads = hand.tendon_loads.loads(laid, tension, base_tile)
+    loads = tendon_loads(hand.finger, laid, tension, base_tile)
     if loads is None or not stays(loads, placement.surface, tension):
         return None
-    return _row(laid, hand.finger.tile_height, loads)
+    return _row(laid, hand.finger.tile_height, *loads)
 
 
 def _alone(
@@ -241,10 +241,12 @@ def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> I
     )
 
 
-def _row(phalanges: Sequence[ClosedPhalanx], height: float, loads: ClosureLoads) -> FingerNumbers:
+def _row(
+    phalanges: Sequence[ClosedPhalanx], height: float, shears: list[complex], normals: list[complex]
+) -> FingerNumbers:
     """Return the numbers of a finger that is laid; ``height`` of its tiles [m]."""
     row: FingerNumbers = []
-    for (angle, u, joint, along, _), t, n in zip(phalanges, *loads, strict=True):
+    for (angle, u, joint, along, _), t, n in zip(phalanges, shears, normals, strict=True):
         place = joint + complex(along, height) * u
         # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from hand_models.base import InvalidInputError, Pose
-from hand_models.finger import FingerModel, Fingernail, SequentialClosure, TendonLoads
+from hand_models.finger import FingerModel, Fingernail, SequentialClosure
 from hand_models.hand.finger_frames import OUTER, FingerFrame, FrameStack
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.names import FINGERS
@@ -64,7 +64,6 @@ class HandModel:
         self.structure = Structure.from_table(table)
         self.nail = Fingernail.from_table(table)
         self.sequential_closure = SequentialClosure(self.finger)
-        self.tendon_loads = TendonLoads(self.finger)
         self.depths = [self.finger.depths(base_tile).tolist() for base_tile in (False, True)]
         # a tile on a finger's base only shifts the others on a tendon that rubs
         self.rubbing = [name.startswith("outer") and self.finger.friction > 0.0 for name in FINGERS]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.parameters import scan_table
-from hand_models.rock.triangles import Triangles
+from hand_models.rock.triangles import Triangles, edges_of
 
 __all__ = ["FilledCells", "filled_cells"]
 
@@ -47,7 +47,7 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
     table = scan_table()
     least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))
     vertices, faces = triangles
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = edges_of(faces)
     steps = np.abs(vertices[edges[:, 0]] - vertices[edges[:, 1]])
     cliff = steps > steep * np.median(np.linalg.norm(steps, axis=1))
     found: list[FilledCells] = []

@@ -21,11 +21,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, scan_table
-from hand_models.rock.borders import borders
 from hand_models.rock.filled_holes import filled_cells
-from hand_models.rock.outlined import OutlinedHold
-from hand_models.rock.triangle_cells import TriangleCells
-from hand_models.rock.triangles import Triangles, bridge, cut, weld, without_spikes, wound_alike
+from hand_models.rock.smoothing import OutlinedHold
+from hand_models.rock.triangles import (
+    TriangleCells,
+    Triangles,
+    borders,
+    bridge,
+    cut,
+    weld,
+    without_spikes,
+    wound_alike,
+)
 
 __all__ = ["Mesh", "read_mesh"]
 

@@ -16,21 +16,24 @@ at most a few millimetres off the rock.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
 from scipy.signal import savgol_coeffs
 from scipy.spatial import cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
-from hand_models.sections import PolylineSection
+from hand_models.rock.holds import Hold
+from hand_models.sections import PolylineSection, Section
 
-__all__ = ["Scale", "raw_outline", "smooth", "smoothed_outline"]
+__all__ = ["OutlinedHold", "Scale", "smooth"]
 
 STANDS_OUT: Final = 1e-5
 """How far raw points may stand out of a raised curve [m]."""
@@ -183,37 +186,6 @@ def _outward(curve: Array, closed: bool) -> Array:
     return np.column_stack([step[:, 1], -step[:, 0]]) / length[:, None]
 
 
-def smoothed_outline(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
-    """Return what of raw polylines a finger can reach from the origin, smoothed.
-
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n, 2)
-        With the rock on their left [m].
-    scale : Scale
-
-    Returns
-    -------
-    PolylineSection or None
-        None if no rock is in reach.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is too long to be a surface of rock; the field is ``hold``.
-    """
-    curves = [smooth(run, scale) for run in _reached(pieces, scale)]
-    reached = [curve for curve in curves if curve is not None]
-    return PolylineSection(reached) if reached else None
-
-
-def raw_outline(pieces: Sequence[Array], scale: Scale) -> PolylineSection | None:
-    """Return what `smoothed_outline` does, debris left out but not smoothed: a nail feels it."""
-    runs = [_distinct(run) for run in _reached(pieces, scale)]
-    reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= scale.bridged_gap]
-    return PolylineSection(reached, faceted=True) if reached else None
-
-
 def _distinct(points: Array) -> Array:
     """Return a polyline without points that are as the one before."""
     return np.asarray(points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))])
@@ -267,3 +239,45 @@ def _runs(piece: Array, reach: float) -> list[Array]:
             ends = start[i] + begin[i] * step[i], start[j] + end[j] * step[j]
             runs.append(np.vstack([ends[0], piece[kept[1:]], ends[1]]))
     return runs
+
+
+class OutlinedHold(Hold):
+    """Rock that is known by raw polylines in each plane; raw for nails, smoothed for fingers.
+
+    Parameters
+    ----------
+    hand : ParameterTable, optional
+        All numbers of the hand that is to grip it, the bundled ones by default: its tiles' length
+        is the scale to which the rock is smoothed for its fingers.
+    """
+
+    scanned = True
+
+    def __init__(self, hand: ParameterTable | None = None) -> None:
+        self._scale = Scale.of(hand)
+
+    @abstractmethod
+    def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
+        """Return the raw outlines in a plane, rock on their left; arguments as of `section`."""
+
+    def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
+        """Return the rock in a plane, as far as a finger reaches, smoothed.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is too long to be a surface of rock; the field is ``hold``.
+        """
+        runs = _reached(self._pieces(origin, s_axis, t_axis), self._scale)
+        curves = [smooth(run, self._scale) for run in runs]
+        reached = [curve for curve in curves if curve is not None]
+        return PolylineSection(reached) if reached else None
+
+    def raw_section(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
+    ) -> Section | None:
+        """Return the same, debris left out but not smoothed: a nail feels it."""
+        runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
+        least = self._scale.bridged_gap
+        reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= least]
+        return PolylineSection(reached, faceted=True) if reached else None

@@ -8,7 +8,7 @@ another, so that the chains of a cut follow from the edges' names, without compa
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import trimesh
@@ -19,7 +19,20 @@ from scipy.spatial import cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError
 
-__all__ = ["Triangles", "bridge", "cut", "weld", "without_spikes", "wound_alike"]
+__all__ = [
+    "TriangleCells",
+    "Triangles",
+    "borders",
+    "bridge",
+    "cut",
+    "edges_of",
+    "weld",
+    "without_spikes",
+    "wound_alike",
+]
+
+SIDE: Final = 0.03
+"""Of a cell of triangles; what is found does not depend on it [m]."""
 
 
 class Triangles(NamedTuple):
@@ -27,6 +40,11 @@ class Triangles(NamedTuple):
 
     vertices: Array
     faces: Indices
+
+
+def edges_of(faces: Indices) -> Indices:
+    """Return the edges of triangles in their own direction, shape (3 m, 2), first sides first."""
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def weld(triangles: Triangles) -> Triangles:
@@ -78,7 +96,7 @@ def wound_alike(triangles: Triangles) -> Triangles:
 
 def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
     """Return pairs of triangles that alone share an edge, and whether they are wound alike."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = edges_of(faces)
     owner = np.tile(np.arange(len(faces)), 3)
     names = _edge_names(edges[:, 0], edges[:, 1], int(faces.max()) + 1)
     order = np.argsort(names, kind="stable")
@@ -104,7 +122,7 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     """
     vertices, faces = triangles
     count = len(vertices)
-    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    ends = edges_of(faces)
     used = sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
     used = used + used.T
     border = np.zeros(count, dtype=bool)
@@ -116,6 +134,24 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     spread = np.sqrt(np.maximum(square - (mean**2).sum(axis=1), 0.0))
     spike = ~border & (np.linalg.norm(vertices - mean, axis=1) > ratio * spread)
     return Triangles(np.where(spike[:, None], mean, vertices), faces)
+
+
+def borders(triangles: Triangles, gap: float) -> Array:
+    """Return the ends of every edge that only one triangle has, shape (n, 2, 3) [m].
+
+    Left out are borders of holes that are no wider than ``gap`` along any axis [m].
+    """
+    vertices, faces = triangles
+    ends, count = edges_of(faces), len(vertices)
+    names, number = np.unique(_edge_names(ends[:, 0], ends[:, 1], count), return_counts=True)
+    edges = np.column_stack(np.divmod(names[number == 1], count))
+    graph = sparse.coo_matrix((np.ones(len(edges)), edges.T), shape=(count, count))
+    _, part = connected_components(graph, directed=False)
+    low, high = np.full((2, part.max() + 1, 3), np.inf) * np.array([1.0, -1.0])[:, None, None]
+    np.minimum.at(low, part, vertices)
+    np.maximum.at(high, part, vertices)
+    wide = ((high - low) > gap).any(axis=1)
+    return np.asarray(vertices[edges[wide[part[edges[:, 0]]]]])
 
 
 def cut(
@@ -232,3 +268,42 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
         parts = [pieces[i] for i in (chain[:-1] if ring else chain)]
         joined.append(np.vstack([*parts, parts[0][:1]] if ring else parts))
     return [*closed, *joined]
+
+
+class TriangleCells:
+    """Triangles, found again by where they are.
+
+    Parameters
+    ----------
+    triangles : Triangles
+    """
+
+    def __init__(self, triangles: Triangles) -> None:
+        corners = triangles.vertices[triangles.faces]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        where = np.floor(0.5 * (low + high) / SIDE).astype(np.intp)
+        where -= where.min(axis=0)
+        name = np.ravel_multi_index(tuple(where.T), tuple(where.max(axis=0) + 1))
+        self._order = np.argsort(name, kind="stable")
+        begins = np.flatnonzero(np.diff(name[self._order], prepend=-1))
+        self._begins, self._ends = begins, np.append(begins[1:], len(name))
+        low = np.minimum.reduceat(low[self._order], begins)
+        high = np.maximum.reduceat(high[self._order], begins)
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+
+    def within(self, axes: Array, low: Array, high: Array) -> Indices:
+        """Return, in order, triangles among which are all that reach into a box.
+
+        Parameters
+        ----------
+        axes : ndarray, shape (k, 3)
+            Unit vectors.
+        low, high : ndarray, shape (k,)
+            Of the box along these; without end in other directions [m].
+        """
+        middle, half = self._middle @ axes.T, self._half @ np.abs(axes).T
+        # rounding must not leave one out
+        half += 1e-9
+        cells = np.flatnonzero(((middle - half <= high) & (middle + half >= low)).all(axis=1))
+        parts = [self._order[self._begins[i] : self._ends[i]] for i in cells.tolist()]
+        return np.sort(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.intp)

@@ -41,19 +41,9 @@ PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
 """Where along a face that cuts a boundary its distance from the rock is taken."""
 
 
-class _Meetings(NamedTuple):
-    """Where faces, or their ends, first meet a boundary, shape (n,) each.
-
-    Attributes
-    ----------
-    turn : ndarray
-        How far the phalanx turns till then; infinite if they do not [rad].
-    vertex : ndarray of int
-        That is met, or the one after the place that is met by an end.
-    """
-
-    turn: Array
-    vertex: Indices
+Meetings = tuple[Array, Indices]
+"""Where faces, or their ends, first meet a boundary, shape (n,) each: how far the phalanx turns
+till then, infinite if they do not [rad]; and the vertex, or the one after the place of an end."""
 
 
 class TurningFaces:
@@ -132,7 +122,7 @@ class TurningFaces:
             )
         return angle, distance, flat
 
-    def _with_ends(self) -> _Meetings:
+    def _with_ends(self) -> Meetings:
         """Return where both ends of faces are first on the boundary, shape (2 n,)."""
         window, shape = self._window, self._square.shape
         arm, phase = np.abs(self._ends), np.angle(self._ends)
@@ -154,7 +144,7 @@ class TurningFaces:
         u, v = np.cos(phase), np.sin(phase)
         return _first(2 * shape[0], row, x * u + y * v, y * u - x * v, first[cut] + 1)
 
-    def _on_face(self) -> _Meetings:
+    def _on_face(self) -> Meetings:
         """Return where a vertex is first on a face."""
         start, end, h, _ = self._face
         nearest, farthest = start * start + h * h - SLACK, end * end + h * h + SLACK
@@ -202,11 +192,11 @@ class TurningFaces:
         return np.minimum(np.maximum(place, start), end), flat
 
 
-def _first(count: int, row: Indices, x: Array, y: Array, vertex: Indices) -> _Meetings:
+def _first(count: int, row: Indices, x: Array, y: Array, vertex: Indices) -> Meetings:
     """Return the first of some directions (x, y) in each row, from where phalanges begin."""
     turn, first = np.full(count, np.inf), np.zeros(count, dtype=np.intp)
     if not len(row):
-        return _Meetings(turn, first)
+        return turn, first
     begin = np.append(0, np.diff(row).nonzero()[0] + 1)
     # grows with the angle, from 0 to 4 in a turn
     quarter = 1.0 - x / np.maximum(np.abs(x) + np.abs(y), np.finfo(float).tiny)
@@ -215,7 +205,7 @@ def _first(count: int, row: Indices, x: Array, y: Array, vertex: Indices) -> _Me
     angle = (np.arctan2(y[at], x[at]) + ROUNDING) % math.tau
     turn[row] = np.maximum(angle - ROUNDING, 0.0)
     first[row] = vertex[at]
-    return _Meetings(turn, first)
+    return turn, first
 
 
 def _turned(s: Array, t: Array, angle: Array) -> tuple[Array, Array]:

@@ -1,4 +1,3 @@
-from .engagement import engaged_share as engaged_share
 from .half_planes import (
     HalfPlane as HalfPlane,
     bounds_gap as bounds_gap,
@@ -17,6 +16,7 @@ from .spine_calibration import (
 )
 from .surface import (
     Surface as Surface,
+    engaged_share as engaged_share,
     pull_strength as pull_strength,
     surface_names as surface_names,
 )

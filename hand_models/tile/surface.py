@@ -23,7 +23,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property, lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +31,10 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import surface_table
 
-__all__ = ["Surface", "pull_strength", "surface_names"]
+__all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
+
+LEAST: Final = 1e-6
+"""Share of spines that counts as none: far less than one, and too little to divide loads by."""
 
 
 @dataclass(frozen=True)
@@ -197,11 +200,6 @@ class Surface:
             pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
         return np.where(phi >= 0.0, pulling, pressing)
 
-    def pulled(self, angle: float) -> float:
-        """Return f_s(φ) of Eq. 21 under pull-off, φ ≥ 0 [N]."""
-        ratio = min(angle / self.pull_off_angle, 1.0)
-        return self.shear_limit - (self.shear_limit - self.pull_off_limit) * ratio
-
 
 def pull_strength(
     shear_limit: ArrayLike, pull_off_limit: ArrayLike, pull_off_angle: ArrayLike, angle: ArrayLike
@@ -220,6 +218,31 @@ def pull_strength(
     most = np.asarray(shear_limit)
     ratio = np.clip(np.asarray(angle) / np.asarray(pull_off_angle), 0.0, 1.0)
     return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio)
+
+
+def engaged_share(gap: ArrayLike, travel: float) -> Array:
+    """Return what share of a tile's spines are on the rock, φ = 1 − gap / travel in [0, 1].
+
+    Spines slide out of their tile by up to their travel; the farther they have to, the fewer find
+    an asperity that is near enough. All are on the rock where the tile itself is; a millionth of
+    them counts as none.
+
+    Parameters
+    ----------
+    gap : array_like
+        From the tile's face to the rock, infinite where there is none [m].
+    travel : float
+        How far spines reach, ``spine_travel`` of ``hand.toml`` [m].
+
+    Returns
+    -------
+    ndarray
+        The shape of ``gap``.
+    """
+    off = np.asarray(gap, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(off > 0.0, np.minimum(1.0 - off / travel, 1.0), 1.0)
+    return np.where(share > LEAST, share, 0.0)
 
 
 def _from_ratios(shear_limit: float, section: str) -> Surface:

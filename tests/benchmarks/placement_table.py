@@ -20,8 +20,8 @@ from hand_models.fixed_wrist import (
 )
 from hand_models.hand import Placement, settle_hands
 from hand_models.rock import Mesh
-from hand_models.rock.smoothing import Scale, smoothed_outline
-from hand_models.rock.triangle_cells import TriangleCells
+from hand_models.rock.smoothing import Scale, smooth
+from hand_models.rock.triangles import TriangleCells
 from hand_models.sections import Section
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Line, Table, span, times
@@ -92,7 +92,7 @@ def placement_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
             "all": lambda _: settle_hands(HAND, placements),
             "crop": lambda _: [crop(plane) for plane in planes[:made]],
             "cut": lambda _: [wall.pieces(plane) for plane in planes[:made]],
-            "smooth": lambda _: [smoothed_outline(each, scale) for each in pieces],
+            "smooth": lambda _: [[smooth(run, scale) for run in each] for each in pieces],
             "seat": lambda _: [seating_on(each.hold, each.grasp, each.at) for each in placements],
             "close": lambda _: settle_hands(HAND, seated),
             "set": lambda _: supports(hands),
