@@ -92,17 +92,17 @@ class ActiveLimits:
         multipliers: Sequence[Array],
     ) -> None:
         self._capacities = concatenated([space.s for space in spaces])
-        self._named = named = _named(tuple([space.rows for space in spaces]), tuple(limbs))
+        self._names, self._of_row = _named(tuple([space.rows for space in spaces]), tuple(limbs))
         duals = concatenated(multipliers)
         self._weights = duals * (duals > BINDING)
-        self._worth = np.bincount(named.of_row, self._weights, len(named.names))
+        self._worth = np.bincount(self._of_row, self._weights, len(self._names))
 
     def _rank(self, limit: int) -> tuple[float, int]:
         """Return what a limit is worth, and for those alike how early its first row that binds."""
         worth = float(self._worth[limit])
         if worth == 0.0:
             return NO_WORTH
-        first = ((self._named.of_row == limit) & (self._weights > 0.0)).argmax()
+        first = ((self._of_row == limit) & (self._weights > 0.0)).argmax()
         return round(worth, ALIKE), -int(first)
 
     def prices(self, utilisation: float) -> tuple[Price, ...]:
@@ -116,10 +116,10 @@ class ActiveLimits:
         utilisation : float
             At which the rows stand.
         """
-        names = self._named.names
+        names = self._names
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
         each = self._weights * utilisation / self._capacities
-        price = np.bincount(self._named.of_row, each, len(names)).tolist()
+        price = np.bincount(self._of_row, each, len(names)).tolist()
         return tuple(Price.of(names[i], price[i], unit_of(names[i].limit)) for i in dear)
 
     def limiting(
@@ -138,12 +138,11 @@ class ActiveLimits:
         idle : sequence of LimitUse
             Limits of limbs without a hand, which have no price.
         """
-        named = self._named
         rows = (used >= close_to(utilisation)).nonzero()[0]
         most = max(idle, key=lambda each: each.utilisation, default=None)
         if not len(rows):
             return most
-        limits, shares = named.of_row.take(rows), used.take(rows)
+        limits, shares = self._of_row.take(rows), used.take(rows)
         worth = self._worth.take(limits)
         dear = (worth >= np.maximum.reduce(worth) - 10.0**-ALIKE).nonzero()[0].tolist()
         tied = set(limits.take(dear).tolist())
@@ -155,37 +154,26 @@ class ActiveLimits:
             return most
         found = int(rows[best])
         capacity = float(self._capacities[found])
-        return LimitUse(named.names[named.of_row[found]], float(used[found]) * capacity, capacity)
+        return LimitUse(self._names[self._of_row[found]], float(used[found]) * capacity, capacity)
 
 
-class _Named(NamedTuple):
-    """The limits of some hands, each name once.
-
-    Attributes
-    ----------
-    names : tuple of LimitName
-    of_row : ndarray of int, shape (sum of nl,)
-        Which of them each limit row is.
-    """
-
-    names: tuple[LimitName, ...]
-    of_row: Indices
+Named = tuple[tuple[LimitName, ...], Indices]
+"""Limits of some hands, each name once, and which of them each limit row is, shape (sum of nl,)."""
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> _Named:
+def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> Named:
     """Return the limits of hands of limbs by the rows of their sets."""
     hands = [_named_alone(rows, limb) for rows, limb in zip(sets, limbs, strict=True)]
-    offsets = accumulate((len(hand.names) for hand in hands), initial=0)
-    return _Named(
-        tuple(chain.from_iterable(hand.names for hand in hands)),
-        concatenated([hand.of_row + at for hand, at in zip(hands, offsets, strict=False)]),
+    offsets = accumulate((len(names) for names, _ in hands), initial=0)
+    return (
+        tuple(chain.from_iterable(names for names, _ in hands)),
+        concatenated([of_row + at for (_, of_row), at in zip(hands, offsets, strict=False)]),
     )
 
 
 @lru_cache(maxsize=KEPT_NAMES)
-def _named_alone(rows: tuple[Row, ...], limb: str) -> _Named:
+def _named_alone(rows: tuple[Row, ...], limb: str) -> Named:
     names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
     index = {name: i for i, name in enumerate(dict.fromkeys(names))}
-    of_row = np.array([index[name] for name in names], dtype=np.intp)
-    return _Named(tuple(index), of_row)
+    return tuple(index), np.array([index[name] for name in names], dtype=np.intp)

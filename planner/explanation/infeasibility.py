@@ -32,10 +32,12 @@ __all__ = [
     "WEIGHS",
     "HardRowSystem",
     "Violation",
-    "among",
     "ranked",
+    "summed",
     "vertex",
 ]
+
+Chosen = NDArray[np.bool_]
 
 HELD_WRENCH: Final = "held_wrench"
 """Name of the constraint that a given wrench of a hand is."""
@@ -97,14 +99,19 @@ class HardRowSystem:
         return np.asarray(self.wrench - self.g)
 
     @property
-    def balance(self) -> tuple[LimitName | None, ...]:
-        """Names of the balance's rows, length nb; None of the body's own."""
-        return (None,) * BODY + self.given
-
-    @property
     def constraints(self) -> tuple[LimitName, ...]:
         """Every name once."""
         return tuple(dict.fromkeys((*self.names, *self.given)))
+
+    def rows_of(
+        self, constraints: Collection[LimitName], *, balance: bool = True
+    ) -> tuple[Chosen, Chosen]:
+        """Return which rows of the balance (nb,) and which hard rows (n,) constraints are.
+
+        The body's own six are among them if its balance counts.
+        """
+        tied = [balance] * BODY + [name in constraints for name in self.given]
+        return np.array(tied), np.array([name in constraints for name in self.names], dtype=bool)
 
     def bound(self, direction: Array, multipliers: Array) -> float:
         """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
@@ -122,10 +129,8 @@ class HardRowSystem:
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
         """Return what multipliers weigh each constraint with, those that count alone."""
-        found: dict[LimitName, float] = {}
         shares = (*multipliers.tolist(), *np.abs(direction[BODY:]).tolist())
-        for name, share in zip((*self.names, *self.given), shares, strict=True):
-            found[name] = found.get(name, 0.0) + share
+        found = summed((*self.names, *self.given), shares)
         return {name: weight for name, weight in found.items() if weight > WEIGHS}
 
     def least_violation(
@@ -144,11 +149,9 @@ class HardRowSystem:
         Violation or None
             None if the solver does not say, or the time is over.
         """
-        chosen = {*constraints, *([None] if balance else [])}
-        rows = np.flatnonzero(among(self.names, chosen))
-        tied = np.flatnonzero(among(self.balance, chosen))
+        tied, rows = self.rows_of(frozenset(constraints), balance=balance)
         G, goal, H, h = self.G[tied], self.goal[tied], self.H[rows], self.h[rows]
-        size, count = self.G.shape[1], len(tied)
+        size, count = G.shape[1], len(G)
         ends = np.append(np.full(size, UNLIMITED), np.inf)
         result = vertex(
             np.append(np.zeros(size), 1.0),
@@ -163,6 +166,14 @@ class HardRowSystem:
         direction[tied] = shares[count : 2 * count] - shares[:count]
         multipliers[rows] = shares[2 * count :]
         return Violation(float(result.x[-1]), direction, multipliers)
+
+
+def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitName, float]:
+    """Return the sum of the weights of each name."""
+    found: dict[LimitName, float] = {}
+    for name, weight in zip(names, weights, strict=True):
+        found[name] = found.get(name, 0.0) + weight
+    return found
 
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
@@ -200,10 +211,3 @@ def vertex(
         },
     )
     return result if result.status == 0 and result.x is not None else None
-
-
-def among(
-    names: Sequence[LimitName | None], chosen: Collection[LimitName | None]
-) -> NDArray[np.bool_]:
-    """Return which of the names are among the chosen, shape (n,)."""
-    return np.array([name in chosen for name in names], dtype=bool)

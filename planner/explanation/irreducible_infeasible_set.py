@@ -11,11 +11,12 @@ all the others have loads is in every one of them.
 from __future__ import annotations
 
 from collections.abc import Collection
+from itertools import compress
 from typing import Final
 
 import numpy as np
 
-from planner.explanation.infeasibility import WEIGHS, HardRowSystem, Violation, among, ranked
+from planner.explanation.infeasibility import BODY, WEIGHS, HardRowSystem, Violation, ranked
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -124,8 +125,8 @@ def sufficient_alone(
 
 def _prove_alone(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> bool:
     """Whether a proof stands on these constraints alone."""
-    direction = proof.direction * among(system.balance, {None, *kept})
-    return system.proves(direction, proof.multipliers * among(system.names, kept))
+    tied, rows = system.rows_of(kept)
+    return system.proves(proof.direction * tied, proof.multipliers * rows)
 
 
 def _needed(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> set[LimitName]:
@@ -135,14 +136,13 @@ def _needed(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]
     alone. With the row of one constraint moved by −n · r / n_k they agree; those loads z are solved
     for, and count if they also keep to what the others' other rows say.
     """
-    mine = among(system.names, kept)
-    rows = np.flatnonzero(mine & (proof.multipliers > WEIGHS))
-    tied = np.flatnonzero(among(system.balance, {None, *kept}))
+    tied, mine = system.rows_of(kept)
+    rows = mine & (proof.multipliers > WEIGHS)
     M = np.vstack([system.G[tied], system.H[rows]])
     right = np.concatenate([system.goal[tied], system.h[rows]])
     pull = np.concatenate([-proof.direction[tied], proof.multipliers[rows]])
-    given = [system.balance[i] for i in tied]
-    owners = given + [system.names[i] for i in rows]
+    given = [*[None] * BODY, *compress(system.given, tied[BODY:])]
+    owners = [*given, *compress(system.names, rows)]
     tried = [name for name in kept if name in owners]
     moved = [
         max((k for k, owner in enumerate(owners) if owner == name), key=lambda k: abs(pull[k]))
@@ -157,7 +157,7 @@ def _needed(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]
             system.H[mine] @ loads - system.h[mine, None],
         ]
     )
-    whose = given + [name for name in system.names if name in kept]
+    whose = [*given, *compress(system.names, mine)]
     found = set()
     for i, name in enumerate(tried):
         others = np.array([owner != name for owner in whose], dtype=bool)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
@@ -26,7 +27,7 @@ from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs
 from planner.explanation.active_limits import LimitUse, close_to, limit_name
-from planner.explanation.infeasibility import ranked
+from planner.explanation.infeasibility import ranked, summed
 from planner.explanation.sentences import blocking_sentence
 from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
 from planner.result import LimitName, TensionPath
@@ -137,13 +138,13 @@ def unsafe_sentence(path: TensionPath) -> str:
 
 def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome) -> list[LimitName]:
     """Return the limits and hard rows that end the safe part, those that weigh most first."""
-    weights: dict[LimitName, float] = {}
-    for limb, space, limit, hard in zip(
-        limbs, spaces, outcome.limit_duals, outcome.hard_duals, strict=True
-    ):
-        for row, weight in zip(space.rows, (*limit, *hard), strict=True):
-            name = limit_name(limb, row)
-            weights[name] = weights.get(name, 0.0) + float(weight)
+    names = [
+        limit_name(limb, row)
+        for limb, space in zip(limbs, spaces, strict=True)
+        for row in space.rows
+    ]
+    duals = zip(outcome.limit_duals, outcome.hard_duals, strict=True)
+    weights = summed(names, np.concatenate([part for pair in duals for part in pair]).tolist())
     least = ENDS * max(weights.values(), default=0.0)
     return [name for name in ranked(weights) if weights[name] > least]
 
@@ -173,25 +174,21 @@ def _pinned(
         From planned tensions to present ones, scaled, by hand.
     """
     goal = np.array(sum(data.hands[i].G @ z[i] + data.hands[i].g for i in fixed))
-    count = len(FINGERS) * len(changes)
-    hands, planned = [], [goal]
-    for i in fixed:
-        hand = data.hands[i]
-        picked = np.zeros((count, len(z[i])))
-        if i in changes:
-            columns = _columns(spaces[i])
-            first = len(FINGERS) * list(changes).index(i)
-            picked[range(first, first + len(FINGERS)), columns] = 1.0
-            planned.append(z[i][columns])
-        hands.append(
-            hand._replace(
-                G=np.vstack([hand.G, picked]),
-                g=np.concatenate([hand.g, np.zeros(count)]),
-                h=hand.h + GIVE / LOAD_UNIT,
-            )
+    sizes = [len(z[i]) for i in fixed]
+    first = dict(zip(fixed, accumulate(sizes, initial=0), strict=False))
+    places = [first[i] + column for i in changes for column in _columns(spaces[i])]
+    picked = np.split(np.eye(sum(sizes))[places], np.cumsum(sizes[:-1]), axis=1)
+    hands = [
+        data.hands[i]._replace(
+            G=np.vstack([data.hands[i].G, mine]),
+            g=np.concatenate([data.hands[i].g, np.zeros(len(places))]),
+            h=data.hands[i].h + GIVE / LOAD_UNIT,
         )
+        for i, mine in zip(fixed, picked, strict=True)
+    ]
+    planned = np.concatenate([z[i] for i in fixed])[places]
     way = np.concatenate([np.zeros(len(goal)), *changes.values()])
-    return StanceData(tuple(hands), np.concatenate(planned)), way
+    return StanceData(tuple(hands), np.concatenate([goal, planned])), way
 
 
 def _least(data: StanceData, still: float) -> float | None:

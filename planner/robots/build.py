@@ -38,8 +38,6 @@ class Chain:
         Limits of the joints' angles [rad], infinite for continuous joints.
     torque_limits : ndarray, shape (n,)
         What the joints bear [N·m].
-    hand_in_link : Pose
-        H in the link that carries it.
     shoulder : ndarray, shape (3,)
         Where the limb begins, in B [m]: its second joint if that lies on the axis of the first, so
         that no joint moves it, otherwise its first.
@@ -61,7 +59,6 @@ class Chain:
     lower: Array
     upper: Array
     torque_limits: Array
-    hand_in_link: Pose
     shoulder: Array
     reach: float
     ids: tuple[int, ...]
@@ -203,7 +200,6 @@ def _mounted(
         lower=np.array([joint.lower for joint in elements]),
         upper=np.array([joint.upper for joint in elements]),
         torque_limits=np.broadcast_to(np.array(mount.torque_limits), len(joints)).copy(),
-        hand_in_link=mount.pose,
         shoulder=root.inverse().apply(shoulder),
         reach=reach,
         ids=ids,

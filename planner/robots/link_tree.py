@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from hand_models.base import Array, Pose, skew
+from hand_models.base import Array, Pose
 from planner.robots.robot import Robot
 from planner.robots.urdf import parse_urdf
 
@@ -62,8 +63,9 @@ class LinkTree:
     def places(self, angles: Mapping[str, float]) -> dict[str, Pose]:
         """Return every link in B, for angles by the joints' names; joints left out are at zero."""
         found = {self.links[0].name: Pose.identity()}
-        for joint in self._joints:
-            turn = _turn(joint.axis, angles.get(joint.name, 0.0))
+        rotations = [angles.get(joint.name, 0.0) * joint.axis for joint in self._joints]
+        turns = Rotation.from_rotvec(rotations).as_matrix()
+        for joint, turn in zip(self._joints, turns, strict=True):
             at = Pose(joint.place.position, joint.place.rotation @ turn)
             found[joint.child] = found[joint.parent] @ at
         from_body = found[self.robot.description.body].inverse()
@@ -135,9 +137,3 @@ def _moved(masses: Array, places: Array, linear: Array, angular: Array) -> Array
 
 def _turned(turns: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("nij,nj->ni", turns, vectors))
-
-
-def _turn(axis: Array, angle: float) -> Array:
-    """Return the rotation about an axis by an angle (Rodrigues)."""
-    cross = skew(axis)
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)

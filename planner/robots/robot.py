@@ -96,10 +96,10 @@ class Robot:
         self.com = self.com_at({}) if description.com is None else np.array(description.com)
         # of each limb: its link's origin in H, its shoulder in B, its reach
         self._ends = {
-            limb: np.array(
-                [*chain.hand_in_link.inverse().position, *chain.shoulder, chain.reach]
-            ).tolist()
-            for limb, chain in self.chains.items()
+            limb: (*mount.pose.inverse().position.tolist(), *chain.shoulder.tolist(), chain.reach)
+            for (limb, chain), mount in zip(
+                self.chains.items(), description.mounts.values(), strict=True
+            )
         }
 
     def __reduce__(self) -> tuple[type[Robot], tuple[Any, ...]]:

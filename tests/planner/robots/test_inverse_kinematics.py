@@ -233,7 +233,7 @@ def test_what_is_missing_beyond_the_stretched_limb(limb, distance):
     way /= np.linalg.norm(way)
     turn = Rotation.random(random_state=5).as_matrix()
     link = Pose(robot.chains[limb].shoulder + (robot.reach + distance) * way, turn)
-    pose = link @ robot.chains[limb].hand_in_link
+    pose = link @ robot.description.mounts[limb].pose
     _, error = unloaded(robot, {limb: pose})
     # nothing can be nearer, and with the asked axes the stretched limb costs no more than itself
     assert distance - 1e-9 <= error.missing[limb] <= distance + robot.reach

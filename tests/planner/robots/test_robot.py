@@ -44,10 +44,9 @@ def test_reach_is_that_of_a_stretched_limb():
 
 def test_hand_is_mounted_where_the_meshes_say():
     # hand frame 87.2 mm along link 7, less 19.85 mm from it to H; palm 112.5 mm above the axis
-    for chain in robosimian().chains.values():
-        mount = chain.hand_in_link
-        np.testing.assert_allclose(mount.position, [0.0872 - 0.01985, 0.0, 0.1125])
-        np.testing.assert_array_equal(mount.rotation, np.eye(3))
+    for mount in robosimian().description.mounts.values():
+        np.testing.assert_allclose(mount.pose.position, [0.0872 - 0.01985, 0.0, 0.1125])
+        np.testing.assert_array_equal(mount.pose.rotation, np.eye(3))
 
 
 @pytest.mark.parametrize("limb", SHOULDERS)
@@ -58,7 +57,7 @@ def test_stretch_is_the_distance_of_the_last_link_over_the_reach(limb, part):
     way = rng.normal(size=3)
     link = robot.chains[limb].shoulder + part * robot.reach * way / np.linalg.norm(way)
     turn = Pose.from_quaternion([0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5]).rotation
-    hand = Pose(link, turn) @ robot.chains[limb].hand_in_link
+    hand = Pose(link, turn) @ robot.description.mounts[limb].pose
     (stretch,) = robot.stretches(Pose.identity(), [limb], [hand])
     assert stretch == pytest.approx(part, abs=1e-9)
 

@@ -81,7 +81,7 @@ hand_com = { value = [0.0, 0.0, -0.04], unit = "m", source = "measured" }
     np.testing.assert_array_equal(robot.chains["left"].torque_limits, [80.0] * 3)
     np.testing.assert_array_equal(robot.chains["right"].torque_limits, [30.0, 20.0, 10.0])
     np.testing.assert_allclose(
-        robot.chains["right"].hand_in_link.rotation, np.diag([-1.0, 1.0, -1.0])
+        robot.description.mounts["right"].pose.rotation, np.diag([-1.0, 1.0, -1.0])
     )
     # the right hand's centre of mass is turned up, by its orientation, from where the left's is
     plain = robot_of(RobotFile("arms", toml + own.replace("-0.04", "0.0"), text))
