@@ -157,6 +157,4 @@ class HandPlan:
 
     def tile(self, finger: str | None, phalanx: str | None) -> int:
         """Return the index of a tile among the hand's."""
-        return next(
-            i for i, t in enumerate(self.tiles) if (t.finger, t.phalanx) == (finger, phalanx)
-        )
+        return next(i for i, tile in enumerate(self.tiles) if tile[:2] == (finger, phalanx))

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from hand_models.base import Array
-from hand_models.tendon import TendonDrive
 from planner.result.plan import Status
 
 __all__ = ["SetPointSource", "SetPoints"]
@@ -40,10 +37,10 @@ class SetPoints:
         y: `WrenchStream.columns` of each hand, then zeros [N].
     source : {'interpolated', 'blended', 'solved'}
         Mixed from plans known before; solved for this wrench alone; or a mixture of both.
-    drive : TendonDrive or None
-        Of all tendons.
-    winches : ndarray, shape (2, hands, 4), or None
-        Angles from the open finger without a tension [rad], and per newton of it.
+    winch_angle : ndarray, shape (hands, 4), or None
+        Where the winches are then, from the open finger [rad].
+    motor_torque, motor_current : ndarray, shape (hands, 4), or None
+        Of motors that tighten the tendons to their tensions [N·m], and what they draw then [A].
     reason : str or None
         Why there is no plan.
     """
@@ -57,28 +54,7 @@ class SetPoints:
     wrenches: Array | None = None
     loads: Array | None = None
     source: SetPointSource = "solved"
-    drive: TendonDrive | None = None
-    winches: Array | None = None
+    winch_angle: Array | None = None
+    motor_torque: Array | None = None
+    motor_current: Array | None = None
     reason: str | None = None
-
-    @property
-    def winch_angle(self) -> Array | None:
-        """Where the winches are then, from the open finger, shape (hands, 4) [rad]."""
-        if self.tensions is None or self.winches is None:
-            return None
-        at_zero, per_newton = self.winches
-        return np.asarray(at_zero + per_newton * self.tensions)
-
-    @property
-    def motor_torque(self) -> Array | None:
-        """Of motors that tighten the tendons to their tensions, shape (hands, 4) [N·m]."""
-        if self.tensions is None or self.drive is None:
-            return None
-        return self.tensions * self.drive.torque_per_newton
-
-    @property
-    def motor_current(self) -> Array | None:
-        """What they draw then, shape (hands, 4) [A]."""
-        if self.tensions is None or self.drive is None:
-            return None
-        return self.tensions * self.drive.current_per_newton + self.drive.no_load_current
