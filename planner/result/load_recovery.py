@@ -14,9 +14,8 @@ from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
 from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
-from planner.result.hand_plan import HandPlan, PalmPlan
+from planner.result.hand_plan import HandPlan, PalmPlan, PlanArrays
 from planner.result.load_layout import COUNT, WRENCH, ZERO, layout_of
-from planner.result.plan_arrays import PlanArrays
 
 __all__ = ["LoadRecovery", "drawn_tendons"]
 
