@@ -23,7 +23,8 @@ from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
 from hand_models.wrench_spaces import SCALE, WrenchSpace
-from planner.capability import SupportPoint, enclose
+from planner.capability import COMPONENTS, SupportPoint, enclose
+from planner.pictures.body_plots import symbol_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,14 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["direction_in_words", "draw_fingers", "plot_wrench_space"]
 
-COMPONENTS: Final = (
-    ("F_x", "N"),
-    ("F_y", "N"),
-    ("F_z", "N"),
-    ("M_x", "N·m"),
-    ("M_y", "N·m"),
-    ("M_z", "N·m"),
-)
 PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
 
 CONTACTS: Final = {
@@ -382,11 +375,11 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
-    (a, unit_a), (b, unit_b) = COMPONENTS[i], COMPONENTS[j]
+    (a, unit_a), (b, unit_b) = symbol_of(COMPONENTS[i]), symbol_of(COMPONENTS[j])
     axes.set(
-        title=f"all wrenches on the rock, in ${a}$ and ${b}$",
-        xlabel=f"${a}$ [{unit_a}]",
-        ylabel=f"${b}$ [{unit_b}]",
+        title=f"all wrenches on the rock, in {a} and {b}",
+        xlabel=f"{a} [{unit_a}]",
+        ylabel=f"{b} [{unit_b}]",
     )
     if np.ptp(points[:, 0]) < FLAT:
         axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)
