@@ -198,12 +198,14 @@ def scene_of(plan: Plan, question: Question) -> Scene:
 
 
 def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> DrawnHand:
-    into_world, frames = hand.pose.apply, settled.hand.frames(settled.grasp.outer_rotation)
+    kind = settled.hand
+    x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
+    into_world, frames = hand.pose.apply, kind.frames(settled.grasp.outer_rotation)
     return DrawnHand(
         limb=hand.limb,
         floats=hand.wrist == "floating",
         place=hand.pose.position,
-        palm=into_world(_palm_corners(settled)),
+        palm=into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)]),
         fingers=tuple(
             into_world(frame.joint + finger.chain @ [frame.along, UP])
             for frame, finger in zip(frames, settled.fingers, strict=True)
@@ -213,13 +215,6 @@ def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> Draw
         force=None if plan is None else -hand.pose.rotation @ plan.wrench[:3],
         utilisation=None if plan is None else plan.utilisation,
     )
-
-
-def _palm_corners(settled: SettledHand) -> Array:
-    """Return the corners of the palm in H, shape (4, 3)."""
-    hand = settled.hand
-    x, y = np.abs(hand.palm_tiles[:, :2]).max(axis=0) + hand.palm_tile_size / 2.0
-    return np.array([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
 
 
 def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
