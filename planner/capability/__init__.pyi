@@ -1,5 +1,6 @@
 from .body_space import (
     COMPONENTS as COMPONENTS,
+    OTHERS as OTHERS,
     BodySection as BodySection,
     BodySpace as BodySpace,
     End as End,

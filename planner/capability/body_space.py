@@ -15,7 +15,7 @@ wrists: what is far from there is approximate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, Literal, NamedTuple, get_args
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,8 +35,12 @@ COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
 
 Others = Literal["needed", "zero", "free"]
 
-OTHERS: Final = get_args(Others)
-"""What the other components of a body wrench may be: as asked for, zero, or anything."""
+OTHERS: Final[dict[str, str]] = {
+    "needed": "the others as asked for",
+    "zero": "the others zero",
+    "free": "whatever the others",
+}
+"""What the other components of a body wrench may be, and how that is told."""
 
 
 class End(NamedTuple):

@@ -9,19 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models.base import Array, whole_file
-from planner.capability import COMPONENTS, BodySection, BodySpace, Polygon
+from planner.capability import COMPONENTS, OTHERS, BodySection, BodySpace, Polygon
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_body_space"]
-
-OTHERS: Final = {
-    "needed": "the others as asked for",
-    "zero": "the others zero",
-    "free": "whatever the others",
-}
-"""What a plane's other components are."""
+__all__ = ["plot_body_space", "symbol_of"]
 
 HELD: Final = "tab:blue"
 GRAVITY: Final = "tab:red"
@@ -40,30 +33,23 @@ BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -
 
 
 class _View(NamedTuple):
-    """A plane of B: what is across and up in it, as axes of B, and how it is told."""
+    """A plane of B, its x up: what is across in it, as an axis of B, and how it is told."""
 
     title: str
     across: Array
-    up: Array
     xlabel: str
-    ylabel: str
 
 
-AHEAD: Final = "ahead, along x of B [m/s²]"
 VIEWS: Final = (
     _View(
         "accelerations, seen from behind the robot",
         np.array([0.0, -1.0, 0.0]),
-        np.array([1.0, 0.0, 0.0]),
         "to the right, along −y of B [m/s²]",
-        AHEAD,
     ),
     _View(
         "accelerations, seen from its right",
         np.array([0.0, 0.0, -1.0]),
-        np.array([1.0, 0.0, 0.0]),
         "toward its belly, along −z of B [m/s²]",
-        AHEAD,
     ),
 )
 """In which accelerations are drawn."""
@@ -101,13 +87,17 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
 
 def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
     turn = space.question.stance.body.rotation
-    return space.acceleration_section(turn @ view.across, turn @ view.up, DRAWN)
+    return space.acceleration_section(turn @ view.across, turn[:, 0], DRAWN)
+
+
+def symbol_of(axis: str) -> tuple[str, str]:
+    """Return how a component of a wrench is written, and its unit."""
+    return f"${axis[0].upper()}_{axis[1]}$", "N" if axis.startswith("f") else "N·m"
 
 
 def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     indices = [COMPONENTS.index(axis) for axis in section.axes]
-    names = [f"${axis[0].upper()}_{axis[1]}$" for axis in section.axes]
-    units = ["N" if index < 3 else "N·m" for index in indices]
+    (across, across_unit), (up, up_unit) = map(symbol_of, section.axes)
     if section.polygon is None:
         axes.text(0.5, 0.5, "nothing is held", transform=axes.transAxes, ha="center", color=HELD)
     else:
@@ -128,10 +118,10 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     axes.axvline(0.0, color="0.5", linewidth=0.8)
     axes.set(
         title=f"body wrenches, {OTHERS[section.others]}",
-        xlabel=f"{names[0]} of the rock on the robot, in B [{units[0]}]",
-        ylabel=f"{names[1]} of the rock on the robot, in B [{units[1]}]",
+        xlabel=f"{across} of the rock on the robot, in B [{across_unit}]",
+        ylabel=f"{up} of the rock on the robot, in B [{up_unit}]",
     )
-    if units[0] == units[1]:
+    if across_unit == up_unit:
         axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, **BELOW)
@@ -143,7 +133,7 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
 
     def flat(vector: Array) -> Array:
         inside = into_body @ vector
-        return np.array([view.across @ inside, view.up @ inside])
+        return np.array([view.across @ inside, inside[0]])
 
     gravity = flat(space.question.stance.gravity)
     axes.plot(0.0, 0.0, "o", color=ASKED, markersize=5, label="at rest")
@@ -156,7 +146,7 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
     asked = flat(np.array(space.question.load.acceleration))
     if np.linalg.norm(asked) > 0.0:
         axes.plot(*asked, "x", color=ASKED, markersize=9, mew=2.0, label="asked for")
-    axes.set(title=view.title, xlabel=view.xlabel, ylabel=view.ylabel)
+    axes.set(title=view.title, xlabel=view.xlabel, ylabel="ahead, along x of B [m/s²]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, **BELOW)

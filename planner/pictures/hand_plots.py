@@ -7,8 +7,10 @@ from above; the set of wrenches in three projections.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,25 +19,19 @@ from matplotlib.patches import Rectangle
 from scipy.spatial import ConvexHull, QhullError
 
 from hand_models.base import Array, whole_file
-from hand_models.finger import PHALANGES, Contact, SettledFinger
+from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
 from hand_models.wrench_spaces import SCALE, WrenchSpace
-from planner.capability import SupportPoint, enclose
+from planner.capability import COMPONENTS, SupportPoint, enclose
+from planner.pictures.body_plots import symbol_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
 __all__ = ["direction_in_words", "draw_fingers", "plot_wrench_space"]
 
-COMPONENTS: Final = (
-    ("F_x", "N"),
-    ("F_y", "N"),
-    ("F_z", "N"),
-    ("M_x", "N·m"),
-    ("M_y", "N·m"),
-    ("M_z", "N·m"),
-)
 PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
 
 CONTACTS: Final = {
@@ -193,15 +189,22 @@ def _draw_finger(
     rows = np.flatnonzero(settled.finger_of == index)
     tiles = dict(zip([settled.tiles[i].phalanx for i in rows], rows.tolist(), strict=True))
     for phalanx, contact in zip(PHALANGES, finger.contacts, strict=True):
-        colour = CONTACTS[contact.kind][0]
-        ends = [_along(contact, a, model.tile_height) for a in model.tile_range]
-        axes.plot(*(MM * np.array(ends)).T, color=colour, linewidth=4, solid_capstyle="butt")
+        ends = [
+            replace(contact, along=a, rise=0.0).point(model.tile_height) for a in model.tile_range
+        ]
+        _draw_tile(axes, contact.kind, ends, linewidth=4, solid_capstyle="butt")
         if contact.kind != "none":
             place = MM * np.array(contact.point(model.tile_height))
-            axes.plot(*place, "o", color="black", markersize=4, zorder=5)
             _draw_force(axes, place, contact.angle, loads[tiles[phalanx]], largest)
     if NAIL in tiles:
-        _draw_nail(axes, settled, index, tiles[NAIL], loads[tiles[NAIL]], largest)
+        row, angle = tiles[NAIL], float(settled.nail_angles[index])
+        reach = settled.hand.nail.length * np.array([math.cos(angle), math.sin(angle)])
+        kind = settled.tiles[row].contact
+        _draw_tile(axes, kind, [finger.pin, finger.pin + reach], linewidth=3)
+        if kind == NAIL:
+            away = settled.positions[row] - frame.joint
+            place = MM * np.array([away @ frame.along, away[2]])
+            _draw_force(axes, place, angle, loads[row], largest)
     axes.annotate(
         "",
         (low[0] + 8.0 + ARROW, low[1] + 8.0),
@@ -222,30 +225,14 @@ def _draw_finger(
     axes.set_aspect("equal", adjustable="box")
 
 
-def _draw_nail(
-    axes: Axes, settled: SettledHand, index: int, row: int, load: Array, largest: float
-) -> None:
-    pin, angle = np.array(settled.fingers[index].pin), float(settled.nail_angles[index])
-    w = np.array([math.cos(angle), math.sin(angle)])
-    kind = settled.tiles[row].contact
-    tip = pin + settled.hand.nail.length * w
-    axes.plot(*(MM * np.array([pin, tip])).T, color=CONTACTS[kind][0], linewidth=3)
-    if kind == NAIL:
-        frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
-        away = settled.positions[row] - frame.joint
-        place = MM * np.array([away @ frame.along, away[2]])
-        axes.plot(*place, "o", color="black", markersize=4, zorder=5)
-        _draw_force(axes, place, angle, load, largest)
+def _draw_tile(axes: Axes, kind: str, ends: Sequence[ArrayLike], **style: Any) -> None:
+    """Draw a tile or a nail, from end to end in (x, z) of F [m], in the colour of its contact."""
+    axes.plot(*(MM * np.array(ends)).T, color=CONTACTS[kind][0], **style)
 
 
 def _chain(finger: SettledFinger) -> Array:
     """Return a finger's joints and its tip in (x, z) of F, shape (4, 2) [mm]."""
     return MM * finger.chain
-
-
-def _along(contact: Contact, along: float, height: float) -> tuple[float, float]:
-    """Return the point (x, z) of F that is so far along a phalanx and above it."""
-    return Contact(contact.angle, contact.joint, along, contact.kind).point(height)
 
 
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
@@ -275,6 +262,8 @@ def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
 
 
 def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: float) -> None:
+    """Draw where a tile meets the rock, and what it does there."""
+    axes.plot(*place, "o", color="black", markersize=4, zorder=5)
     u = np.array([math.cos(angle), math.sin(angle)])
     force = -load[0] * u + load[1] * np.array([-u[1], u[0]])
     end = place + ARROW * force / largest
@@ -386,11 +375,11 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
-    (a, unit_a), (b, unit_b) = COMPONENTS[i], COMPONENTS[j]
+    (a, unit_a), (b, unit_b) = symbol_of(COMPONENTS[i]), symbol_of(COMPONENTS[j])
     axes.set(
-        title=f"all wrenches on the rock, in ${a}$ and ${b}$",
-        xlabel=f"${a}$ [{unit_a}]",
-        ylabel=f"${b}$ [{unit_b}]",
+        title=f"all wrenches on the rock, in {a} and {b}",
+        xlabel=f"{a} [{unit_a}]",
+        ylabel=f"{b} [{unit_b}]",
     )
     if np.ptp(points[:, 0]) < FLAT:
         axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)

@@ -22,7 +22,7 @@ from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array, whole_file
-from planner.pictures.plan_scene import Scene, ViewDirections, scene_of, view_directions
+from planner.pictures.plan_scene import UP, Scene, ViewDirections, scene_of, view_directions
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
 from planner.question import Question
@@ -147,7 +147,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     step = MaxNLocator(TICKS).tick_values(0.0, float((high - low).max()))[1]
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MultipleLocator(step))
-    right = np.cross(seen.ahead, seen.up)
+    right = np.cross(seen.ahead, UP)
     aside = ASIDE_STEEP if seen.steep else ASIDE
     camera = -math.cos(aside) * seen.ahead + math.sin(aside) * right
     lean = math.asin(np.clip(seen.into[2], -1.0, 1.0))
@@ -175,14 +175,14 @@ def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> N
     ahead = "toward the rock" if seen.toward else "ahead"
     if seen.steep:
         below = seen.into[2] > 0.0
-        right = np.cross(seen.up if below else -seen.up, seen.ahead)
+        right = np.cross(UP if below else -UP, seen.ahead)
         _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead))
         facing.set_title("seen from below" if below else "seen from above", fontsize=10)
     else:
-        right = np.cross(seen.ahead, seen.up)
-        _draw_side(facing, scene, right, seen.up, ("to the right", "up"))
+        right = np.cross(seen.ahead, UP)
+        _draw_side(facing, scene, right, UP, ("to the right", "up"))
         facing.set_title("seen from behind", fontsize=10)
-    _draw_side(side, scene, seen.ahead, seen.up, (ahead, "up"))
+    _draw_side(side, scene, seen.ahead, UP, (ahead, "up"))
     side.set_title("seen from the side", fontsize=10)
 
 

@@ -17,6 +17,7 @@ from planner.question import HandOnHold, Question, Stance
 from planner.result import HandPlan, Plan
 
 __all__ = [
+    "UP",
     "DrawnHand",
     "DrawnLimb",
     "DrawnLoad",
@@ -31,6 +32,9 @@ ARROW: Final = 0.5
 
 LEANING: Final = 0.3
 """Horizontal part of a direction from which on it says where ahead is."""
+
+UP: Final = np.array([0.0, 0.0, 1.0])
+"""In W; and z of a hand."""
 
 STEEP: Final = 0.9
 """Vertical part of the direction into the rock from which on the rock is a ceiling or a floor."""
@@ -142,12 +146,12 @@ class Scene:
 
 
 class ViewDirections(NamedTuple):
-    """Unit directions in W that are seen from the robot: up, ahead, and into the rock.
+    """Unit directions in W that are seen from the robot: ahead, and into the rock.
 
     Attributes
     ----------
-    up, ahead : ndarray, shape (3,)
-        Ahead is horizontal.
+    ahead : ndarray, shape (3,)
+        Horizontal.
     into : ndarray, shape (3,)
         The mean of the hands' z; ahead where they cancel.
     toward : bool
@@ -157,7 +161,6 @@ class ViewDirections(NamedTuple):
         Whether the rock is a ceiling or a floor.
     """
 
-    up: Array
     ahead: Array
     into: Array
     toward: bool
@@ -166,17 +169,16 @@ class ViewDirections(NamedTuple):
 
 def view_directions(stance: Stance) -> ViewDirections:
     """Return how a stance is looked at."""
-    up = np.array([0.0, 0.0, 1.0])
     into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
     x, _, z = stance.body.rotation.T
     level = [
-        direction - (direction @ up) * up for direction in (into, -z, x, np.array([1.0, 0.0, 0.0]))
+        direction - (direction @ UP) * UP for direction in (into, -z, x, np.array([1.0, 0.0, 0.0]))
     ]
     chosen = next(i for i, v in enumerate(level) if np.linalg.norm(v) >= LEANING)
     ahead = level[chosen] / np.linalg.norm(level[chosen])
     length = float(np.linalg.norm(into))
     into = into / length if length >= LEANING else ahead
-    return ViewDirections(up, ahead, into, chosen == 0, bool(abs(into @ up) >= STEEP))
+    return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ UP) >= STEEP))
 
 
 def scene_of(plan: Plan, question: Question) -> Scene:
@@ -196,36 +198,23 @@ def scene_of(plan: Plan, question: Question) -> Scene:
 
 
 def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> DrawnHand:
-    into_world = hand.pose.apply
+    kind = settled.hand
+    x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
+    into_world, frames = hand.pose.apply, kind.frames(settled.grasp.outer_rotation)
     return DrawnHand(
         limb=hand.limb,
         floats=hand.wrist == "floating",
         place=hand.pose.position,
-        palm=into_world(_palm_corners(settled)),
-        fingers=tuple(into_world(chain) for chain in _finger_chains(settled)),
+        palm=into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)]),
+        fingers=tuple(
+            into_world(frame.joint + finger.chain @ [frame.along, UP])
+            for frame, finger in zip(frames, settled.fingers, strict=True)
+        ),
         touching=into_world(settled.positions[settled.holding]),
         rock=into_world(rock_patch(settled)),
         force=None if plan is None else -hand.pose.rotation @ plan.wrench[:3],
         utilisation=None if plan is None else plan.utilisation,
     )
-
-
-def _palm_corners(settled: SettledHand) -> Array:
-    """Return the corners of the palm in H, shape (4, 3)."""
-    hand = settled.hand
-    x, y = np.abs(hand.palm_tiles[:, :2]).max(axis=0) + hand.palm_tile_size / 2.0
-    return np.array([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
-
-
-def _finger_chains(settled: SettledHand) -> list[Array]:
-    """Return each finger's joints and tip in H, shape (4, 3) each."""
-    chains = []
-    up = np.array([0.0, 0.0, 1.0])
-    frames = settled.hand.frames(settled.grasp.outer_rotation)
-    for frame, finger in zip(frames, settled.fingers, strict=True):
-        flat = finger.chain
-        chains.append(frame.joint + flat[:, :1] * frame.along + flat[:, 1:] * up)
-    return chains
 
 
 def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 from typing import Any, Final
 
 import numpy as np
@@ -70,9 +71,7 @@ def draw_tiles(axes: Any, plan: Plan) -> None:
 def draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:
     """Draw the utilisation of every joint as a table of colours."""
     used = [np.asarray(limb.utilisations) for limb in limbs]
-    values = np.full((len(limbs), max(map(len, used))), np.nan)
-    for row, joints in zip(values, used, strict=True):
-        row[: len(joints)] = joints
+    values = np.array(list(zip_longest(*used, fillvalue=np.nan))).T
     columns = [str(i + 1) for i in range(values.shape[1])]
     _draw_table(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
     axes.set_title("utilisation of each joint, from the body outward", fontsize=10, loc="right")

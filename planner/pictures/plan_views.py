@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final
@@ -130,7 +130,7 @@ class View:
         return begin, tip
 
     def merged(
-        self, spots: Array, texts: Sequence[str], between: str, near: float
+        self, spots: Iterable[Array], texts: Iterable[str], between: str, near: float
     ) -> list[tuple[Array, str]]:
         """Return notes with seen places; from a side, those that are near each other joined."""
         found: list[tuple[Array, str]] = []
@@ -249,13 +249,10 @@ def _draw_limb(view: View, limb: DrawnLimb) -> None:
 
 def _name_hands(view: View, scene: Scene) -> None:
     """Write the limbs' names beside their hands, away from the body."""
-    names = [hand.limb + (" (floats)" if hand.floats else "") for hand in scene.hands]
-    places = [hand.place for hand in scene.hands]
-    for limb in scene.limbs:
-        if not any(hand.limb == limb.limb for hand in scene.hands):
-            names.append(f"{limb.limb} (free)")
-            places.append(limb.chain[-1])
-    names = [name.replace("_", " ") for name in names]
+    held = {hand.limb for hand in scene.hands}
+    named = [(hand.limb + " (floats)" * hand.floats, hand.place) for hand in scene.hands]
+    named += [(f"{limb} (free)", chain[-1]) for limb, chain, _ in scene.limbs if limb not in held]
+    names, places = zip(*((name.replace("_", " "), place) for name, place in named), strict=True)
     spots = view.flat(np.array(places))
     middle = view.flat(scene.body.position[None])[0]
     for spot, text in view.merged(spots, names, ",\n", NEAR_NAMES):
@@ -265,18 +262,16 @@ def _name_hands(view: View, scene: Scene) -> None:
 
 def _draw_forces(view: View, scene: Scene) -> None:
     """Draw the hands' forces on the robot in the colours of their utilisation, and the load."""
-    ends: list[tuple[Array, Array]] = []
-    sizes: list[str] = []
+    arrows = []
     for hand in scene.hands:
         if hand.force is not None and hand.utilisation is not None:
             colour = COLOURS(UTILISATION(hand.utilisation))
-            ends.append(view.arrow(hand.place, scene.scale * hand.force, colour))
-            sizes.append(f"{np.linalg.norm(hand.force):.0f} N")
-    if ends:
-        tips = np.array([tip for _, tip in ends])
-        steps = {tuple(tip): tip - begin for begin, tip in ends}
-        for tip, text in view.merged(tips, sizes, ", ", NEAR_TIPS):
-            view.beyond(text, tip, steps[tuple(tip)])
+            begin, tip = view.arrow(hand.place, scene.scale * hand.force, colour)
+            arrows.append((tip, f"{np.linalg.norm(hand.force):.0f} N", tip - begin))
+    steps = {tuple(tip): step for tip, _, step in arrows}
+    tips, sizes = [tip for tip, _, _ in arrows], [size for _, size, _ in arrows]
+    for tip, text in view.merged(tips, sizes, ", ", NEAR_TIPS):
+        view.beyond(text, tip, steps[tuple(tip)])
     load = scene.load
     view.line(load.place[None], color=LOAD, marker="o", ms=8, zorder=6)
     begin, tip = view.arrow(load.place, scene.scale * load.force, LOAD)

@@ -85,27 +85,24 @@ def _coarse(triangles: Triangles) -> Triangles:
 
 def _surface(settled: SettledHand, hand: Array) -> Triangles:
     """Return a hold's surface in its own frame, at least near a hand at a place in that frame."""
-    hold = settled.hold
+    hold, middle = settled.hold, float(hand[1])
+    sides = middle - 2.0 * AROUND, middle + 2.0 * AROUND
     match hold:
         case Plane():
             x = float(hand[0])
             outline = np.array([[x - 2.0 * AROUND, 0.0], [x + 2.0 * AROUND, 0.0]])
-            return _drawn_out(outline, *_width(hand))
+            return _drawn_out(outline, *sides)
         case Cylinder() | Edge():
-            return _drawn_out(_round_outline(hold, hand), *_width(hand))
+            return _drawn_out(_round_outline(hold, hand), *sides)
         case Sphere():
             return _cap(np.full(3, hold.diameter / 2.0), hand)
         case Ellipsoid():
             return _cap(np.array(hold.semi_axes), hand)
         case Profile():
-            return _strips(hold, settled, hand)
+            return _strips(hold, settled, *sides)
         case Mesh():
             return hold.triangles
     return Triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
-
-
-def _width(hand: Array) -> tuple[float, float]:
-    return float(hand[1]) - 2.0 * AROUND, float(hand[1]) + 2.0 * AROUND
 
 
 def _drawn_out(outline: Array, low: float, high: float) -> Triangles:
@@ -155,9 +152,8 @@ def _cap(semi_axes: Array, hand: Array) -> Triangles:
     return _grid(centre + unit * semi_axes)
 
 
-def _strips(hold: Profile, settled: SettledHand, hand: Array) -> Triangles:
-    """Return the surface of a hold that is drawn as outlines."""
-    low, high = _width(hand)
+def _strips(hold: Profile, settled: SettledHand, low: float, high: float) -> Triangles:
+    """Return the surface of a hold that is drawn as outlines, from y = low to high."""
     if len(hold.outlines) == 1:
         return _drawn_out(hold.outlines[0], low, high)
     half_way = 0.5 * float(settled.hand.inner_joint[1] + settled.hand.outer_axis[1])

@@ -1,5 +1,5 @@
 from .floating_load_recovery import recover_floating_hand as recover_floating_hand
-from .hand_plan import HandPlan as HandPlan, WristPlan as WristPlan
+from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
 from .load_recovery import LoadRecovery as LoadRecovery
 from .plain_parts import (
     Finger as Finger,
@@ -11,6 +11,10 @@ from .plain_parts import (
     Tile as Tile,
     Time as Time,
 )
-from .plan import Certificate as Certificate, Plan as Plan, Status as Status
-from .plan_arrays import PlanArrays as PlanArrays
-from .set_points import SetPoints as SetPoints, SetPointSource as SetPointSource
+from .plan import (
+    Certificate as Certificate,
+    Plan as Plan,
+    SetPoints as SetPoints,
+    SetPointSource as SetPointSource,
+    Status as Status,
+)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger import PHALANGES
-from hand_models.hand import NAIL, HandModel
+from hand_models.hand import NAIL
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import KEPT, HandBatch, TileIndex, concatenated
+from planner.prepare import HandBatch, concatenated
 from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
-from planner.result.hand_plan import HandPlan, PalmPlan
+from planner.result.hand_plan import HandPlan, PalmPlan, PlanArrays
 from planner.result.load_layout import COUNT, WRENCH, ZERO, layout_of
-from planner.result.plan_arrays import PlanArrays
 
 __all__ = ["LoadRecovery", "drawn_tendons"]
 
@@ -69,9 +67,7 @@ class LoadRecovery:
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
             rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
-        joints, _, nails = drawn_tendons(known)
-        self._drives, self._per_shear = _drives_of(known.places, settled[0].hand)
-        self._winches = (joints + nails) / settled[0].hand.drive.winch_radius
+        self._drawn = drawn_tendons(known)
         self._fixed = (
             tiles,
             pieces,
@@ -114,18 +110,15 @@ class LoadRecovery:
             shears = shears.copy()
             shears[layout.hooked] = 0.0
         drawn = np.add.reduceat(shears, known.places.first_of_finger)
-        at_zero, per_newton = self._drives
-        drives = per_newton * tensions
-        drives += at_zero
-        drives[2] += self._winches
-        drives[2] += self._per_shear * drawn
+        drive, (joints, losses, nails) = known.hands[0].hand.drive, self._drawn
+        turned = drive.winch_angle(joints, tensions, drawn, losses, nails)
         forces = np.zeros((len(known.points), 3))
         forces[: len(of_tiles)] = (of_tiles[:, None] @ known.axes)[:, 0]
         forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
         palm_used = palms / known.palm_limits
         arrays = PlanArrays(
             tensions,
-            drives,
+            np.array([drive.torque(tensions), drive.current(tensions), turned]),
             of_tiles,
             forces,
             known.points,
@@ -192,37 +185,9 @@ def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
     nails : ndarray, shape (F,)
         [m]
     """
-    hand = known.hands[0].hand
-    radii, losses = _losses(known.places, hand)
-    nails = hand.nail.pulley_radius * concatenated([each.nail_angles for each in known.hands])
-    return known.bends @ radii, losses, nails
-
-
-@lru_cache(maxsize=KEPT)
-def _drives_of(places: TileIndex, hand: HandModel) -> tuple[Array, float]:
-    """Return what tensions and tiles' shears do to motors and winches, affine in them.
-
-    Returns
-    -------
-    drives : ndarray, shape (2, 3, F)
-        Torque [N·m] and current [A] of each motor, angle of each winch [rad]: at zero tension,
-        straight fingers and without shear; then per newton of tension.
-    per_shear : float
-        Of the winches' angles, per newton of the shears of a tendon's tiles [rad/N].
-    """
-    drive, (_, losses) = hand.drive, _losses(places, hand)
-    none, one = np.zeros_like(losses), np.ones_like(losses)
-    at_zero, at_one = (
-        np.array([drive.torque(f), drive.current(f), drive.winch_angle(none, f, none, losses)])
-        for f in (none, one)
-    )
-    return np.array([at_zero, at_one - at_zero]), drive.winch_angle(0.0, 0.0, 1.0, 0.0)
-
-
-@lru_cache(maxsize=KEPT)
-def _losses(places: TileIndex, hand: HandModel) -> tuple[Array, Array]:
-    """Return the pulleys' radii of a finger [m], and the sum of the diagonal of M of each."""
+    hand, places = known.hands[0].hand, known.places
     sums = np.add.accumulate((1.0 - hand.finger.friction) ** np.arange(len(PHALANGES) + 1.0))
     losses = np.full(len(places.phalanges), sums[-2])
     losses[places.base_fingers] = sums[-1]
-    return np.array(hand.finger.pulley_radii), losses
+    nails = hand.nail.pulley_radius * concatenated([each.nail_angles for each in known.hands])
+    return known.bends @ np.array(hand.finger.pulley_radii), losses, nails

@@ -195,19 +195,21 @@ class WrenchStream:
         """Return loads, and what they do, as set-points, checked."""
         stance, check = self._stance, self._stance.check
         wrenches, utilisation = read
+        tensions = loads[:, : len(FINGERS)]
         used = float(max(utilisation, check.idle))
         return SetPoints(
             status="optimal" if used <= stance.cap + SLACK else "overloaded",
             body_wrench=wrench,
             utilisation=used,
             gap=float(max(used - max(bound, check.idle), 0.0)),
-            tensions=loads[:, : len(FINGERS)],
+            tensions=tensions,
             wrenches=wrenches,
             loads=loads,
             verified=check.fault(loads, wrenches, used, wrench) is None,
             source=source,
-            drive=stance.drive,
-            winches=stance.winches,
+            winch_angle=stance.winches[0] + stance.winches[1] * tensions,
+            motor_torque=stance.drive.torque(tensions),
+            motor_current=stance.drive.current(tensions),
         )
 
     def _without(self, wrench: Array) -> SetPoints:

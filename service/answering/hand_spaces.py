@@ -30,8 +30,6 @@ from service.requests import SpaceWant, WrenchSpaceRequest
 
 __all__ = ["wrench_space"]
 
-VIEWS: Final = {"vertices": WrenchSpace.vertices, "half_spaces": WrenchSpace.half_spaces}
-
 KNOWN: Final = "the hand's wrench space was known"
 REACH: Final = "it was known how far the hand's set reaches"
 """What a deadline may come before."""
@@ -150,42 +148,27 @@ def _views(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> dict[str, An
             field="want",
         )
     views: dict[str, Any] = dict.fromkeys((*VIEWS, "dimension", "capability"))
+    warnings = []
     try:
-        found, warnings = _listed(space, want)
-        if "vertices" in found:
-            views["vertices"] = plain(space.vertices())
-        if "half_spaces" in found:
-            views["half_spaces"] = _half_spaces(space)
-        if space.listed:
-            views["dimension"] = space.dimension
+        for view, told_of in VIEWS.items():
+            if want is not None and view not in want:
+                continue
+            try:
+                size = getattr(space.sizes(), view)
+                if size > MOST:
+                    much = f"{size} candidates to go through are too many (at most {MOST})"
+                    raise LimitError(much)
+                views[view] = told_of(space)
+            except LimitError as error:
+                why = f"{error.message}; {LESS}"
+                if want is not None:
+                    raise LimitError(f"{view}: {why}, or leave it out", field="want") from None
+                warnings.append(f"{view} left out: {why}")
+        views["dimension"] = space.dimension if space.listed else None
         return views | {"capability": _capability(space), "warnings": warnings}
     except EmptySetError:
         listed = want is None or "vertices" in want
         return dict.fromkeys(views) | {"vertices": [] if listed else None}
-
-
-def _listed(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> tuple[list[str], list[str]]:
-    """Return which of vertices and half-spaces are told, and warnings of those left out.
-
-    Those that are told have been computed.
-    """
-    found, warnings = [], []
-    for view, compute in VIEWS.items():
-        if want is not None and view not in want:
-            continue
-        try:
-            size = getattr(space.sizes(), view)
-            if size > MOST:
-                raise LimitError(f"{size} candidates to go through are too many (at most {MOST})")
-            compute(space)
-            found.append(view)
-        except LimitError as error:
-            if want is not None:
-                raise LimitError(
-                    f"{view}: {error.message}; {LESS}, or leave it out", field="want"
-                ) from None
-            warnings.append(f"{view} left out: {error.message}; {LESS}")
-    return found, warnings
 
 
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
@@ -195,6 +178,10 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
         plain(faces.equation_normals), plain(faces.equation_offsets)
     )
     return told(replies.HalfSpaces, faces, equations=equations)
+
+
+VIEWS: Final = {"vertices": lambda space: plain(space.vertices()), "half_spaces": _half_spaces}
+"""What may be left out of a set, and how it is told."""
 
 
 def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:

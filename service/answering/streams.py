@@ -62,10 +62,24 @@ class Streams:
     def declare(self, request: StreamRequest, robots: Robots = ROBOTS) -> StreamReply:
         """Answer a declaration; parameters and errors as of `opened`."""
         start = time.perf_counter()
-        stream = opened(request, robots)
-        identifier = uuid.uuid4().hex
+        stream, identifier = opened(request, robots), uuid.uuid4().hex
         try:
-            reply = _declared(identifier, stream, request.id, start)
+            # with fewer plans, later set-points would not be the same
+            deadline.check(FIRST)
+            first = stream.set_points(stream.first)
+            deadline.check(FIRST)
+            named = zip(stream.limbs, map(list, stream.columns), strict=True)
+            reply = told(
+                StreamReply,
+                first,
+                id=request.id,
+                poses=placed_poses(stream.question.stance),
+                stream=identifier,
+                radius=stream.interpolates,
+                body_wrench=plain(stream.first),
+                hands=[HandColumns(limb=limb, columns=columns) for limb, columns in named],
+                took=time.perf_counter() - start,
+            )
             # what cannot be told would take a place that nobody knows of
             Format.MSGPACK.encode(reply)
         except BaseException:
@@ -111,28 +125,6 @@ class Streams:
             gone, self._kept = self._kept, OrderedDict()
         for stream in gone.values():
             stream.close()
-
-
-def _declared(identifier: str, stream: WrenchStream, name: str | None, start: float) -> StreamReply:
-    """Return a stream as it travels; ``name`` is the request's, others as of `set_points_reply`."""
-    # with fewer plans, later set-points would not be the same
-    deadline.check(FIRST)
-    first = stream.set_points(stream.first)
-    deadline.check(FIRST)
-    return told(
-        StreamReply,
-        first,
-        id=name,
-        poses=placed_poses(stream.question.stance),
-        stream=identifier,
-        radius=stream.interpolates,
-        body_wrench=stream.first.tolist(),
-        hands=[
-            HandColumns(limb=limb, columns=list(columns))
-            for limb, columns in zip(stream.limbs, stream.columns, strict=True)
-        ],
-        took=time.perf_counter() - start,
-    )
 
 
 def set_points_reply(

@@ -13,11 +13,6 @@ from .hand import (
     WrenchSet as WrenchSet,
     Wrist as Wrist,
 )
-from .health import (
-    HealthReply as HealthReply,
-    LastFailure as LastFailure,
-    ProcessHealth as ProcessHealth,
-)
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     Certificate as Certificate,
@@ -27,7 +22,10 @@ from .reply import (
     AXES as AXES,
     ErrorDetail as ErrorDetail,
     ErrorReply as ErrorReply,
+    HealthReply as HealthReply,
+    LastFailure as LastFailure,
     PlacedFrame as PlacedFrame,
+    ProcessHealth as ProcessHealth,
     Reply as Reply,
     StanceReply as StanceReply,
 )

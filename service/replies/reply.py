@@ -1,4 +1,4 @@
-"""What every reply has, and the reply to a request that failed.
+"""What every reply has, the reply to a request that failed, and what an operator is told.
 
 Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
 moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
@@ -7,7 +7,7 @@ was not asked for with ``want`` is left out.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 from msgspec import UNSET, Struct, UnsetType
 
@@ -15,7 +15,10 @@ __all__ = [
     "AXES",
     "ErrorDetail",
     "ErrorReply",
+    "HealthReply",
+    "LastFailure",
     "PlacedFrame",
+    "ProcessHealth",
     "Reply",
     "StanceReply",
     "Vector",
@@ -60,3 +63,39 @@ class ErrorReply(Reply, kw_only=True):
     """A request that could not be understood, or a service that failed on it."""
 
     error: ErrorDetail
+
+
+class ProcessHealth(Struct, kw_only=True):
+    """One of a service's processes; ``resident``: its memory [bytes], where the system tells it."""
+
+    pid: int | None
+    purpose: Literal["questions", "streams"]
+    state: Literal["starting", "idle", "working"]
+    resident: int | None
+
+
+class LastFailure(Struct, kw_only=True):
+    """What failed last: the kind of error, of which key or process, and when (Unix time).
+
+    ``id``: the question's.
+    """
+
+    kind: str
+    about: str
+    id: str | None = None
+    at: float
+
+
+class HealthReply(Reply, kw_only=True):
+    """How a service is.
+
+    ``uptime``: [s]; ``replied``: questions so far; ``waiting``: questions, by the kind of queue.
+    """
+
+    robot: str
+    version: str | None
+    uptime: float
+    replied: int
+    waiting: dict[str, int]
+    processes: list[ProcessHealth]
+    last_failure: LastFailure | None

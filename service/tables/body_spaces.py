@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
-from planner.capability import COMPONENTS
+from planner.capability import COMPONENTS, OTHERS
 from planner.result import LimitName
 from service import replies
 from service.replies import BodySpaceReply
@@ -18,12 +18,6 @@ __all__ = ["print_body_space"]
 
 FINEST: Final = 1e-3
 """A gap below this is told as this [N]."""
-
-OTHERS: Final = {
-    "needed": "the others as asked for",
-    "zero": "the others zero",
-    "free": "whatever the others",
-}
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:

@@ -28,8 +28,8 @@ from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
 from planner.pictures.plan_scene import scene_of, view_directions
 from planner.pictures.plan_views import COLOURS, LIMB
+from planner.pictures.report import draw_route
 from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
-from planner.pictures.route_plots import draw_route
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
 from planner.route import RouteStage
