@@ -1,11 +1,12 @@
-from .budget import Budget as Budget
 from .clock import (
+    Budget as Budget,
     DeadlineError as DeadlineError,
+    Unfinished as Unfinished,
     check as check,
     expired as expired,
+    late_sentence as late_sentence,
     left as left,
     seconds as seconds,
     within as within,
 )
 from .overlap import Overlap as Overlap, begin_overlap as begin_overlap
-from .unfinished import Unfinished as Unfinished, late_sentence as late_sentence

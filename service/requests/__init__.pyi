@@ -17,7 +17,17 @@ from .limits import (
     Limits as Limits,
     Load as Load,
 )
-from .plan import PlanRequest as PlanRequest, Want as Want
+from .questions import (
+    Axis as Axis,
+    BodySpaceRequest as BodySpaceRequest,
+    PlanRequest as PlanRequest,
+    RouteRequest as RouteRequest,
+    SetPointsRequest as SetPointsRequest,
+    SpaceWant as SpaceWant,
+    StreamRequest as StreamRequest,
+    Want as Want,
+    WrenchSpaceRequest as WrenchSpaceRequest,
+)
 from .request import (
     DEFAULT_DEADLINE as DEFAULT_DEADLINE,
     LONGEST_DEADLINE as LONGEST_DEADLINE,
@@ -29,12 +39,4 @@ from .request import (
     Request as Request,
     Wrench as Wrench,
 )
-from .route import RouteRequest as RouteRequest
-from .spaces import (
-    Axis as Axis,
-    BodySpaceRequest as BodySpaceRequest,
-    SpaceWant as SpaceWant,
-    WrenchSpaceRequest as WrenchSpaceRequest,
-)
 from .stance import Grasp as Grasp, Hand as Hand, Place as Place, Stance as Stance
-from .stream import SetPointsRequest as SetPointsRequest, StreamRequest as StreamRequest

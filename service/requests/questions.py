@@ -1,0 +1,166 @@
+"""The questions: who carries what in a stance, what it can bear, set-points, and a whole climb.
+
+Fields that the contract knows but this version does not are declared, so that they are refused by
+name (`service.wire.checks`) and not as unknown.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from service.requests.limits import Limits, Load
+from service.requests.request import (
+    Coordinate,
+    Detail,
+    Identifier,
+    Later,
+    Name,
+    Pose,
+    Query,
+    Request,
+    Tensions,
+    Wrench,
+)
+from service.requests.stance import Hand, Stance
+
+__all__ = [
+    "Axis",
+    "BodySpaceRequest",
+    "PlanRequest",
+    "RouteRequest",
+    "SetPointsRequest",
+    "SpaceWant",
+    "StreamRequest",
+    "Want",
+    "WrenchSpaceRequest",
+]
+
+ObjectiveName = Annotated[
+    Literal["max_margin", "min_effort", "max_reliability"],
+    Meta(
+        description="least utilisation, or least effort within limits.utilisation; "
+        "max_reliability is not supported in this version"
+    ),
+]
+Want = Literal["load_factor", "prices", "model", "robust"]
+Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
+Direction = tuple[Coordinate, Coordinate, Coordinate]
+SpaceWant = Literal["robust", "half_spaces", "vertices"]
+Radius = Annotated[
+    float,
+    Meta(
+        gt=0.0,
+        le=1e4,
+        description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
+    ),
+]
+
+
+class PlanRequest(Query, frozen=True, kw_only=True):
+    """Asks who carries what in a stance."""
+
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions],
+        Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
+    ] = {}
+    confidence: Later = None
+    detail: Detail = "full"
+    want: Annotated[
+        list[Want],
+        Meta(description="robust: the least load factor over a scatter of the hands' places, too"),
+    ] = []
+
+
+class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
+    """Asks what one hand of a stance can carry."""
+
+    stance: Stance
+    limb: Name
+    want: Annotated[
+        list[SpaceWant] | None,
+        Meta(
+            description="what is told beside rows and capability, each at most once; an error of "
+            "kind limit where it would cost too much, as many half_planes may. By default "
+            "half_spaces and vertices where they are cheap. robust: the least that it can carry "
+            "over a scatter of its place",
+            extra_json_schema={"uniqueItems": True},
+        ),
+    ] = None
+
+
+class BodySpaceRequest(Query, frozen=True, kw_only=True):
+    """Asks what a stance can hold: body wrenches, a plane of them, and accelerations."""
+
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions], Meta(description="tensions of the tendons now, by limb [N]")
+    ] = {}
+    axes: Annotated[
+        list[Axis], Meta(min_length=2, max_length=2, description="of the plane; fx and fz")
+    ] = field(default_factory=lambda: ["fx", "fz"])
+    others: Annotated[
+        Literal["needed", "zero", "free"],
+        Meta(
+            description="the plane's other components: as asked for, zero, or whatever they may be"
+        ),
+    ] = "needed"
+    directions: Annotated[
+        list[Direction],
+        Meta(
+            max_length=100,
+            description="along which the largest acceleration is wanted, in W: one program each",
+        ),
+    ] = []
+
+
+class StreamRequest(Query, frozen=True, kw_only=True):
+    """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
+
+    stance: Stance
+    body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
+        None
+    )
+    load: Load | None = None
+    limits: Limits = Limits()
+    radius: Radius = 30.0
+
+
+class SetPointsRequest(Query, frozen=True, kw_only=True):
+    """Asks a stream for the set-points of a body wrench."""
+
+    stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
+    body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
+    detail: Detail = "full"
+
+
+class Move(Hand, frozen=True, kw_only=True):
+    """One limb to its next hold."""
+
+    body: Annotated[
+        Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
+    ] = None
+
+
+class RouteRequest(Request, frozen=True, kw_only=True):
+    """A climb: a start stance, and moves. Not asked over zenoh; a file of the command line."""
+
+    name: Identifier = "route"
+    stance: Stance
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    limits: Limits = Limits()
+    moves: Annotated[list[Move], Meta(max_length=10_000)]
