@@ -17,7 +17,7 @@ from service.answering.hand_answers import placed_poses, vector
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
-from service.requests import BodySpaceRequest, PlanRequest
+from service.requests import BodySpaceRequest, PlanRequest, about_the_same
 
 __all__ = ["Explored", "explore"]
 
@@ -55,7 +55,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     """
     start = time.perf_counter()
     directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]
-    asked = question(_plan_request(request), robots)
+    asked = question(about_the_same(PlanRequest, request), robots)
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)
@@ -91,18 +91,6 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         warnings=[*space.plan.warnings, *_warnings(space, linear is not None, error)],
     )
     return Explored(space, section, reply)
-
-
-def _plan_request(request: BodySpaceRequest) -> PlanRequest:
-    """Return the plan request with the same stance, load and limits."""
-    return PlanRequest(
-        v=1,
-        stance=request.stance,
-        body_wrench=request.body_wrench,
-        load=request.load,
-        limits=request.limits,
-        present=request.present,
-    )
 
 
 def _unit(given: Sequence[float], field: str) -> Array:

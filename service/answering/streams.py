@@ -19,7 +19,7 @@ from service.answering.hand_answers import placed_poses
 from service.answering.own_robot import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
-from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
+from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest, about_the_same
 from service.wire import Format
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
@@ -50,14 +50,8 @@ def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
             "not for streams, whose tensions change with the wrench; leave it out",
             field="limits.tension_change",
         )
-    asked = PlanRequest(
-        v=1,
-        stance=request.stance,
-        body_wrench=request.body_wrench,
-        load=request.load,
-        limits=request.limits,
-    )
-    return WrenchStream(question(asked, robots), radius=request.radius)
+    asked = question(about_the_same(PlanRequest, request), robots)
+    return WrenchStream(asked, radius=request.radius)
 
 
 class Streams:
