@@ -11,15 +11,13 @@ from .holds import (
     Sphere as Sphere,
     Surface as Surface,
 )
-from .limits import (
+from .questions import (
+    Axis as Axis,
     AxisForce as AxisForce,
+    BodySpaceRequest as BodySpaceRequest,
     ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,
-)
-from .questions import (
-    Axis as Axis,
-    BodySpaceRequest as BodySpaceRequest,
     PlanRequest as PlanRequest,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,
