@@ -1,15 +1,13 @@
-from .budget import Budget as Budget
 from .clock import (
+    Budget as Budget,
     DeadlineError as DeadlineError,
+    Unfinished as Unfinished,
     check as check,
     expired as expired,
+    late as late,
+    late_sentence as late_sentence,
     left as left,
     seconds as seconds,
     within as within,
 )
 from .overlap import Overlap as Overlap, begin_overlap as begin_overlap
-from .unfinished import (
-    Unfinished as Unfinished,
-    late as late,
-    late_sentence as late_sentence,
-)

@@ -1,20 +1,32 @@
-"""How long an answer may still take: a clock that reaches every solver it starts.
+"""How long an answer may still take, and how much it may still compute.
 
-The clock is that of the thread's context, so that nothing on the way has to hand it on. Solvers ask
-it at each of their iterations, searches before each of their steps, hands while they close.
+A clock reaches every solver that is started. It is that of the thread's context, so that nothing on
+the way has to hand it on. Solvers ask it at each of their iterations, searches before each of their
+steps, hands while they close. A budget is a count of programs, the same on every machine.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from hand_models.base import CruxError, broken_off_by
 
-__all__ = ["DeadlineError", "check", "expired", "left", "seconds", "within"]
+__all__ = [
+    "Budget",
+    "DeadlineError",
+    "Unfinished",
+    "check",
+    "expired",
+    "late",
+    "late_sentence",
+    "left",
+    "seconds",
+    "within",
+]
 
 
 class _Clock(NamedTuple):
@@ -25,6 +37,32 @@ class _Clock(NamedTuple):
 
 
 _clock: ContextVar[_Clock | None] = ContextVar("_clock", default=None)
+
+
+Unfinished = Literal[
+    "least_utilisation",
+    "tie_break",
+    "wrists",
+    "least_effort",
+    "load_factor",
+    "path",
+    "certificate",
+    "explanation",
+    "robust",
+]
+
+UNFINISHED: Final[dict[Unfinished, str]] = {
+    "least_utilisation": "it was proven that no plan uses less",
+    "tie_break": "the one of least effort was found of the plans that use as little",
+    "wrists": "the search for the poses of the floating wrists ended",
+    "least_effort": "the plan of least effort was found",
+    "load_factor": "the load factor was found",
+    "path": "it was found whether the way from the present tensions is safe",
+    "certificate": "it was found what keeps the hands from a plan within the limits",
+    "explanation": "it was found which limits alone leave no balance",
+    "robust": "the load factor was found at all places of the hands",
+}
+"""What was not there yet."""
 
 
 class DeadlineError(CruxError):
@@ -114,3 +152,51 @@ def check(missing: str) -> None:
     clock = _clock.get()
     if clock is not None and time.perf_counter() >= clock.end:
         raise DeadlineError(clock.seconds, missing)
+
+
+def late(name: Unfinished) -> tuple[Unfinished, ...]:
+    """Return the name of what is not finished, if that is for the time."""
+    return (name,) if expired() else ()
+
+
+def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
+    """Say what came too late for a deadline [s], and what the answer is therefore."""
+    missing = ", before ".join(UNFINISHED[name] for name in names)
+    sentence = f"the deadline of {seconds:g} s came before {missing}"
+    if "least_effort" in names:
+        sentence += "; the plan is one of less utilisation and more effort"
+    return sentence
+
+
+class Budget:
+    """A count of programs that may still be solved; a deadline, where there is one, ends it, too.
+
+    A search asks before each step whether it has ended, so that the last step may overdraw it.
+
+    Parameters
+    ----------
+    programs : int
+    whole : Budget, optional
+        Of which this one is a part: what is spent here is spent there.
+    """
+
+    def __init__(self, programs: int, whole: Budget | None = None) -> None:
+        self._left = programs
+        self._whole = whole
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing is left, here or of the whole, or the time is over."""
+        if self._left <= 0 or expired():
+            return True
+        return self._whole is not None and self._whole.ended
+
+    def spend(self, programs: int = 1) -> None:
+        """Take some programs off."""
+        self._left -= programs
+        if self._whole is not None:
+            self._whole.spend(programs)
+
+    def part(self, programs: int) -> Budget:
+        """Return a part of this budget."""
+        return Budget(programs, self)

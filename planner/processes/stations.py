@@ -19,7 +19,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from planner.processes.child_processes import begin_child, starting_children
 
-__all__ = ["Lane", "Make", "Station", "resident"]
+__all__ = ["OUT_OF_MEMORY", "Lane", "Make", "Station", "resident"]
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -135,7 +135,7 @@ class Plan:
     solver : Solver
     time : Time
     unfinished : tuple of str
-        What a deadline has left unfinished, by name: see `planner.deadline.unfinished`. Values that
+        What a deadline has left unfinished, by name: see `planner.deadline.Unfinished`. Values that
         are missing for it are None.
     robust : RobustLoadFactor or None
         The load factor over a scatter of the hands' places, if it was asked for; None where the

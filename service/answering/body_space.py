@@ -16,7 +16,7 @@ from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
-from service.requests import BodySpaceRequest, PlanRequest
+from service.requests import BodySpaceRequest, PlanRequest, about_the_same
 
 __all__ = ["Explored", "explore"]
 
@@ -54,7 +54,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     """
     start = time.perf_counter()
     directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]
-    asked = question(told(PlanRequest, request, deadline=None), robots)
+    asked = question(about_the_same(PlanRequest, request), robots)
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)

@@ -17,7 +17,7 @@ from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
-from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
+from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest, about_the_same
 from service.wire import Format
 
 __all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
@@ -48,7 +48,7 @@ def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
             "not for streams, whose tensions change with the wrench; leave it out",
             field="limits.tension_change",
         )
-    asked = question(told(PlanRequest, request, deadline=None), robots)
+    asked = question(about_the_same(PlanRequest, request), robots)
     return WrenchStream(asked, radius=request.radius)
 
 

@@ -29,7 +29,7 @@ from service.commands.terminal import (
     writing,
 )
 from service.replies import RobustCapability
-from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest
+from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest, about_the_same
 from service.tables import console, print_body_space, print_wrench_space
 
 if TYPE_CHECKING:
@@ -73,11 +73,8 @@ def wrench_space(
 
     limb, hand = limb_and_hand
     robots = robots_of(robot)
-    request = WrenchSpaceRequest(
-        v=1,
-        stance=asked(read_request(stance), hand, robot).stance,
-        limb=limb,
-    )
+    plan = asked(read_request(stance), hand, robot)
+    request = WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
     reply = answering.wrench_space(request, robots)
     if robust:
         alone = msgspec.structs.replace(request, want=["robust"])
@@ -162,14 +159,10 @@ def body_space(
     from service.answering import explore, robots_of
 
     plan = asked(read_request(stance), hand, robot)
-    request = BodySpaceRequest(
-        v=1,
+    request = about_the_same(
+        BodySpaceRequest,
+        plan,
         id=plan.id,
-        stance=plan.stance,
-        body_wrench=plan.body_wrench,
-        load=plan.load,
-        limits=plan.limits,
-        present=plan.present,
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
     )

@@ -23,7 +23,8 @@ R = TypeVar("R", bound=Request)
 
 def bundled(kind: type[Request] = PlanRequest) -> tuple[str, ...]:
     """Return the names of the bundled stances, or of the bundled routes."""
-    return tuple(sorted(Path(f.name).stem for f in _folder(kind).iterdir() if _is_json(f)))
+    files = [file.name for file in _folder(kind).iterdir()]
+    return tuple(sorted(name.removesuffix(".json") for name in files if name.endswith(".json")))
 
 
 def read_request(source: str) -> PlanRequest:
@@ -50,10 +51,6 @@ def read_route(source: str) -> RouteRequest:
 def _folder(kind: type[Request]) -> Traversable:
     folder = resources.files("service") / "examples"
     return folder / "routes" if kind is RouteRequest else folder
-
-
-def _is_json(file: Traversable) -> bool:
-    return file.is_file() and file.name.endswith(".json")
 
 
 def _read(source: str, kind: type[R], field: str, noun: str) -> R:

@@ -18,7 +18,7 @@ from service.commands.options import FiniteRange, asked, hand_option, json_optio
 from service.commands.stances import read_request
 from service.commands.terminal import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
 from service.replies import ErrorDetail, ErrorReply, SetPointsReply
-from service.requests import PlanRequest, StreamRequest, Wrench
+from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
 from service.wire import MalformedError
 
 if TYPE_CHECKING:
@@ -106,14 +106,7 @@ def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
         raise UnsupportedError(
             f"{plan.objective} is not for streams; valid is max_margin", field="objective"
         )
-    return StreamRequest(
-        v=1,
-        stance=plan.stance,
-        body_wrench=plan.body_wrench,
-        load=plan.load,
-        limits=plan.limits,
-        radius=radius,
-    )
+    return about_the_same(StreamRequest, plan, radius=radius)
 
 
 def _body_wrench(line: bytes) -> Wrench:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -66,22 +67,18 @@ def answering(
     def answer(job: Job) -> Answer:
         start = time.perf_counter()
         arrived = start - job.waited
-        own = Streams() if job.rehearsal else streams
-        try:
-            with deadline.within(job.seconds, started=arrived):
-                found = handle(
-                    job.name,
-                    job.payload,
-                    job.encoding,
-                    hand,
-                    robots,
-                    started=arrived,
-                    streams=own,
-                    files=files,
-                )
-        finally:
-            if job.rehearsal:
-                own.close()
+        own = closing(Streams()) if job.rehearsal else nullcontext(streams)
+        with own as asked, deadline.within(job.seconds, started=arrived):
+            found = handle(
+                job.name,
+                job.payload,
+                job.encoding,
+                hand,
+                robots,
+                started=arrived,
+                streams=asked,
+                files=files,
+            )
         return found._replace(seconds=time.perf_counter() - start)
 
     return answer

@@ -11,13 +11,22 @@ from .holds import (
     Sphere as Sphere,
     Surface as Surface,
 )
-from .limits import (
+from .questions import (
+    Axis as Axis,
     AxisForce as AxisForce,
+    BodySpaceRequest as BodySpaceRequest,
     ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,
+    PlanRequest as PlanRequest,
+    RouteRequest as RouteRequest,
+    SetPointsRequest as SetPointsRequest,
+    SpaceWant as SpaceWant,
+    StreamRequest as StreamRequest,
+    Want as Want,
+    WrenchSpaceRequest as WrenchSpaceRequest,
+    about_the_same as about_the_same,
 )
-from .plan import PlanRequest as PlanRequest, Want as Want
 from .request import (
     DEFAULT_DEADLINE as DEFAULT_DEADLINE,
     LONGEST_DEADLINE as LONGEST_DEADLINE,
@@ -29,12 +38,4 @@ from .request import (
     Request as Request,
     Wrench as Wrench,
 )
-from .route import RouteRequest as RouteRequest
-from .spaces import (
-    Axis as Axis,
-    BodySpaceRequest as BodySpaceRequest,
-    SpaceWant as SpaceWant,
-    WrenchSpaceRequest as WrenchSpaceRequest,
-)
 from .stance import Grasp as Grasp, Hand as Hand, Place as Place, Stance as Stance
-from .stream import SetPointsRequest as SetPointsRequest, StreamRequest as StreamRequest

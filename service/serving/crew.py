@@ -165,16 +165,17 @@ class Crew:
 
     def states(self) -> list[ProcessHealth]:
         """Return what each process does."""
-        return [self._state(station) for station in self.stations]
-
-    def _state(self, station: Station[Job, Answer]) -> ProcessHealth:
-        busy = any(self.work[lane] is not None for lane in station.lanes)
-        return ProcessHealth(
-            pid=station.process.pid,
-            purpose="streams" if station is self._streams else "questions",
-            state="starting" if not station.ready else "working" if busy else "idle",
-            resident=resident(station.process.pid),
-        )
+        found = []
+        for station in self.stations:
+            busy = any(self.work[lane] is not None for lane in station.lanes)
+            state = ProcessHealth(
+                pid=station.process.pid,
+                purpose="streams" if station is self._streams else "questions",
+                state="starting" if not station.ready else "working" if busy else "idle",
+                resident=resident(station.process.pid),
+            )
+            found.append(state)
+        return found
 
 
 def _ending(status: int | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from contextlib import suppress
 from enum import Enum
 from functools import partial
@@ -9,10 +11,9 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
-from hand_models.base import CruxError, InvalidInputError, LimitError
+from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
 from service.replies import ErrorDetail, ErrorReply
 from service.requests import Identifier, SetPointsRequest, StreamRequest
-from service.wire.checks import check
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import validation_error
@@ -59,6 +60,23 @@ ALIASES: Final = {
     "zenoh/bytes": "application/json",
     "text/json": "application/json",
 }
+
+
+class _Later(NamedTuple):
+    """Values of a field that this version supports, and what to tell who gives another."""
+
+    supported: tuple[object, ...]
+    advice: str
+
+
+LATER: Final = {
+    "objective": _Later(("max_margin", "min_effort"), "valid are max_margin and min_effort"),
+    "confidence": _Later((None,), "leave it out: tile limits are nominal"),
+}
+"""What this version supports of the fields that later versions will."""
+
+BULK: Final = ("vertices", "faces")
+"""Long lists of numbers of a mesh, which its model checks as arrays."""
 
 
 class Format(Enum):
@@ -156,7 +174,7 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
         if form is Format.MSGPACK and "Expected `float`" in str(error):
             # no bound is kept by what is not a number
             with suppress(RecursionError):
-                check(_plain(payload, form))
+                _check(_plain(payload, form))
         field, message = validation_error(
             error,
             kind,
@@ -169,10 +187,41 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             refuse_in_json(payload)
         else:
             refuse_in_msgpack(payload)
-        check(request)
+        _check(request)
     except RecursionError:
         raise MalformedError("nested too deeply") from None
     return request
+
+
+def _check(value: object, path: str = "") -> None:
+    """Check a decoded request, or a part of it, for what its type does not ensure.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is not finite.
+    UnsupportedError
+        If a field has a value that this version does not support.
+    """
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise InvalidInputError(f"must be a finite number, got {value}", field=path)
+    elif isinstance(value, msgspec.Struct):
+        for name in value.__struct_fields__:
+            part, field = getattr(value, name), f"{path}.{name}" if path else name
+            if name in LATER and part not in LATER[name].supported:
+                given = f"{part} is " if isinstance(part, str) else ""
+                raise UnsupportedError(
+                    f"{given}not supported in this version; {LATER[name].advice}", field=field
+                )
+            if name not in BULK:
+                _check(part, field)
+    elif isinstance(value, Mapping):
+        for name, part in value.items():
+            _check(part, f"{path}.{name}" if path else str(name))
+    elif isinstance(value, (list, tuple)):
+        for i, part in enumerate(value):
+            _check(part, f"{path}[{i}]")
 
 
 def most_bytes(kind: type) -> int:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from planner import plan
-from planner.deadline.unfinished import UNFINISHED
+from planner.deadline.clock import UNFINISHED
 from planner.result import LimitName, Plan
 from service import Planners
 from service.answering import dispatch

@@ -1,0 +1,249 @@
+"""The questions: who carries what in a stance, what it can bear, set-points, and a whole climb.
+
+Fields that the contract knows but this version does not are declared, so that they are refused by
+name (`service.wire.codec`) and not as unknown.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeVar
+
+from msgspec import Meta, field
+
+from service.requests.request import (
+    Acceleration,
+    AccelerationEntry,
+    Coordinate,
+    Detail,
+    Force,
+    Identifier,
+    Later,
+    Name,
+    Pose,
+    Position,
+    Query,
+    Request,
+    Strict,
+    Tension,
+    Tensions,
+    Wrench,
+)
+from service.requests.stance import Hand, Stance
+
+__all__ = [
+    "Axis",
+    "AxisForce",
+    "BodySpaceRequest",
+    "ForceCap",
+    "Limits",
+    "Load",
+    "PlanRequest",
+    "RouteRequest",
+    "SetPointsRequest",
+    "SpaceWant",
+    "StreamRequest",
+    "Want",
+    "WrenchSpaceRequest",
+    "about_the_same",
+]
+
+Q = TypeVar("Q", bound=Query)
+
+
+Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
+Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
+Torques = Annotated[
+    list[Torque],
+    Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [N·m]"),
+]
+ForceBound = Annotated[float, Meta(ge=-1e6, le=1e6)]
+ForceRange = Annotated[
+    list[ForceBound],
+    Meta(min_length=2, max_length=2, description="least and largest, with zero in between [N]"),
+]
+AxisForce = Force | ForceRange | None
+# a tuple with lists in it crashes msgspec's garbage collection
+AxisForces = Annotated[list[AxisForce], Meta(min_length=3, max_length=3)]
+Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
+ObjectiveName = Annotated[
+    Literal["max_margin", "min_effort", "max_reliability"],
+    Meta(
+        description="least utilisation, or least effort within limits.utilisation; "
+        "max_reliability is not supported in this version"
+    ),
+]
+Want = Literal["load_factor", "prices", "model", "robust"]
+Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
+Direction = tuple[Coordinate, Coordinate, Coordinate]
+SpaceWant = Literal["robust", "half_spaces", "vertices"]
+Radius = Annotated[
+    float,
+    Meta(
+        gt=0.0,
+        le=1e4,
+        description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
+    ),
+]
+
+
+class Load(Strict, frozen=True, kw_only=True):
+    """What the body weighs and how it is to move; by default the robot's own weight, at rest."""
+
+    mass: Mass | None = None
+    com: Annotated[Position | None, Meta(description="centre of mass in B")] = None
+    acceleration: Acceleration = (0.0, 0.0, 0.0)
+    angular_acceleration: Annotated[
+        tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+        Meta(description="in W [rad/s²]; needs the stance's joints"),
+    ] = (0.0, 0.0, 0.0)
+
+
+class ForceCap(Strict, frozen=True, kw_only=True):
+    """The most that a hand may do to its rock."""
+
+    largest_force: Annotated[
+        Force | AxisForces,
+        Meta(
+            description="whatever its direction; or along each axis of the frame: the largest "
+            "either way, a range, or null for none"
+        ),
+    ]
+    frame: Literal["hand", "body", "world"] = "hand"
+
+
+class Limits(Strict, frozen=True, kw_only=True):
+    """Caps that the caller puts on the plan."""
+
+    utilisation: Utilisation = 1.0
+    tendon_tension: Tension | None = None
+    joint_torque: Annotated[
+        Torque | dict[Name, Torque | Torques] | None,
+        Meta(description="of all joints, or by limb, in place of the robot's own figures [N·m]"),
+    ] = None
+    per_hand: Annotated[dict[Name, ForceCap], Meta(description="by limb")] = {}
+    tension_change: Annotated[
+        Tension | None, Meta(description="largest change from the present tensions [N]")
+    ] = None
+
+
+class PlanRequest(Query, frozen=True, kw_only=True):
+    """Asks who carries what in a stance."""
+
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions],
+        Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
+    ] = {}
+    confidence: Later = None
+    detail: Detail = "full"
+    want: Annotated[
+        list[Want],
+        Meta(description="robust: the least load factor over a scatter of the hands' places, too"),
+    ] = []
+
+
+class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
+    """Asks what one hand of a stance can carry."""
+
+    stance: Stance
+    limb: Name
+    want: Annotated[
+        list[SpaceWant] | None,
+        Meta(
+            description="what is told beside rows and capability, each at most once; an error of "
+            "kind limit where it would cost too much, as many half_planes may. By default "
+            "half_spaces and vertices where they are cheap. robust: the least that it can carry "
+            "over a scatter of its place",
+            extra_json_schema={"uniqueItems": True},
+        ),
+    ] = None
+
+
+class BodySpaceRequest(Query, frozen=True, kw_only=True):
+    """Asks what a stance can hold: body wrenches, a plane of them, and accelerations."""
+
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    limits: Limits = Limits()
+    present: Annotated[
+        dict[Name, Tensions], Meta(description="tensions of the tendons now, by limb [N]")
+    ] = {}
+    axes: Annotated[
+        list[Axis], Meta(min_length=2, max_length=2, description="of the plane; fx and fz")
+    ] = field(default_factory=lambda: ["fx", "fz"])
+    others: Annotated[
+        Literal["needed", "zero", "free"],
+        Meta(
+            description="the plane's other components: as asked for, zero, or whatever they may be"
+        ),
+    ] = "needed"
+    directions: Annotated[
+        list[Direction],
+        Meta(
+            max_length=100,
+            description="along which the largest acceleration is wanted, in W: one program each",
+        ),
+    ] = []
+
+
+class StreamRequest(Query, frozen=True, kw_only=True):
+    """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
+
+    stance: Stance
+    body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
+        None
+    )
+    load: Load | None = None
+    limits: Limits = Limits()
+    radius: Radius = 30.0
+
+
+class SetPointsRequest(Query, frozen=True, kw_only=True):
+    """Asks a stream for the set-points of a body wrench."""
+
+    stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
+    body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
+    detail: Detail = "full"
+
+
+class Move(Hand, frozen=True, kw_only=True):
+    """One limb to its next hold."""
+
+    body: Annotated[
+        Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
+    ] = None
+
+
+class RouteRequest(Request, frozen=True, kw_only=True):
+    """A climb: a start stance, and moves. Not asked over zenoh; a file of the command line."""
+
+    name: Identifier = "route"
+    stance: Stance
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    limits: Limits = Limits()
+    moves: Annotated[list[Move], Meta(max_length=10_000)]
+
+
+def about_the_same(kind: type[Q], request: Query, **more: Any) -> Q:
+    """Return a question of another kind about the same stance, load, limits and present tensions.
+
+    Parameters
+    ----------
+    kind : type of Query
+    request : Query
+    more : object
+        Fields of the question's own.
+    """
+    shared = ("stance", "body_wrench", "load", "limits", "present")
+    common = {*kind.__struct_fields__} & {*request.__struct_fields__} & {*shared}
+    return kind(v=1, **{name: getattr(request, name) for name in common}, **more)
