@@ -18,12 +18,13 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments.force_limits import (
     GOALS,
     MEASURES,
+    PARAMETER_STUDIES,
     HullPoints,
     Measure,
     rest_state,
     sharpened,
 )
-from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend
+from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend, panels
 from hand_models.experiments.study_result import StudyResult, told
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
@@ -179,7 +180,19 @@ class Sweep:
                 )
         table = gripper_table(hand)
         conditions = self.conditions or Conditions.of_fig16()[0]
-        conditions.check(table)
+        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
+        if not least <= conditions.diameter <= most:
+            raise InvalidInputError(
+                f"must be from {least:g} to {most:g} m, got {conditions.diameter:g}",
+                field="--diameter",
+            )
+        strongest = table.scalar("tendon", "maximum_tension")
+        if not 0.0 < conditions.tension <= strongest:
+            raise InvalidInputError(
+                f"must be above 0 and at most the tendon's {strongest:g} N, got "
+                f"{conditions.tension:g}",
+                field="--tension",
+            )
         grasp = conditions.gripper(table)
         axes = list(radius_axes(table))
         for i, (text, option) in enumerate(((self.x, "--x"), (self.y, "--y"))):
@@ -207,10 +220,8 @@ class Sweep:
         """Draw a map for each measure."""
         data = result.data
         measures: list[Measure] = list(data["limits"])
-        figure = Figure(figsize=(6.2 * len(measures), 5.6), layout="constrained")
-        for axes, measure in zip(
-            figure.subplots(1, len(measures), squeeze=False)[0], measures, strict=True
-        ):
+        figure, shown = panels(1, len(measures), (6.2 * len(measures), 5.6), grid="none")
+        for axes, measure in zip(shown, measures, strict=True):
             draw_map(axes, data, measure)
         legend(figure, [data])
         figure.suptitle(conditions_title(data["conditions"]))
