@@ -33,7 +33,6 @@ from .study_result import (
     told as told,
 )
 from .sweep import (
-    Cell as Cell,
     Sweep as Sweep,
     radius_axes as radius_axes,
     sweep_cell as sweep_cell,

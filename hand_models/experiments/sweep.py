@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["Cell", "Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
+__all__ = ["Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
 
 RAYS: Final = 300
 CUTS: Final = 4
@@ -41,31 +41,25 @@ POINTS: Final = 15
 """Values along an axis where nothing else is asked for."""
 
 
-class Cell(NamedTuple):
-    """What a gripper holds.
+def sweep_cell(
+    table: ParameterTable, conditions: Conditions, measures: Sequence[Measure]
+) -> dict[str, Any]:
+    """Return what a gripper of some numbers holds.
 
-    Attributes
-    ----------
-    state : str
-        Of `force_limits.State`, or ``no grasp`` where the fingers do not lie on the rock.
-    limits : dict
-        By measure; empty unless the state is ``holds``.
+    Returns
+    -------
+    dict
+        ``state``: of `force_limits.State`, or ``no grasp`` where the fingers do not lie on the
+        rock. ``limits`` by measure: empty unless the state is ``holds``.
     """
-
-    state: str
-    limits: dict[Measure, float]
-
-
-def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence[Measure]) -> Cell:
-    """Return what a gripper of some numbers holds."""
+    limits: dict[Measure, float] = {}
     try:
         grasp = conditions.gripper(table)
     except InvalidInputError:
-        return Cell(NO_GRASP, {})
+        return {"state": NO_GRASP, "limits": limits}
     state = rest_state(grasp)
     if state != "holds" or not measures:
-        return Cell(state, {})
-    limits: dict[Measure, float] = {}
+        return {"state": state, "limits": limits}
     try:
         points = HullPoints.explored(grasp, RAYS)
         for measure in measures:
@@ -73,11 +67,11 @@ def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence
                 points, end = sharpened(grasp, points, measure, CUTS, STARTS)
                 limits[measure] = end.value
     except EmptySetError:
-        return Cell("contact fails", {})
+        return {"state": "contact fails", "limits": {}}
     if "volume" in measures:
         below = clipped_vertices(points.wrenches)
         limits["volume"] = volume(below) if len(below) else 0.0
-    return Cell(state, limits)
+    return {"state": state, "limits": limits}
 
 
 def sweep_map(
@@ -117,7 +111,7 @@ def sweep_map(
         for up, across in told(progress, list(itertools.product(y.values, x.values)))
     ]
     shape = len(y.values), len(x.values)
-    state = np.array([cell.state for cell in cells]).reshape(shape)
+    state = np.array([cell["state"] for cell in cells]).reshape(shape)
     sides = {
         name: {
             "entry": axis.entry,
@@ -127,7 +121,7 @@ def sweep_map(
         }
         for name, axis in (("x", x), ("y", y))
     }
-    limits = {m: np.array([cell.limits.get(m, np.nan) for cell in cells]) for m in measures}
+    limits = {m: np.array([cell["limits"].get(m, np.nan) for cell in cells]) for m in measures}
     return {
         "conditions": asdict(conditions),
         **sides,
@@ -211,7 +205,7 @@ class Sweep:
         data = {
             **found,
             "tile_shear_limit": grasp.surface.shear_limit,
-            "current": sweep_cell(table, conditions, self.measures)._asdict(),
+            "current": sweep_cell(table, conditions, self.measures),
             "summary": _summary(found),
         }
         return StudyResult("sweep", f"{x.entry} and {y.entry}: what the gripper holds", data, ())

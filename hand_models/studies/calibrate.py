@@ -38,6 +38,8 @@ from hand_models.experiments import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table, hand_table
+from hand_models.studies.fig12 import NEAR_FORCE, NEAR_SHARE
+from hand_models.studies.fig13 import NEAR
 from hand_models.tile import Surface
 
 __all__ = ["Fit", "plot", "run"]
@@ -51,11 +53,6 @@ BEFOREHAND: Final = 1.0 / np.sqrt(12.0)
 
 FIXED: Final = 0.5
 """A number counts as fixed by the data if they leave this share of what was unknown beforehand."""
-
-FORCE_TOLERANCE: Final = 0.3
-RELATIVE_TOLERANCE: Final = 0.1
-MOMENT_TOLERANCE: Final = 0.25
-"""Of Fig. 12's values [N] and relative; of the extents in force; of that in moment."""
 
 RAYS: Final = 3000
 """Of the wrench space's boundary."""
@@ -123,8 +120,8 @@ class Fit:
         self.labels += ["extent of F_x", "extent of F_z", "extent of M_y"]
         far = [data.scalar("fig13", name) for name in ("force_x", "force_z", "moment")]
         self.wanted = np.array([*values, *far])
-        share = [RELATIVE_TOLERANCE] * (len(self.wanted) - 1) + [MOMENT_TOLERANCE]
-        least = [FORCE_TOLERANCE] * len(values) + [0.0] * len(far)
+        share = [*[NEAR_SHARE] * len(values), *NEAR]
+        least = [*[NEAR_FORCE] * len(values), *[0.0] * len(far)]
         self.tolerance = np.maximum(share * np.abs(self.wanted), least)
 
     def start(self) -> Array:
@@ -182,11 +179,14 @@ class Fit:
         """Return the numbers that fit best, some of them held."""
         free = np.flatnonzero(~held)
 
+        def whole(part: Array) -> Array:
+            found = x.copy()
+            found[free] = part
+            return found
+
         def cubes(part: Array) -> Array:
             tick()
-            whole = x.copy()
-            whole[free] = part
-            found = self.residuals(whole)
+            found = self.residuals(whole(part))
             return np.asarray(np.sign(found) * np.abs(found) ** POWER)
 
         best = least_squares(
@@ -196,9 +196,7 @@ class Fit:
             diff_step=np.full(len(free), STEP),
             max_nfev=rounds,
         )
-        whole = x.copy()
-        whole[free] = best.x
-        return whole
+        return whole(best.x)
 
 
 def _own(fit: Fit) -> Array:

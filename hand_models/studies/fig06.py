@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -80,7 +81,7 @@ def _curve(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
         "best_friction": 2.0 * (k1 - k2) / (k1 + k2),
         "load_over_friction": np.array([experiment.load(pair, mu) for mu in FRICTIONS]),
         "gain_over_preload_stiffness": np.array(
-            [experiment.with_preload(kp).gain(pair) for kp in SPRING_RANGE]
+            [replace(experiment, preload_stiffness=kp).gain(pair) for kp in SPRING_RANGE]
         ),
     }
 
@@ -89,7 +90,7 @@ def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[Pair]) -> flo
     """Return the k_p at which the least gain of all pairs is the printed one [N/m], if any is."""
 
     def excess(stiffness: float) -> float:
-        softer = experiment.with_preload(stiffness)
+        softer = replace(experiment, preload_stiffness=stiffness)
         return min(softer.gain(pair) for pair in pairs) - PRINTED_GAIN
 
     softest, stiffest = SPRING_RANGE[0], SPRING_RANGE[-1]

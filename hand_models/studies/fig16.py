@@ -74,7 +74,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     data |= {
         "in_use": {
             name: {
-                at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)._asdict()
+                at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
                 for at, surfaces in (("usual", usual), ("lower", lower))
             }
             for name in SURFACES

@@ -119,7 +119,7 @@ def test_the_volume_is_that_of_the_part_that_pulls(grasp):
 
 def test_what_holds_more_has_larger_limits():
     found = [
-        sweep_cell(gripper_table(), Conditions(0.3, 46.0, name), ["shear", "normal"]).limits
+        sweep_cell(gripper_table(), Conditions(0.3, 46.0, name), ["shear", "normal"])["limits"]
         for name in ("concrete-fine", "concrete-coarse")
     ]
     for measure, weaker in found[0].items():
