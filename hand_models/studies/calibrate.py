@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -243,10 +243,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     jacobian = fit.jacobian(x)
     spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(n) / BEFOREHAND**2)))
     own = _own(fit)
+    at_own = (own - fit.low) / fit.width
     held = []
     for k, labels in enumerate(HELD):
         those = np.isin(fit.names, labels)
-        fixed = np.where(those, (own - fit.low) / fit.width, x)
+        fixed = np.where(those, at_own, x)
         tick = ticking(FITS * (n + 1) + 2 * n + k * REFITS * n)
         found = fit.residuals(fit.fitted(fixed, those, REFITS, tick))
         held.append(
@@ -259,7 +260,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             }
         )
     progress(total, total)
-    hand_residuals = fit.residuals((own - fit.low) / fit.width)
+    hand_residuals = fit.residuals(at_own)
     model = fit.wanted + after * fit.tolerance
     numbers = {
         "name": fit.names,
@@ -273,10 +274,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "left_unknown": spread / BEFOREHAND,
         "fixed_by_data": spread <= FIXED * BEFOREHAND,
     }
-    data = {
+    data: dict[str, Any] = {
         "residuals": [
             {"datum": label, "wanted": wanted, "model": found, "tolerances_off": off}
-            for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
+            for label, wanted, found, off in zip(
+                fit.labels, fit.wanted.tolist(), model.tolist(), after.tolist(), strict=True
+            )
         ],
         "numbers": [{key: values[i] for key, values in numbers.items()} for i in range(n)],
         "singular_values": np.linalg.svd(jacobian, compute_uv=False),
@@ -287,13 +290,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     }
     claims = tuple(
         Claim(
-            f"{label} ({'Fig. 13' if label.startswith('extent') else 'Fig. 12'})",
-            float(wanted),
-            float(found),
-            bool(abs(off) <= 1.0),
+            f"{r['datum']} ({'Fig. 13' if r['datum'].startswith('extent') else 'Fig. 12'})",
+            r["wanted"],
+            r["model"],
+            abs(r["tolerances_off"]) <= 1.0,
             role="calibration",
         )
-        for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
+        for r in data["residuals"]
     )
     return StudyResult("calibrate", "one set of numbers for Figs. 12 and 13", data, claims)
 

@@ -117,23 +117,16 @@ def _claims(experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any])
         min(gains[pair] for pair in pairs) >= PRINTED_GAIN - EXACT,
         role="calibration",
     )
-    yield Claim(
-        "tile loads are those of Eq. 1",
-        "same",
-        f"differ by {off_1:.0e}",
-        off_1 <= EXACT,
-    )
-    yield Claim(
-        "the load at the softer tile's travel is that of Eq. 3",
-        "same",
-        f"differ by {off_3:.0e}",
-        off_3 <= EXACT,
-    )
+    for words, off in (
+        ("tile loads are those of Eq. 1", off_1),
+        ("the load at the softer tile's travel is that of Eq. 3", off_3),
+    ):
+        yield Claim(words, "same", f"differ by {off:.0e}", bool(off <= EXACT))
     yield Claim(
         "mu = 2 (k1 - k2)/(k1 + k2) is best (Eq. 2); here: more adds nothing",
         "largest load there",
         f"first at it within {off_2:.3f}, curves' step {step:.2f}",
-        off_2 <= step,
+        bool(off_2 <= step),
     )
     yield Claim(
         "at force limits of 2:1, mu = 2/3 shares the load 2:1 (Section 4.1)",
@@ -145,7 +138,7 @@ def _claims(experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any])
         "friction shifts load to the stiffer contact (Section 4.1)",
         "more",
         f"its share grows by {100 * shifted:.1f} % of the load or more",
-        shifted > 0.0,
+        bool(shifted > 0.0),
     )
     yield Claim(
         "the order of the springs does not matter (Fig. 6 has each pair once)",
