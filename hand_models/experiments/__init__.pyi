@@ -9,6 +9,7 @@ from .force_limits import (
 )
 from .hard_stop import PalmExperiment as PalmExperiment
 from .pictures import (
+    COLOURS as COLOURS,
     conditions_title as conditions_title,
     draw_map as draw_map,
     label_solid as label_solid,
@@ -32,13 +33,12 @@ from .study_result import (
     told as told,
 )
 from .sweep import (
-    Cell as Cell,
     Sweep as Sweep,
     radius_axes as radius_axes,
     sweep_cell as sweep_cell,
     sweep_map as sweep_map,
 )
-from .sweep_axis import Axis as Axis, Conditions as Conditions
+from .sweep_axis import SANDPAPER as SANDPAPER, Axis as Axis, Conditions as Conditions
 from .wrench_hull import (
     UNITS as UNITS,
     Extents as Extents,

@@ -124,18 +124,15 @@ class Limit:
     ----------
     value : float
         Of the measure.
-    wrench : ndarray, shape (3,)
-        In the paper's signs.
     direction : ndarray, shape (3,)
         A wrench farther in it than every point would raise the limit.
     corners : ndarray of int
-        Of the points, those between which the wrench lies.
+        Of the points, those between which that wrench lies.
     weights : ndarray
         Of the corners; their sum is 1.
     """
 
     value: float
-    wrench: Array
     direction: Array
     corners: Indices
     weights: Array
@@ -173,7 +170,6 @@ def limit(points: Array, measure: Measure) -> Limit:
     corners = np.flatnonzero(result.x > 0.0)
     return Limit(
         value=-float(result.fun),
-        wrench=result.x @ points,
         direction=goal
         + result.eqlin.marginals[:-1] @ planes
         + result.ineqlin.marginals[0] * np.array([0.0, 1.0, 0.0]),

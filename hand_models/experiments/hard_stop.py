@@ -7,7 +7,7 @@ it; a gain by friction does not depend on it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,10 +43,6 @@ class PalmExperiment:
             preload_stiffness=hand.scalar("palm", "spring_stiffness"),
             friction=hand.scalar("palm", "pulley_friction"),
         )
-
-    def with_preload(self, stiffness: float) -> PalmExperiment:
-        """Return the experiment with another k_p [N/m]."""
-        return replace(self, preload_stiffness=stiffness)
 
     def load(self, sequence: Sequence[int], friction: float, own_friction: float = 0.0) -> float:
         """Return the palm's load when the first of its softest contacts is at its stop.

@@ -17,6 +17,7 @@ from hand_models.experiments.force_limits import MEASURES, Measure
 from hand_models.finger import PHALANGES
 
 __all__ = [
+    "COLOURS",
     "NO_GRASP",
     "conditions_title",
     "draw_map",
@@ -25,6 +26,9 @@ __all__ = [
     "legend",
     "panels",
 ]
+
+COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
+"""Of phalanges, in every picture; for failures the paper's are red and blue, too."""
 
 NO_GRASP: Final = "no grasp"
 STATES: Final = {
@@ -55,7 +59,7 @@ def panels(
     rows: int,
     columns: int,
     size: tuple[float, float],
-    grid: Literal["x", "y", "both"] = "both",
+    grid: Literal["x", "y", "both", "none"] = "both",
     **options: Any,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure of some inches, and its axes row by row, with lines across them.
@@ -64,7 +68,7 @@ def panels(
     """
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
-    for each in axes:
+    for each in axes if grid != "none" else ():
         each.grid(axis=grid, alpha=0.3)
     return figure, axes
 

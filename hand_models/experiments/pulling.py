@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hand_models.base import Array, EmptySetError, Indices, Progress
+from hand_models.base import Array, EmptySetError, Progress
 from hand_models.compliance import SIDES, STEP, Gripper, Numbers
 from hand_models.experiments.wrench_hull import UNITS, in_paper_signs
 from hand_models.finger import PHALANGES
@@ -119,8 +118,8 @@ def unloaded(gripper: Gripper) -> Array:
     EmptySetError
         If it does not hold itself.
     """
-    poses, residual = wrist_poses(gripper, np.zeros((1, 3)), np.zeros((1, 3)))
-    if not (residual[0] <= BALANCED and gripper.evaluate(poses).holds[0]):
+    poses = pulled_off_poses(gripper, np.zeros(1))
+    if not (len(poses) and gripper.evaluate(poses).holds[0]):
         raise EmptySetError("the gripper lets go before any load: closing alone is too much")
     return np.asarray(poses[0])
 
@@ -159,52 +158,37 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
     poses = np.repeat(unloaded(gripper)[None], m, axis=0)
     loads, increments = np.zeros(m), np.full(m, INCREMENT)
-    failing, ways = np.zeros(m, dtype=int), np.full(m, UNBALANCED, dtype=object)
+    # the right side's first, as limit rows are
+    tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+    names = [row.limit for row in gripper.limits]
+    fails: list[tuple[str | None, str | None, str]] = [(None, None, UNBALANCED)] * m
     going = np.ones(m, dtype=bool)
     while going.any():
         i = np.flatnonzero(going)
         tried, residual = wrist_poses(
             gripper, (loads[i] + increments[i])[:, None] * unit[i], poses[i]
         )
-        found = gripper.evaluate(tried)
-        balanced = residual <= BALANCED
+        found, balanced = gripper.evaluate(tried), residual <= BALANCED
         holds = found.holds & balanced
         poses[i[holds]] = tried[holds]
         loads[i[holds]] += increments[i[holds]]
+        shears = np.concatenate([side.shears for side in gripper.finger_loads(tried)], axis=1)
+        for k in np.flatnonzero(~holds):
+            row = found.limiting[k]
+            if not balanced[k]:
+                fails[i[k]] = (None, None, UNBALANCED)
+            elif found.utilisation[k] > 1.0:
+                fails[i[k]] = (*tiles[row // (len(names) // len(tiles))], names[row])
+            else:
+                fails[i[k]] = (*tiles[shears[k].argmin()], DRAGGED)
         over = i[~holds]
-        failing[over], ways[over] = _failures(gripper, tried[~holds], balanced[~holds])
         increments[over] *= 0.5
         going[over] = increments[over] >= FINEST
         going &= loads < LARGEST
         if progress is not None:
             progress(m - int(going.sum()), m)
-    tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
-    fails = [
-        (None, None) if way == UNBALANCED else tiles[tile]
-        for tile, way in zip(failing, ways, strict=True)
-    ]
-    return Pulled(
-        wrenches=loads[:, None] * unit,
-        poses=poses,
-        side=tuple(side for side, _ in fails),
-        phalanx=tuple(phalanx for _, phalanx in fails),
-        way=tuple(ways),
-    )
-
-
-def _failures(
-    gripper: Gripper, poses: Array, balanced: NDArray[np.bool_]
-) -> tuple[Indices, NDArray[np.object_]]:
-    """Return which tile fails at some poses, right side first, and how."""
-    limits = gripper.limits
-    per_tile = len(limits) // (len(SIDES) * len(PHALANGES))
-    names = np.array([row.limit for row in limits], dtype=object)
-    shears = np.concatenate([side.shears for side in gripper.finger_loads(poses)], axis=1)
-    verdict = gripper.evaluate(poses)
-    exceeded, rows = verdict.utilisation > 1.0, verdict.limiting
-    tiles = np.where(exceeded, rows // per_tile, shears.argmin(axis=1))
-    ways = np.where(exceeded, names[rows], DRAGGED)
-    return tiles, np.where(balanced, ways, UNBALANCED)
+    sides, phalanges, ways = zip(*fails, strict=True)
+    return Pulled(loads[:, None] * unit, poses, sides, phalanges, ways)
 
 
 def even_pulls(count: int, size: Array) -> Array:

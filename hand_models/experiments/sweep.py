@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,18 +18,19 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments.force_limits import (
     GOALS,
     MEASURES,
+    PARAMETER_STUDIES,
     HullPoints,
     Measure,
     rest_state,
     sharpened,
 )
-from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend
+from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend, panels
 from hand_models.experiments.study_result import StudyResult, told
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["Cell", "Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
+__all__ = ["Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
 
 RAYS: Final = 300
 CUTS: Final = 4
@@ -40,31 +41,25 @@ POINTS: Final = 15
 """Values along an axis where nothing else is asked for."""
 
 
-class Cell(NamedTuple):
-    """What a gripper holds.
+def sweep_cell(
+    table: ParameterTable, conditions: Conditions, measures: Sequence[Measure]
+) -> dict[str, Any]:
+    """Return what a gripper of some numbers holds.
 
-    Attributes
-    ----------
-    state : str
-        Of `force_limits.State`, or ``no grasp`` where the fingers do not lie on the rock.
-    limits : dict
-        By measure; empty unless the state is ``holds``.
+    Returns
+    -------
+    dict
+        ``state``: of `force_limits.State`, or ``no grasp`` where the fingers do not lie on the
+        rock. ``limits`` by measure: empty unless the state is ``holds``.
     """
-
-    state: str
-    limits: dict[Measure, float]
-
-
-def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence[Measure]) -> Cell:
-    """Return what a gripper of some numbers holds."""
+    limits: dict[Measure, float] = {}
     try:
         grasp = conditions.gripper(table)
     except InvalidInputError:
-        return Cell(NO_GRASP, {})
+        return {"state": NO_GRASP, "limits": limits}
     state = rest_state(grasp)
     if state != "holds" or not measures:
-        return Cell(state, {})
-    limits: dict[Measure, float] = {}
+        return {"state": state, "limits": limits}
     try:
         points = HullPoints.explored(grasp, RAYS)
         for measure in measures:
@@ -72,11 +67,11 @@ def sweep_cell(table: ParameterTable, conditions: Conditions, measures: Sequence
                 points, end = sharpened(grasp, points, measure, CUTS, STARTS)
                 limits[measure] = end.value
     except EmptySetError:
-        return Cell("contact fails", {})
+        return {"state": "contact fails", "limits": {}}
     if "volume" in measures:
         below = clipped_vertices(points.wrenches)
         limits["volume"] = volume(below) if len(below) else 0.0
-    return Cell(state, limits)
+    return {"state": state, "limits": limits}
 
 
 def sweep_map(
@@ -116,7 +111,7 @@ def sweep_map(
         for up, across in told(progress, list(itertools.product(y.values, x.values)))
     ]
     shape = len(y.values), len(x.values)
-    state = np.array([cell.state for cell in cells]).reshape(shape)
+    state = np.array([cell["state"] for cell in cells]).reshape(shape)
     sides = {
         name: {
             "entry": axis.entry,
@@ -126,7 +121,7 @@ def sweep_map(
         }
         for name, axis in (("x", x), ("y", y))
     }
-    limits = {m: np.array([cell.limits.get(m, np.nan) for cell in cells]) for m in measures}
+    limits = {m: np.array([cell["limits"].get(m, np.nan) for cell in cells]) for m in measures}
     return {
         "conditions": asdict(conditions),
         **sides,
@@ -179,7 +174,19 @@ class Sweep:
                 )
         table = gripper_table(hand)
         conditions = self.conditions or Conditions.of_fig16()[0]
-        conditions.check(table)
+        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
+        if not least <= conditions.diameter <= most:
+            raise InvalidInputError(
+                f"must be from {least:g} to {most:g} m, got {conditions.diameter:g}",
+                field="--diameter",
+            )
+        strongest = table.scalar("tendon", "maximum_tension")
+        if not 0.0 < conditions.tension <= strongest:
+            raise InvalidInputError(
+                f"must be above 0 and at most the tendon's {strongest:g} N, got "
+                f"{conditions.tension:g}",
+                field="--tension",
+            )
         grasp = conditions.gripper(table)
         axes = list(radius_axes(table))
         for i, (text, option) in enumerate(((self.x, "--x"), (self.y, "--y"))):
@@ -198,7 +205,7 @@ class Sweep:
         data = {
             **found,
             "tile_shear_limit": grasp.surface.shear_limit,
-            "current": sweep_cell(table, conditions, self.measures)._asdict(),
+            "current": sweep_cell(table, conditions, self.measures),
             "summary": _summary(found),
         }
         return StudyResult("sweep", f"{x.entry} and {y.entry}: what the gripper holds", data, ())
@@ -207,10 +214,8 @@ class Sweep:
         """Draw a map for each measure."""
         data = result.data
         measures: list[Measure] = list(data["limits"])
-        figure = Figure(figsize=(6.2 * len(measures), 5.6), layout="constrained")
-        for axes, measure in zip(
-            figure.subplots(1, len(measures), squeeze=False)[0], measures, strict=True
-        ):
+        figure, shown = panels(1, len(measures), (6.2 * len(measures), 5.6), grid="none")
+        for axes, measure in zip(shown, measures, strict=True):
             draw_map(axes, data, measure)
         legend(figure, [data])
         figure.suptitle(conditions_title(data["conditions"]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,13 +22,13 @@ from hand_models.parameters import (
 )
 from hand_models.tile import Surface
 
-__all__ = ["CONCRETE", "Axis", "Conditions"]
+__all__ = ["CONCRETE", "SANDPAPER", "Axis", "Conditions"]
 
 CONCRETE: Final = "concrete-fine"
 """The surface of Figs. 15 and 16."""
 
 SANDPAPER: Final = "sandpaper-36"
-"""The preset in whose place stands what the gripper's experiments tell of the same sandpaper."""
+"""That of the paper's experiments: what they tell of it stands in the place of the preset."""
 
 MOST_POINTS: Final = 201
 """Of an axis."""
@@ -51,26 +51,6 @@ class Conditions:
         settings = experiment_table()
         tension = settings.scalar("fig16", "tension")
         return tuple(cls(d, tension) for d in settings.vector(PARAMETER_STUDIES, "diameters"))
-
-    def check(self, table: ParameterTable) -> None:
-        """Refuse a rock that no hand is made for, and a tension that the tendon does not bear.
-
-        Raises
-        ------
-        InvalidInputError
-            The field is the option that has the number.
-        """
-        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
-        if not least <= self.diameter <= most:
-            raise InvalidInputError(
-                f"must be from {least:g} to {most:g} m, got {self.diameter:g}", field="--diameter"
-            )
-        strongest = table.scalar("tendon", "maximum_tension")
-        if not 0.0 < self.tension <= strongest:
-            raise InvalidInputError(
-                f"must be above 0 and at most the tendon's {strongest:g} N, got {self.tension:g}",
-                field="--tension",
-            )
 
     def gripper(self, table: ParameterTable) -> Gripper:
         """Return a gripper of these numbers.
@@ -148,27 +128,23 @@ class Axis:
             hint = f"; did you mean {' or '.join(like)}?" if like else ""
             listed = ", ".join(sorted(known))
             raise InvalidInputError(f"the gripper reads no {entry!r}{hint}; known are {listed}")
-        section, name, index = known[entry]
-        old = table.quantity(section, name)
+        axis = known[entry]
+        bundled = table.quantity(axis.section, axis.name).value
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=entry)
-        if low < 0.0 <= np.min(old.value):
+        if low < 0.0 <= np.min(bundled):
             raise InvalidInputError(f"LOW must not be negative, got {low:g}", field=entry)
-        if high > (most := LARGEST.get(old.unit, math.inf)):
+        if high > (most := LARGEST.get(axis.unit, math.inf)):
             raise InvalidInputError(
-                f"HIGH must not exceed {most:.4g} {old.unit}, got {high:g}", field=entry
+                f"HIGH must not exceed {most:.4g} {axis.unit}, got {high:g}", field=entry
             )
         if not 2 <= count <= MOST_POINTS:
             raise InvalidInputError(f"N must be from 2 to {MOST_POINTS}, got {count}", field=entry)
-        axis = cls(section, name, index, tuple(np.linspace(low, high, count).tolist()), old.unit)
-        if section in hand_table().sections:
+        if axis.section in hand_table().sections:
             for value in (low, high):
-                own_hand(
-                    ParameterTable(
-                        {section: {name: axis.set(table, value).quantity(section, name)}}
-                    )
-                )
-        return axis
+                changed = axis.set(table, value).quantity(axis.section, axis.name)
+                own_hand(ParameterTable({axis.section: {axis.name: changed}}))
+        return replace(axis, values=tuple(np.linspace(low, high, count).tolist()))
 
     def set(self, table: ParameterTable, value: float) -> ParameterTable:
         """Return a table in which the entry has a value."""
@@ -198,19 +174,16 @@ class _Read(ParameterTable):
         return super().quantity(section, name)
 
 
-def _entries(table: ParameterTable, surface: str) -> dict[str, tuple[str, str, int | None]]:
-    """Return section, name and index of the numbers that a gripper reads, by a caller's names."""
+def _entries(table: ParameterTable, surface: str) -> dict[str, Axis]:
+    """Return the numbers that a gripper reads, by a caller's names, still without values."""
     reading = _Read(table)
     settings = experiment_table()
     diameter = settings.vector(PARAMETER_STUDIES, "diameters")[0]
     Conditions(diameter, settings.scalar("fig16", "tension"), surface).gripper(reading)
-    found: dict[str, tuple[str, str, int | None]] = {}
-    for section, name, quantity in table:
-        if (section, name) not in reading.entries - IDLE:
-            continue
-        if isinstance(quantity.value, list):
-            for i in range(len(quantity.value)):
-                found[f"{section}.{name}[{i}]"] = section, name, i
-        else:
-            found[f"{section}.{name}"] = section, name, None
-    return found
+    axes = [
+        Axis(section, name, index, (), quantity.unit)
+        for section, name, quantity in table
+        if (section, name) in reading.entries - IDLE
+        for index in (range(len(quantity.value)) if isinstance(quantity.value, list) else (None,))
+    ]
+    return {axis.entry: axis for axis in axes}

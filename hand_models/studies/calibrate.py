@@ -13,9 +13,10 @@ the data exclude.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Iterable
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -25,6 +26,7 @@ from scipy.optimize import least_squares
 from hand_models.base import Array, CruxError, Progress, SolverError
 from hand_models.compliance import Gripper, boundary, gripper_table, linear_box
 from hand_models.experiments import (
+    SANDPAPER,
     Axis,
     Claim,
     StudyResult,
@@ -36,6 +38,8 @@ from hand_models.experiments import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table, hand_table
+from hand_models.studies.fig12 import NEAR_FORCE, NEAR_SHARE
+from hand_models.studies.fig13 import NEAR
 from hand_models.tile import Surface
 
 __all__ = ["Fit", "plot", "run"]
@@ -50,11 +54,6 @@ BEFOREHAND: Final = 1.0 / np.sqrt(12.0)
 FIXED: Final = 0.5
 """A number counts as fixed by the data if they leave this share of what was unknown beforehand."""
 
-FORCE_TOLERANCE: Final = 0.3
-RELATIVE_TOLERANCE: Final = 0.1
-MOMENT_TOLERANCE: Final = 0.25
-"""Of Fig. 12's values [N] and relative; of the extents in force; of that in moment."""
-
 RAYS: Final = 3000
 """Of the wrench space's boundary."""
 
@@ -66,8 +65,6 @@ STEP: Final = 2e-3
 
 HOPELESS: Final = 30.0
 """Residual where a set of numbers gives no gripper that holds."""
-
-SANDPAPER: Final = "sandpaper-36"
 
 HELD: Final = (
     ("tile_height",),
@@ -84,29 +81,21 @@ HELD: Final = (
 
 def _numbers() -> tuple[Axis, ...]:
     """Return the gripper's numbers to be found, each from the least to the most plausible."""
-    alone = (
-        *(("gripper", name) for name in ("base_half_spacing", "added_radius", "origin_height")),
-        *(("finger", name) for name in ("tile_height", "seated_contact")),
-    )
-    entries: list[tuple[str, str, int | None, str]] = [
-        *((section, name, None, name) for section, name in alone),
-        ("finger", "pulley_radii", 1, "middle_radius"),
-        ("finger", "pulley_radii", 2, "distal_radius"),
-        *(("tile", "engagement", i, "engagement") for i in range(len(PHALANGES))),
-        *(("gripper", "contact_stiffness", i, "contact_stiffness") for i in range(len(PHALANGES))),
-        *(("gripper", name, None, name) for name in ("shear_limit", "pull_off_slope")),
-    ]
-    table = experiment_table()
-    return tuple(
-        Axis(
-            section,
-            name,
-            index,
-            table.vector("calibration", plausible),
-            table.quantity("calibration", plausible).unit,
-        )
-        for section, name, index, plausible in entries
-    )
+    one, each = (None,), range(len(PHALANGES))
+    places: dict[str, tuple[str, str, Iterable[int | None]]] = {
+        "tile_height": ("finger", "tile_height", one),
+        "seated_contact": ("finger", "seated_contact", one),
+        "middle_radius": ("finger", "pulley_radii", (1,)),
+        "distal_radius": ("finger", "pulley_radii", (2,)),
+        "engagement": ("tile", "engagement", each),
+        "contact_stiffness": ("gripper", "contact_stiffness", each),
+    }
+    table, found = experiment_table(), []
+    for plausible, quantity in table.sections["calibration"].items():
+        section, name, indices = places.get(plausible, ("gripper", plausible, one))
+        ends = table.vector("calibration", plausible)
+        found += [Axis(section, name, index, ends, quantity.unit) for index in indices]
+    return tuple(found)
 
 
 class Fit:
@@ -131,9 +120,9 @@ class Fit:
         self.labels += ["extent of F_x", "extent of F_z", "extent of M_y"]
         far = [data.scalar("fig13", name) for name in ("force_x", "force_z", "moment")]
         self.wanted = np.array([*values, *far])
-        self.tolerance = RELATIVE_TOLERANCE * np.abs(self.wanted)
-        self.tolerance[: len(values)].clip(FORCE_TOLERANCE, out=self.tolerance[: len(values)])
-        self.tolerance[-1] = MOMENT_TOLERANCE * abs(far[-1])
+        share = [*[NEAR_SHARE] * len(values), *NEAR]
+        least = [*[NEAR_FORCE] * len(values), *[0.0] * len(far)]
+        self.tolerance = np.maximum(share * np.abs(self.wanted), least)
 
     def start(self) -> Array:
         """Return where the table is."""
@@ -190,11 +179,14 @@ class Fit:
         """Return the numbers that fit best, some of them held."""
         free = np.flatnonzero(~held)
 
+        def whole(part: Array) -> Array:
+            found = x.copy()
+            found[free] = part
+            return found
+
         def cubes(part: Array) -> Array:
             tick()
-            whole = x.copy()
-            whole[free] = part
-            found = self.residuals(whole)
+            found = self.residuals(whole(part))
             return np.asarray(np.sign(found) * np.abs(found) ** POWER)
 
         best = least_squares(
@@ -204,9 +196,7 @@ class Fit:
             diff_step=np.full(len(free), STEP),
             max_nfev=rounds,
         )
-        whole = x.copy()
-        whole[free] = best.x
-        return whole
+        return whole(best.x)
 
 
 def _own(fit: Fit) -> Array:
@@ -239,28 +229,26 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     fit = Fit(gripper_table(hand))
     n = len(fit.numbers)
     total = FITS * (n + 1) + 2 * n + len(HELD) * REFITS * n
-    done = 0
 
-    def tick() -> None:
-        nonlocal done
-        done += 1
-        progress(min(done, total - 1), total)
+    def ticking(before: int) -> Callable[[], None]:
+        counts = itertools.count(before + 1)
+        return lambda: progress(min(next(counts), total - 1), total)
 
     start = fit.start()
     before = fit.residuals(start)
-    x = fit.fitted(start, np.zeros(n, dtype=bool), FITS, tick)
+    x = fit.fitted(start, np.zeros(n, dtype=bool), FITS, ticking(0))
     after = fit.residuals(x)
     if np.abs(after).max() > np.abs(before).max():
         x, after = start, before
-    done = FITS * (n + 1)
     jacobian = fit.jacobian(x)
     spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(n) / BEFOREHAND**2)))
     own = _own(fit)
+    at_own = (own - fit.low) / fit.width
     held = []
     for k, labels in enumerate(HELD):
-        done = FITS * (n + 1) + 2 * n + k * REFITS * n
         those = np.isin(fit.names, labels)
-        fixed = np.where(those, (own - fit.low) / fit.width, x)
+        fixed = np.where(those, at_own, x)
+        tick = ticking(FITS * (n + 1) + 2 * n + k * REFITS * n)
         found = fit.residuals(fit.fitted(fixed, those, REFITS, tick))
         held.append(
             {
@@ -272,9 +260,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             }
         )
     progress(total, total)
-    hand_residuals = fit.residuals((own - fit.low) / fit.width)
+    hand_residuals = fit.residuals(at_own)
     model = fit.wanted + after * fit.tolerance
     numbers = {
+        "name": fit.names,
+        "unit": [number.unit for number in fit.numbers],
         "recorded": fit.values(start),
         "fitted": fit.values(x),
         "hand": own,
@@ -284,19 +274,14 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "left_unknown": spread / BEFOREHAND,
         "fixed_by_data": spread <= FIXED * BEFOREHAND,
     }
-    data = {
+    data: dict[str, Any] = {
         "residuals": [
             {"datum": label, "wanted": wanted, "model": found, "tolerances_off": off}
-            for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
+            for label, wanted, found, off in zip(
+                fit.labels, fit.wanted.tolist(), model.tolist(), after.tolist(), strict=True
+            )
         ],
-        "numbers": [
-            {
-                "name": name,
-                "unit": number.unit,
-                **{key: values[i] for key, values in numbers.items()},
-            }
-            for i, (name, number) in enumerate(zip(fit.names, fit.numbers, strict=True))
-        ],
+        "numbers": [{key: values[i] for key, values in numbers.items()} for i in range(n)],
         "singular_values": np.linalg.svd(jacobian, compute_uv=False),
         "held": held,
         "worst_before": np.abs(before).max(),
@@ -305,13 +290,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     }
     claims = tuple(
         Claim(
-            f"{label} ({'Fig. 13' if label.startswith('extent') else 'Fig. 12'})",
-            float(wanted),
-            float(found),
-            bool(abs(off) <= 1.0),
+            f"{r['datum']} ({'Fig. 13' if r['datum'].startswith('extent') else 'Fig. 12'})",
+            r["wanted"],
+            r["model"],
+            abs(r["tolerances_off"]) <= 1.0,
             role="calibration",
         )
-        for label, wanted, found, off in zip(fit.labels, fit.wanted, model, after, strict=True)
+        for r in data["residuals"]
     )
     return StudyResult("calibrate", "one set of numbers for Figs. 12 and 13", data, claims)
 

@@ -9,7 +9,9 @@ out of the finger plane.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -18,9 +20,8 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from hand_models.base import Array, Progress
-from hand_models.experiments import Claim, StudyResult
+from hand_models.experiments import SANDPAPER, Claim, StudyResult, panels
 from hand_models.parameters import ParameterTable
-from hand_models.studies.fig10_picture import draw_curve, draw_surface, draw_table
 from hand_models.tile import (
     LEAST_SPINES,
     SpineArray,
@@ -36,9 +37,6 @@ from hand_models.tile import (
 )
 
 __all__ = ["plot", "run"]
-
-PRESET: Final = "sandpaper-36"
-"""The surface of the experiment."""
 
 ANGLES: Final = np.radians(np.linspace(-30.0, 67.5, 14))
 """Loading angles φ of the trials."""
@@ -70,7 +68,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 
     They are of one tile's spines and of the rock, so no number of the hand's matters.
     """
-    surface, array = Surface.named(PRESET), SpineArray.named(PRESET)
+    surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
     steps = 4
     progress(0, steps)
     limit = surface.pull_off_angle
@@ -79,14 +77,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     drag = statistics(array.simulate_drag(np.random.default_rng(SEED + 1), TRIALS))
     spread = statistics(array.simulate(np.random.default_rng(SEED + 1), TRIALS, CURVE))
     mean = drag.mean * array.share(CURVE)
-    in_finger_plane = np.column_stack([np.cos(CURVE), -np.sin(CURVE), np.zeros(len(CURVE))])
     progress(1, steps)
     table = _table()
     progress(2, steps)
     gaps = _gaps(surface)
     progress(3, steps)
     data: dict[str, Any] = {
-        "surface": PRESET,
+        "surface": SANDPAPER,
         "trials": {"angle": ANGLES, "strength": trials},
         "array": {
             "angle": CURVE,
@@ -96,7 +93,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         },
         "planner": {
             "law": surface.strength(CURVE),
-            "half_plane": directional_strength(inner_half_planes(surface), in_finger_plane),
+            "half_plane": directional_strength(inner_half_planes(surface), _directions(CURVE, 0.0)),
             "shear_limit": surface.shear_limit,
             "pull_off_limit": surface.pull_off_limit,
             "pull_off_angle": limit,
@@ -114,15 +111,14 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         ],
     }
     progress(4, steps)
-    claims = (*_claims_of_the_curve(surface, array, data), *_claims_of_the_table(table))
-    hull = Claim(
-        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
-        "> 1",
-        data["hull_over_surface"],
-        data["hull_over_surface"] > 1.01,
-    )
     title = "limit curve of a spine tile on 36-grit sandpaper"
-    return StudyResult("fig10", title, data, (*claims, hull))
+    return StudyResult("fig10", title, data, tuple(_claims(surface, array, data)))
+
+
+def _directions(angle: Array | float, azimuth: Array | float) -> Array:
+    """Return unit loads (shear, normal, lateral) at loading angles and azimuths, shape (..., 3)."""
+    along, aside = np.cos(angle) * np.cos(azimuth), np.cos(angle) * np.sin(azimuth)
+    return np.stack(np.broadcast_arrays(along, -np.sin(angle), aside), axis=-1)
 
 
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
@@ -132,10 +128,10 @@ def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> d
         [np.cos(angles[within]), np.sin(angles[within])]
     )
     centre = points.mean(axis=0)
-    normal = np.linalg.svd(points - centre)[2][1]
-    normal = normal * np.sign(normal[0])
-    distance = (points - centre) @ normal
     spread = points - centre
+    normal = np.linalg.svd(spread)[2][1]
+    normal = normal * np.sign(normal[0])
+    distance = spread @ normal
     return {
         "slope": float(normal[1] / normal[0]),
         "shear_limit": float(normal @ centre / normal[0]),
@@ -152,11 +148,14 @@ def _table() -> list[dict[str, Any]]:
         for cell in measured_tile_shear(concrete):
             tile = replace(array, spines=cell.spines, backlash=cell.backlash)
             found = statistics(tile.simulate_drag(np.random.default_rng(SEED), TRIALS))
-            simulated = {
-                "simulated_mean": found.mean,
-                "simulated_deviation": found.deviation,
-            }
-            cells.append({"concrete": concrete, **cell._asdict(), **simulated})
+            cells.append(
+                {
+                    "concrete": concrete,
+                    **cell._asdict(),
+                    "simulated_mean": found.mean,
+                    "simulated_deviation": found.deviation,
+                }
+            )
     return cells
 
 
@@ -188,118 +187,208 @@ def hull_over_surface(surface: Surface) -> float:
         np.linspace(0.0, math.pi / 2, 181), np.linspace(-math.pi / 2, math.pi / 2, 181)
     )
     radius = surface.strength(angle, azimuth)
-    points = radius[..., None] * np.stack(
-        [np.cos(angle) * np.cos(azimuth), np.cos(angle) * np.sin(azimuth), np.sin(angle)], axis=-1
-    )
+    points = radius[..., None] * _directions(angle, azimuth)
     rows = np.trapezoid(radius**3 * np.cos(angle) / 3.0, angle, axis=1)
     own = float(np.trapezoid(rows, azimuth[:, 0]))
     return float(ConvexHull(points.reshape(-1, 3)).volume) / own
 
 
-def _claims_of_the_curve(
-    surface: Surface, array: SpineArray, data: dict[str, Any]
-) -> tuple[Claim, ...]:
+def _claims(surface: Surface, array: SpineArray, data: dict[str, Any]) -> Iterator[Claim]:
     limit = surface.pull_off_angle
     # what the mean of the measurements in one direction is known to
     error = np.mean(data["array"]["deviation"][within_law(CURVE, limit)]) / math.sqrt(REPEATS)
-    by_angle, line = data["fit_of_mean"], data["cartesian_line_of_mean"]
     fitted = data["fit_of_trials"]["shear_limit"]
     pressed = CURVE[CURVE < 0.0]
     force = array.share(pressed)
     gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
     ratio = surface.pull_off_limit / surface.shear_limit
-    coarse = Surface.named("concrete-coarse").shear_limit / surface.shear_limit
-    rock = Surface.named("rock").shear_limit / surface.shear_limit
     at_limit, beyond = float(array.share(limit)), float(array.share(BEYOND))
     kept = float(surface.strength(BEYOND) / surface.shear_limit)
-    return (
-        Claim(
-            "attachment is approximately linear with the loading angle (Appendix 9.4)",
-            f"off by less than five measurements can tell, {error:.1f} N",
-            f"off by up to {by_angle['worst']:.1f} N, R² {by_angle['r_squared']:.2f}",
-            by_angle["worst"] <= error,
-        ),
-        Claim(
+    for key, words in (
+        ("fit_of_mean", "attachment is approximately linear with the loading angle (Appendix 9.4)"),
+        (
+            "cartesian_line_of_mean",
             "the limit curve is nearly a straight line in Cartesian coordinates (Section 6.1)",
+        ),
+    ):
+        line = data[key]
+        yield Claim(
+            words,
             f"off by less than five measurements can tell, {error:.1f} N",
             f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}",
-            line["worst"] <= error,
-        ),
-        Claim(
-            "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
-            surface.shear_limit,
-            fitted,
-            abs(fitted - surface.shear_limit) <= error,
-            role="calibration",
-        ),
-        Claim(
-            "f_smin / f_smax at 45° is that of the fit to Fig. 13",
-            ratio,
-            at_limit,
-            abs(at_limit - ratio) <= 0.01 * ratio,
-            role="calibration",
-        ),
-        Claim(
-            "beyond 45° (not published) the planner's constant f_smin: f_s / f_smax at 60°",
-            kept,
-            beyond,
-            beyond >= kept,
-        ),
-        Claim(
-            "under positive normal forces conventional Coulomb friction applies (Section 6.1)",
-            array.tile_friction,
-            gained,
-            abs(gained - array.tile_friction) <= 1e-6,
-        ),
-        Claim(
-            "the force on rock is 2 to 5 times greater (Section 6): coarse concrete, as measured",
-            "2 to 5",
-            coarse,
-            2.0 <= coarse <= 5.0,
-        ),
-        Claim(
-            "the force on rock is 2 to 5 times greater (Section 6): the planner's rock",
-            "2 to 5",
-            rock,
-            2.0 <= rock <= 5.0,
-            role="calibration",
-        ),
+            bool(line["worst"] <= error),
+        )
+    yield Claim(
+        "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
+        surface.shear_limit,
+        fitted,
+        bool(abs(fitted - surface.shear_limit) <= error),
+        role="calibration",
     )
-
-
-def _claims_of_the_table(table: list[dict[str, Any]]) -> list[Claim]:
-    claims = []
-    enough = [cell for cell in table if cell["spines"] >= LEAST_SPINES]
-    few = [cell for cell in table if cell["spines"] < LEAST_SPINES]
+    yield Claim(
+        "f_smin / f_smax at 45° is that of the fit to Fig. 13",
+        ratio,
+        at_limit,
+        abs(at_limit - ratio) <= 0.01 * ratio,
+        role="calibration",
+    )
+    yield Claim(
+        "beyond 45° (not published) the planner's constant f_smin: f_s / f_smax at 60°",
+        kept,
+        beyond,
+        beyond >= kept,
+    )
+    yield Claim(
+        "under positive normal forces conventional Coulomb friction applies (Section 6.1)",
+        array.tile_friction,
+        gained,
+        abs(gained - array.tile_friction) <= 1e-6,
+    )
+    for preset, words in (
+        ("concrete-coarse", "coarse concrete, as measured"),
+        ("rock", "the planner's rock"),
+    ):
+        times = Surface.named(preset).shear_limit / surface.shear_limit
+        yield Claim(
+            f"the force on rock is 2 to 5 times greater (Section 6): {words}",
+            "2 to 5",
+            times,
+            2.0 <= times <= 5.0,
+            role="calibration" if preset == "rock" else "test",
+        )
+    enough = [cell for cell in data["tile_shear"] if cell["spines"] >= LEAST_SPINES]
+    few = [cell for cell in data["tile_shear"] if cell["spines"] < LEAST_SPINES]
     for cells, spines in ((enough, "20, 40, 60"), (few, "5, 10")):
         off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
-        claims.append(
-            Claim(
-                f"strength of tiles of {spines} spines, 2 concretes, 2 backlashes ([16], Fig. 7)",
-                "within the bars",
-                f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less",
-                max(off) <= 1.0,
-                role="calibration" if cells is enough else "test",
-            )
+        yield Claim(
+            f"strength of tiles of {spines} spines, 2 concretes, 2 backlashes ([16], Fig. 7)",
+            "within the bars",
+            f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less",
+            max(off) <= 1.0,
+            role="calibration" if cells is enough else "test",
         )
     for concrete in ("fine", "coarse"):
         cells = [cell for cell in enough if cell["concrete"] == concrete]
         ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
-        claims.append(
-            Claim(
-                f"scatter of those tiles on {concrete} concrete, over the length of its bar",
-                "0.5 to 1.5",
-                f"{min(ratios):.2f} to {max(ratios):.2f}",
-                min(ratios) >= 0.5 and max(ratios) <= 1.5,
-            )
+        yield Claim(
+            f"scatter of those tiles on {concrete} concrete, over the length of its bar",
+            "0.5 to 1.5",
+            f"{min(ratios):.2f} to {max(ratios):.2f}",
+            min(ratios) >= 0.5 and max(ratios) <= 1.5,
         )
-    return claims
+    yield Claim(
+        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
+        "> 1",
+        data["hull_over_surface"],
+        data["hull_over_surface"] > 1.01,
+    )
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the limit curve, the table of strengths, and the surface seen from the pull."""
     return {
-        "fig10": draw_curve(result.data, REPEATS),
-        "fig10_tile_shear": draw_table(result.data),
-        "fig10_surface": draw_surface(PRESET),
+        "fig10": _draw_curve(result.data),
+        "fig10_tile_shear": _draw_table(result.data),
+        "fig10_surface": _draw_surface(),
     }
+
+
+OF_TRIALS: Final = {"marker": ".", "linestyle": "", "color": "tab:blue", "alpha": 0.6}
+DOTTED: Final = {"linestyle": ":", "color": "k"}
+
+
+def _draw_curve(data: dict[str, Any]) -> Figure:
+    """Draw the limit curve over the loading angle, and in Cartesian coordinates."""
+    figure, (polar, cartesian) = panels(1, 2, (13.0, 5.0))
+    fit, limit = data["fit_of_trials"], data["planner"]["pull_off_angle"]
+    fitted = np.linspace(0.0, limit, 46)
+    line = fit["shear_limit"] + (fit["pull_off_limit"] - fit["shear_limit"]) * fitted / limit
+    low, _, high = data["array"]["quantiles_5_50_95"]
+    trials = data["trials"]["strength"].ravel()
+    polar.axvspan(-30.0, 0.0, color="0.9")
+    polar.fill_between(np.degrees(CURVE), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
+    cartesian.axhspan(0.0, -20.0, color="0.9")
+    for angles, strength, label, of_points, style in (
+        (np.repeat(ANGLES, REPEATS), trials, None, "70 simulated trials", OF_TRIALS),
+        (fitted, line, "Eq. 21 fitted to the trials", None, {"color": "tab:red"}),
+        (CURVE, data["array"]["mean"], "spine array, mean", None, {"color": "tab:blue"}),
+        (CURVE, data["planner"]["law"], "planner, Eq. 21", None, {"color": "k"}),
+        (CURVE, data["planner"]["half_plane"], "planner, half-planes", None, DOTTED),
+    ):
+        polar.plot(np.degrees(angles), strength, label=label, **style)
+        shear, pull_off = strength * np.cos(angles), strength * np.sin(angles)
+        cartesian.plot(shear, pull_off, label=of_points, **style)
+    polar.set(
+        xlabel="loading angle φ from shear toward pull-off [°]; grey: pressed",
+        ylabel="largest force [N]; band: 5 to 95 % of tiles",
+        title="over the loading angle",
+        xlim=(-30.0, 90.0),
+        ylim=(0.0, 60.0),
+    )
+    cartesian.set(
+        xlabel="shear [N]",
+        ylabel="pull-off [N]; grey: pressed",
+        title="in Cartesian coordinates",
+        xlim=(0.0, 50.0),
+        ylim=(-20.0, 20.0),
+    )
+    polar.legend()
+    cartesian.legend()
+    return figure
+
+
+def _draw_table(data: dict[str, Any]) -> Figure:
+    """Draw the measured and the simulated strengths over the number of spines."""
+    figure, both = panels(1, 2, (11.0, 4.4), sharey=True)
+    highest = 1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"])
+    for axes, concrete in zip(both, ("fine", "coarse"), strict=True):
+        cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
+        ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
+        for (backlash, group), colour in zip(ordered, ("tab:blue", "tab:orange"), strict=True):
+            keys = ("spines", "mean", "error", "simulated_mean", "simulated_deviation")
+            found = np.array([[row[key] for key in keys] for row in group])
+            spines, mean, error, simulated, deviation = found.T
+            name = f"{1e3 * backlash:g} mm of play"
+            axes.errorbar(
+                spines, mean, error, fmt="o", color=colour, capsize=3, label=f"measured, {name}"
+            )
+            axes.plot(spines, simulated, color=colour, label=f"simulated, {name}")
+            axes.fill_between(
+                spines, simulated - deviation, simulated + deviation, color=colour, alpha=0.15
+            )
+        axes.set(xlabel="spines of a tile [1]", title=f"{concrete} concrete", ylim=(0.0, highest))
+        axes.legend(loc="upper left")
+    both[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
+    return figure
+
+
+def _draw_surface() -> Figure:
+    """Draw the strength over the azimuth at three loading angles."""
+    surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
+    figure, shown = panels(1, 3, (13.0, 4.6))
+    azimuth = np.radians(np.linspace(-90.0, 90.0, 181))
+    for axes, part in zip(shown, (0.0, 0.5, 1.0), strict=True):
+        angle = part * surface.pull_off_angle
+        directions = _directions(angle, azimuth)
+        drag = float(surface.strength(angle)) / float(array.share(angle))
+        radii: list[tuple[Array, str, str, str]] = [
+            (drag * array.share(angle, azimuth), "tab:blue", "-", "spine array, to its level"),
+            (surface.strength(angle, azimuth), "k", "-", "planner's surface"),
+        ]
+        for count, style in ((1, ":"), (4, "--")):
+            pieces = inner_half_planes(replace(surface, half_planes=count))
+            radii.append(
+                (directional_strength(pieces, directions), "k", style, f"half-planes: {count}")
+            )
+        for radius, colour, style, label in radii:
+            shear, _, lateral = radius * directions.T
+            axes.plot(shear, lateral, style, color=colour, label=label)
+        axes.set(
+            xlabel="shear [N]",
+            ylabel="lateral load [N]",
+            title=f"pulled at φ = {math.degrees(angle):g}°",
+            aspect="equal",
+        )
+    handles, labels = shown[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure

@@ -16,7 +16,15 @@ from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
-from hand_models.experiments import Claim, StudyResult, panels, pull, pulled_off_poses, unloaded
+from hand_models.experiments import (
+    COLOURS,
+    Claim,
+    StudyResult,
+    panels,
+    pull,
+    pulled_off_poses,
+    unloaded,
+)
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.tile import inner_half_planes
@@ -221,16 +229,12 @@ def _listed(values: Array) -> str:
     return ", ".join(f"{value:.2f}" for value in values)
 
 
-COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
-"""Of proximal, middle and distal phalanx, in every picture."""
-
-
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw shear and normal forces over the pull, and the condition of A."""
     data = result.data
     figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):
-        for i, (name, colour) in enumerate(zip(PHALANGES, COLOURS, strict=True)):
+        for i, (name, colour) in enumerate(COLOURS.items()):
             axes.plot(data["pull"], data[kind][:, i], color=colour, label=name)
             axes.plot(data["until_slip"]["pull"], data["until_slip"][kind][:, i], ":", color=colour)
             read = [data["read_off"][f"{kind}_{end}"][i] for end in ("unloaded", "pulled")]

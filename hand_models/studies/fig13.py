@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from trimesh.remesh import subdivide
 
 from hand_models.base import Array, Progress
 from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
@@ -269,10 +270,12 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 
 
 def _draw_solid(axes: Any, points: Array) -> None:
-    faces = points[hull(points * UNITS).simplices]
-    faces = faces[faces[:, :, 1].min(axis=1) < -SYMMETRIC]
+    simplices = hull(points * UNITS).simplices
+    triangles = simplices[points[simplices, 1].min(axis=1) < -SYMMETRIC]
+    corners = points
     for _ in range(SUBDIVISIONS):
-        faces = _subdivided(faces)
+        corners, triangles = subdivide(corners, triangles)
+    faces = corners[triangles]
     colours = colormaps["viridis"](faces[:, :, 1].mean(axis=1) / points[:, 1].min())
     axes.add_collection3d(
         Poly3DCollection(faces[:, :, [0, 2, 1]], facecolors=colours, edgecolor=colours, lw=0.2)
@@ -284,14 +287,6 @@ def _draw_solid(axes: Any, points: Array) -> None:
         zlim=(low[1], 0.0),
     )
     label_solid(axes, "hull, F_z ≤ 0, F_z downward, the paper's signs")
-
-
-def _subdivided(faces: Array) -> Array:
-    """Return four triangles for each of some, shape (n, 3, 3)."""
-    a, b, c = np.moveaxis(faces, 1, 0)
-    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-    four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.concatenate([np.stack(corners, axis=1) for corners in four])
 
 
 def _draw_strength(axes: Any, data: dict[str, Any]) -> None:

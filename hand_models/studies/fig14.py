@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from hand_models.base import Array, Progress
 from hand_models.compliance import Gripper, gripper_table, search
 from hand_models.experiments import (
+    COLOURS,
     DRAGGED,
     UNBALANCED,
     Claim,
@@ -258,10 +259,6 @@ def _claims_of_size(near: dict[str, Any], *others: dict[str, Any]) -> Iterator[C
             f"{shares}, volume {100 * size:.0f} % of that on 300 mm",
             all(value < 1.0 for value in (*of.values(), size)),
         )
-
-
-COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
-"""Of failures; the paper's are red and blue, too."""
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

@@ -49,7 +49,8 @@ STARTS: Final = 4
 FORCES: Final = ("shear", "normal")
 COLOURS: Final = ("tab:blue", "tab:red")
 VALUES: Final = ("shear", "pure_shear", "normal", "volume", "pressed_share")
-"""What is found at each tension; not a number where nothing holds."""
+WHO: Final = ("shear_phalanges", "normal_phalanges")
+"""What is found at each tension, and whose contacts fail there: none where nothing holds."""
 
 CLOSE: Final = 0.1
 """Newtons to which the tension is found at which closing alone fails."""
@@ -77,12 +78,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     curves = []
     for i, diameter in enumerate(diameters):
         rows = found[i * TENSIONS : (i + 1) * TENSIONS]
-        columns = {key: [row[key] for row in rows] for key in rows[0]}
         curves.append(
             {
                 "diameter": diameter,
-                **columns,
-                **{key: np.array(columns[key]) for key in VALUES},
+                "state": [row["state"] for row in rows],
+                **{key: np.array([row.get(key, np.nan) for row in rows]) for key in VALUES},
+                **{key: [row.get(key, []) for row in rows] for key in WHO},
                 "closing_alone_fails_at": _closing_limit(table, diameter, tried),
             }
         )
@@ -107,8 +108,7 @@ def _at(grasp: Gripper) -> dict[str, Any]:
         # the points added for one limit may raise the other
         shear = limit(points.wrenches, "shear")
     except EmptySetError:
-        nobody: dict[str, list[str]] = {f"{force}_phalanges": [] for force in FORCES}
-        return {"state": state, **dict.fromkeys(VALUES, np.nan), **nobody}
+        return {"state": state}
     ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
     return {
         "state": state,
@@ -131,8 +131,7 @@ def _pressed_share(grasp: Gripper, points: HullPoints, found: Limit) -> float:
     """Return which part of F_x at a limit the normal forces of the contacts make up."""
     right, left = grasp.finger_loads(points.poses[found.corners])
     along = [(-side.normals * side.directions[..., 1]).sum(axis=1) for side in (right, left)]
-    total = float(found.wrench[0])
-    return float(found.weights @ (along[0] - along[1])) / total if total else 0.0
+    return float(found.weights @ (along[0] - along[1])) / found.value if found.value else 0.0
 
 
 def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> float | None:
@@ -219,11 +218,7 @@ def _claims(tried: Array, curves: list[dict[str, Any]]) -> Iterator[Claim]:
         f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold",
         curved > flat,
     )
-    beyond = [
-        strong[f"{force}_phalanges"][i]
-        for i in range(strong.best("shear"), strong.last + 1)
-        for force in FORCES
-    ]
+    beyond = [strong[key][i] for i in range(strong.best("shear"), strong.last + 1) for key in WHO]
     others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
     ends = sum("proximal" in found or "distal" in found for found in beyond)
     yield Claim(

@@ -25,6 +25,7 @@ from hand_models.experiments import (
     conditions_title,
     draw_map,
     legend,
+    panels,
     part,
     radius_axes,
     sweep_cell,
@@ -73,7 +74,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     data |= {
         "in_use": {
             name: {
-                at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)._asdict()
+                at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
                 for at, surfaces in (("usual", usual), ("lower", lower))
             }
             for name in SURFACES
@@ -173,11 +174,10 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 
 
 def _draw(maps: dict[str, dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(12.0, 10.0), layout="constrained")
-    grid = figure.subplots(len(MEASURES_SHOWN), len(maps))
-    for row, measure in zip(grid, MEASURES_SHOWN, strict=True):
-        for axes, (name, data) in zip(row, maps.items(), strict=True):
-            draw_map(axes, data, measure)
-            axes.set_title(f"{name}: {conditions_title(data['conditions'])}")
+    figure, shown = panels(len(MEASURES_SHOWN), len(maps), (12.0, 10.0), grid="none")
+    each = itertools.product(MEASURES_SHOWN, maps.items())
+    for axes, (measure, (name, data)) in zip(shown, each, strict=True):
+        draw_map(axes, data, measure)
+        axes.set_title(f"{name}: {conditions_title(data['conditions'])}")
     legend(figure, list(maps.values()))
     return figure

@@ -32,14 +32,10 @@ __all__ = [
     "run_study",
 ]
 
+FIGURES: Final = ("fig06", "fig07", "fig10", "fig12", "fig13", "fig14", "fig15", "fig16")
+
 STUDIES: Final[Mapping[str, str]] = {
-    **{
-        name: f"hand_models.studies.{name}"
-        for name in (
-            *("fig06", "fig07", "fig10", "fig12", "fig13", "fig14", "fig15", "fig16"),
-            "calibrate",
-        )
-    },
+    **{name: f"hand_models.studies.{name}" for name in (*FIGURES, "calibrate")},
     "sweep": "hand_models.experiments.sweep",
 }
 """Modules of the studies by the name of their figure; loaded when asked for."""

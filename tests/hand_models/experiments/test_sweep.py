@@ -81,10 +81,10 @@ def test_every_entry_that_is_offered_does_something_or_is_read_with_reason(table
 def test_a_cell_is_what_the_gripper_holds(table):
     grasp = CONDITIONS.gripper(table)
     cell = sweep_cell(table, CONDITIONS, ["shear", "normal"])
-    assert cell.state == rest_state(grasp)
+    assert cell["state"] == rest_state(grasp)
     points, shear = sharpened(grasp, HullPoints.explored(grasp, RAYS), "shear", CUTS, STARTS)
     _, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
-    assert cell.limits == {"shear": shear.value, "normal": normal.value}
+    assert cell["limits"] == {"shear": shear.value, "normal": normal.value}
 
 
 def test_the_rows_of_a_grid_are_those_of_y(table):
