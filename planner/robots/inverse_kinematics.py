@@ -97,9 +97,8 @@ def solve_limbs(
     angles = lower_torques(batch, find_angles(batch))
     solved = np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCE
     if solved.all():
-        return {
-            limb: angles[i, :n] for i, (limb, n) in enumerate(zip(poses, batch.joints, strict=True))
-        }
+        parts = zip(poses, angles, batch.joints, strict=True)
+        return {limb: mine[:n] for limb, mine, n in parts}
     missing, turned = {}, {}
     for i in np.flatnonzero(~solved).tolist():
         deadline.check("it was known how far a hand is out of reach")
