@@ -236,7 +236,7 @@ class Recomputed(NamedTuple):
             yield from map(getattr(self, say), np.flatnonzero(wrong).tolist())
         for used, told, relative, name in self.claims():
             right = np.abs(used - told) <= relative * np.maximum(np.abs(used), 1.0)
-            what = "" if name == self.drive else ": utilisation"
+            what = "" if used is self.drives else ": utilisation"
             for i in np.flatnonzero(~right).tolist():
                 yield f"{name(i)}{what} is {used.flat[i]:.8g}, not {told.flat[i]:.8g}"
         yield from self.contacts()
