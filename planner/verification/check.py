@@ -158,11 +158,8 @@ KNOWN: Final[BoundedStore[Hashable, Recomputing]] = BoundedStore("recomputing", 
 
 
 def _recomputing(known: HandBatch, places: Sequence[HandOnHold], strength: float) -> Recomputing:
-    told = tuple(
-        [
-            (place.limb, place.wrist, None if preload is None else tuple(preload))
-            for place in places
-            for preload in (place.tendon_preload,)
-        ]
-    )
-    return KNOWN.get((known.hands, told, strength), lambda: Recomputing(known, places, strength))
+    preloads = [place.tendon_preload for place in places]
+    told = tuple([None if preload is None else preload.tobytes() for preload in preloads])
+    names = tuple([(place.limb, place.wrist) for place in places])
+    key = known.hands, names, told, strength
+    return KNOWN.get(key, lambda: Recomputing(known, places, strength))

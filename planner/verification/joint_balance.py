@@ -44,6 +44,9 @@ joints, but each takes the errors of those beyond it.
 NOWHERE: Final = np.zeros(0)
 """Of no joints."""
 
+BEFORE: Final = np.tri(JOINTS, k=-1)
+"""Of each joint, the phalanges before it."""
+
 OUTWARD: Final = np.tri(JOINTS).T
 """Of each joint, the phalanges that it turns."""
 
@@ -128,13 +131,11 @@ class JointBalance:
         self._gain = gain * known.engagement
         self._rest = known.bends * -np.array(body.finger.joint_stiffness)
         self._rest -= body.finger.joint_preload
-        self._planes = planes = _planes_of(
-            body, tuple([hand.grasp.outer_rotation for hand in hands])
-        )
+        self._planes = _planes_of(body, tuple([hand.grasp.outer_rotation for hand in hands]))
         directions = np.empty((*known.angles.shape, 2))
         np.cos(known.angles, out=directions[:, :, 0])
         np.sin(known.angles, out=directions[:, :, 1])
-        self._joints = planes.chain @ directions
+        self._joints = body.finger.joint_spacing * BEFORE @ directions
         self._axes = self._axes_of(self._joints)
 
         self.held: NDArray[np.bool_] | None = None
@@ -217,7 +218,8 @@ class JointBalance:
 
     def _axes_of(self, joints: Array) -> Array:
         """Return the joints' axes where these are, as rows for wrenches, shape (F, 3, 6)."""
-        return np.asarray(joints @ self._planes.turns + self._planes.axes)
+        axes, turns = self._planes
+        return np.asarray(joints @ turns + axes)
 
 
 def _turned(axes: Array, wrenches: Array) -> Array:
@@ -225,31 +227,21 @@ def _turned(axes: Array, wrenches: Array) -> Array:
     return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=2))
 
 
-class _Planes(NamedTuple):
-    """Planes of the fingers of some hands.
+@lru_cache(maxsize=KEPT)
+def _planes_of(hand: HandModel, rotations: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return the planes of the fingers of hands of one model turned so far.
 
-    Attributes
-    ----------
+    Returns
+    -------
     axes : ndarray, shape (F, 1, 6)
         The proximal joints' axes, as rows for wrenches about the origin of H.
     turns : ndarray, shape (F, 2, 6)
         What is added to those per metre along the finger and into the rock.
-    chain : ndarray, shape (3, 3)
-        From directions of the phalanges to places of the joints [m].
     """
-
-    axes: Array
-    turns: Array
-    chain: Array
-
-
-@lru_cache(maxsize=KEPT)
-def _planes_of(hand: HandModel, rotations: tuple[float, ...]) -> _Planes:
-    """Return the planes of hands of one model turned so far."""
     frames = [frame for rotation in rotations for frame in hand.frames(rotation)]
     axes, turns = np.zeros((len(frames), 1, 6)), np.zeros((len(frames), 2, 6))
     for axis, turn, frame in zip(axes[:, 0], turns, frames, strict=True):
         across = np.cross([0.0, 0.0, 1.0], frame.along)
         axis[:3], axis[3:] = np.cross(across, frame.joint), -across
         turn[0, 2], turn[1, :3] = -1.0, frame.along
-    return _Planes(axes, turns, hand.finger.joint_spacing * np.tri(JOINTS, k=-1))
+    return axes, turns

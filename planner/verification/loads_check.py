@@ -25,7 +25,7 @@ from planner.verification.check import BALANCE, Check
 from planner.verification.joint_balance import LEVER
 from planner.verification.limbs import force_use
 from planner.verification.limit_surface import LimitCurves
-from planner.verification.recomputation import PULLING
+from planner.verification.recomputation import held_by
 from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
 
 __all__ = ["LoadsCheck"]
@@ -103,7 +103,7 @@ class LoadsCheck:
         again = check.again.of([], arrays, check.asked_for([], arrays, joints))
         named = np.array([y * (np.arange(len(y)) < len(names)) for names in self._columns])
         error = max(again.error, LEVER * float(np.abs(self.loads_of(arrays) - named).max()))
-        # of loads no larger than one, each adds its error to those without loads, and to these
+        # each load adds an error in proportion to it, and that without loads
         if not 2.0 * (1.0 + len(y)) * error <= NEAR or any(again.contacts()):
             self.wrong.append("what loads do to the hands")
 
@@ -125,16 +125,17 @@ class LoadsCheck:
             used.append((np.concatenate((capped, torques, -torques))[None], each[[h]]))
             signs.append((-none[None], each[[h]]))
         self.idle = max((float(np.abs(torques).max()) for torques in joints.values()), default=0.0)
-        return [
-            *((own, on_rock) for own in arrays.loads[touching].T),
-            _flat((arrays.palms[:, ::2], each)),
-            _flat((again.wrenches, each)),
-            _flat((again.along, each)),
-            _flat(*signs),
-            stops,
-            _flat((tiles[touching] / known.engagement[touching, None], on_rock)),
-            _flat(*used),
+        parts = [
+            *([(own, on_rock)] for own in arrays.loads[touching].T),
+            [(arrays.palms[:, ::2], each)],
+            [(again.wrenches, each)],
+            [(again.along, each)],
+            signs,
+            [stops],
+            [(tiles[touching] / known.engagement[touching, None], on_rock)],
+            used,
         ]
+        return [_flat(part) for part in parts]
 
     def _stack(self, numbers: Sequence[Sequence[tuple[Array, Indices]]]) -> None:
         """Put the numbers without loads, and per newton, into a matrix of each hand.
@@ -222,7 +223,7 @@ class LoadsCheck:
             return "a load of the wrong sign"
         if not abs(again - utilisation) <= UTILISATION * max(1.0, again):
             return "the utilisation"
-        if not self._holds(own, found[:, self._held], allowed):
+        if not (held_by(own[:, :3]) <= most(found[:, self._held], axis=1) + allowed).all():
             return "what a hand holds"
         for h, i, value in self._given:
             if not abs(own[h, i] - value) <= allowed:
@@ -231,12 +232,6 @@ class LoadsCheck:
             if not np.linalg.norm(own[h, :3]) <= (BALL @ own[h, :3]).max() + allowed:
                 return "a force that is capped"
         return self._outside(found, allowed)
-
-    def _holds(self, wrenches: Array, along: Array, allowed: float) -> bool:
-        """Whether each hand holds no more, across the rock and away from it, than its rows say."""
-        forces = np.minimum(wrenches[:, :3], PULLING)
-        held = np.sqrt(np.einsum("hx,hx->h", forces, forces))
-        return bool((held <= most(along, axis=1) + allowed).all())
 
     def _outside(self, found: Array, allowed: float) -> str | None:
         """Say whether a tile is outside Eq. 21's surface, though within its half-planes."""
@@ -251,7 +246,7 @@ class LoadsCheck:
         return None
 
 
-def _flat(*parts: tuple[Array, Indices]) -> tuple[Array, Indices]:
+def _flat(parts: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     """Return numbers (n, …) of hands (n,) one after another, and whose each is."""
     values = [own.ravel() for own, _ in parts]
     hands = [hand.repeat(own.size // max(len(own), 1)) for own, hand in parts]

@@ -26,7 +26,7 @@ from planner.verification.limit_surface import LimitCurves, planes_of
 from planner.verification.nails import NO_NAILS, Nails
 from planner.verification.sentences import COUNT, LOAD, PALM_SIGNS, UTILISATION, Recomputed
 
-__all__ = ["PULLING", "Recomputing"]
+__all__ = ["Recomputing", "held_by"]
 
 PULLING: Final = np.array([np.inf, np.inf, 0.0])
 """Of a hand's force, what does not press."""
@@ -77,6 +77,12 @@ def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> tuple[Array
     return per_newton, at_zero, per_shear
 
 
+def held_by(forces: Array) -> Array:
+    """Return what hands hold that exert forces on the rock (H, 3), across and away from it [N]."""
+    held = np.minimum(forces, PULLING)
+    return np.asarray(np.sqrt(np.add.reduce(held * held, axis=1)))
+
+
 class Recomputing:
     """Recomputes plans of the same settled hands.
 
@@ -92,9 +98,9 @@ class Recomputing:
 
     def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
         hands, index, body = known.hands, known.places, known.hands[0].hand
-        self.known, self._body = known, body
+        self.known, self._body, self._winch = known, body, body.drive.winch_radius
         self.limbs = tuple([place.limb for place in places])
-        self._preloads = [place.tendon_preload for place in places]
+        self._places = places
         self._balance = JointBalance(known)
         # tiles that touch nothing use nothing of their limits
         shares = np.where(known.touch.away, 1.0, known.engagement)
@@ -112,10 +118,6 @@ class Recomputing:
         ]
         self._drawing = np.array(drawing, dtype=np.intp)
         self._closing = np.array([hands[i // COUNT].closing_tension for i in drawing])
-
-    @property
-    def _winch(self) -> float:
-        return self._body.drive.winch_radius
 
     def allowed(self, arrays: PlanArrays) -> Array:
         """Return the error that loads of each hand may have, shape (H,), at least `LOAD` [N]."""
@@ -178,7 +180,6 @@ class Recomputing:
         wrenches[:, 3:] += arrays.palm_moments
         force = arrays.wrenches[:, :3]
         along = force @ HELD.T
-        held = np.minimum(force, PULLING)
         palms = arrays.palms[:, ::2] * self._palm_shares
         pressed = most(palms, axis=1)
         by_rows = most(along, axis=1)
@@ -204,7 +205,7 @@ class Recomputing:
             curves=curve,
             forces=arrays.forces[:tiles] - (arrays.loads[:, None] @ arrays.axes)[:, 0],
             wrenches=wrenches,
-            held=np.sqrt(np.add.reduce(held * held, axis=1)),
+            held=held_by(force),
             by_rows=by_rows,
             along=along,
             drives=uses[:DRIVEN],
@@ -225,12 +226,11 @@ class Recomputing:
 
     def _wound(self, tensions: Array, floats: Sequence[int]) -> Array:
         """Return to which tensions winches have drawn the tendons: of floating hands, preloads."""
-        wound = tensions.copy()
+        wound = tensions.reshape(-1, COUNT).copy()
         for h in floats:
-            preload = self._preloads[h]
-            own = wound[COUNT * h : COUNT * (h + 1)]
-            own[:] = self.known.hands[h].closing_tension if preload is None else preload
-        return wound
+            preload = self._places[h].tendon_preload
+            wound[h] = self.known.hands[h].closing_tension if preload is None else preload
+        return wound.ravel()
 
     def _floated(
         self, found: list[str], arrays: PlanArrays, floats: Sequence[int], wound: Array

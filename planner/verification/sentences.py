@@ -180,9 +180,9 @@ class Recomputed(NamedTuple):
         told = self.arrays
         return (
             (self.drives, told.drives, DRIVE, self.drive),
-            (self.tiles, told.tile_utilisations, UTILISATION, self.tile_share),
-            (self.palms, told.palm_utilisations, UTILISATION, self.palm_share),
-            (self.hands, told.utilisations, UTILISATION, self.share),
+            (self.tiles, told.tile_utilisations, UTILISATION, self.tile),
+            (self.palms, told.palm_utilisations, UTILISATION, self.of_palm),
+            (self.hands, told.utilisations, UTILISATION, self.limbs.__getitem__),
         )
 
     def owners(self) -> dict[str, Indices]:
@@ -236,8 +236,9 @@ class Recomputed(NamedTuple):
             yield from map(getattr(self, say), np.flatnonzero(wrong).tolist())
         for used, told, relative, name in self.claims():
             right = np.abs(used - told) <= relative * np.maximum(np.abs(used), 1.0)
+            what = "" if used is self.drives else ": utilisation"
             for i in np.flatnonzero(~right).tolist():
-                yield f"{name(i)} is {used.flat[i]:.8g}, not {told.flat[i]:.8g}"
+                yield f"{name(i)}{what} is {used.flat[i]:.8g}, not {told.flat[i]:.8g}"
         yield from self.contacts()
 
     # Names --------------------------------------------------------------------------------------
@@ -253,7 +254,7 @@ class Recomputed(NamedTuple):
     def contact(self, i: int) -> str:
         """Return the name of a tile, or after them all of a palm."""
         palm = i - len(self.known.places.hand)
-        return self.tile(i) if palm < 0 else f"{self.limbs[palm]}: palm"
+        return self.tile(i) if palm < 0 else self.of_palm(palm)
 
     def of_finger(self, kind: str, finger: int) -> str:
         """Return the name of something of a finger: ``front_left: tendon of inner_right``."""
@@ -267,14 +268,8 @@ class Recomputed(NamedTuple):
         kind, finger = divmod(i, COUNT * len(self.limbs))
         return self.of_finger(DRIVES[kind], finger)
 
-    def tile_share(self, t: int) -> str:
-        return f"{self.tile(t)}: utilisation"
-
-    def palm_share(self, h: int) -> str:
-        return f"{self.limbs[h]}: palm: utilisation"
-
-    def share(self, h: int) -> str:
-        return f"{self.limbs[h]}: utilisation"
+    def of_palm(self, h: int) -> str:
+        return f"{self.limbs[h]}: palm"
 
     # Sentences ----------------------------------------------------------------------------------
 
