@@ -164,27 +164,19 @@ class Gripper(CompliantGrasp):
         right = self.finger.loads(inward + across, deeper - aside, -turn)
         return right, self.finger.loads(inward - across, deeper + aside, turn)
 
-    def wrenches(self, loads: tuple[FingerLoads, FingerLoads]) -> Numbers:
-        """Return the wrenches on the rock about G's origin, in the contract's signs, (m, 6)."""
-        spread, deep = self.half_spacing, self.origin_height
+    def loads_at(self, twists: Numbers) -> GraspLoads:
+        """Return loads and wrenches, about G's origin in the contract's signs, at wrist poses."""
+        loads = self.finger_loads(twists)
         right, left = (side.planar_wrench for side in loads)
         wrenches = np.zeros((len(right), 6), dtype=right.dtype)
         wrenches[:, 0] = right[:, 0] - left[:, 0]
         wrenches[:, 2] = right[:, 1] + left[:, 1]
         # M_y = z F_x − x F_z; a finger's own M is from x toward z
-        own = -right[:, 2] + left[:, 2] - deep * wrenches[:, 0]
-        wrenches[:, 4] = own - spread * (right[:, 1] - left[:, 1])
-        return wrenches
-
-    def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at wrist poses of shape (m, 3)."""
-        loads = self.finger_loads(twists)
+        own = -right[:, 2] + left[:, 2] - self.origin_height * wrenches[:, 0]
+        wrenches[:, 4] = own - self.half_spacing * (right[:, 1] - left[:, 1])
         elements = [side.shears for side in loads] + [side.normals for side in loads]
-        return GraspLoads(
-            np.concatenate(elements, axis=1),
-            self.wrenches(loads),
-            np.logical_and(*(side.reached for side in loads)),
-        )
+        reached = loads[0].reached & loads[1].reached
+        return GraspLoads(np.concatenate(elements, axis=1), wrenches, reached)
 
 
 def sandpaper(table: ParameterTable) -> Surface:

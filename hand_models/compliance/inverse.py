@@ -12,7 +12,7 @@ fails, steps begin anew at a few other poses.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -57,18 +57,15 @@ class WristPose:
         ξ about H at rest [m, rad].
     residual : ndarray, shape (6,)
         w − w_g(ξ) [N, N·m].
-    steps : int
-        Taken.
     converged : bool
     """
 
     twist: Array
     residual: Array
-    steps: int
     converged: bool
 
 
-def wrist_pose(hand: CompliantHand, wrench: ArrayLike, start: ArrayLike | None = None) -> WristPose:
+def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     """Return the pose of the wrist at which a hand exerts a wrench on the rock.
 
     Parameters
@@ -76,56 +73,29 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike, start: ArrayLike | None =
     hand : CompliantHand
     wrench : array_like, shape (6,)
         In H at rest [N, N·m].
-    start : array_like, shape (6,), optional
-        Pose to begin at [m, rad]; rest by default.
 
     Returns
     -------
     WristPose
-        The nearest that was found, if none is exact; limits are not looked at.
+        The nearest that was found from rest on, if none is exact; limits are not looked at.
     """
     wanted = finite_vector(wrench, 6, "wrench")
-    first = np.zeros(6) if start is None else finite_vector(start, 6, "start")
-    found = _reached(hand, wanted, first)
-    steps = found.steps
-    ways = np.random.default_rng(0).normal(size=(OTHER_STARTS, 6)) * pose_units(WRIST)
-    for share, way in zip(
-        np.linspace(0.0, FARTHEST_START, OTHER_STARTS + 1)[1:], ways, strict=True
-    ):
-        if found.converged:
-            break
-        tried = _reached(hand, wanted, first + share * way)
-        steps += tried.steps
-        found = min(found, tried, key=_size)
-    return replace(found, steps=steps)
-
-
-def _reached(hand: CompliantHand, wanted: Array, first: Array) -> WristPose:
-    """Return what steps find from a pose, taking the palm in each way in turn."""
+    directions = np.random.default_rng(0).normal(size=(OTHER_STARTS, 6)) * pose_units(WRIST)
+    shares = np.linspace(0.0, FARTHEST_START, OTHER_STARTS + 1)[1:]
     ways: list[Array | None] = [None]
     if hand.settled.palm.engaged:
         ways += [np.array(way) for way in itertools.product((False, True), repeat=2)]
     found: list[WristPose] = []
-    steps = 0
-    for carries in ways:
-        at, taken = _least(hand, wanted, first, carries)
-        steps += taken
-        residual = wanted - hand.wrenches(hand.loads(at[None]))[0]
-        exact = float(np.abs(residual * SCALE).max()) <= TOLERANCE
-        found.append(WristPose(at, residual, steps, exact))
-        if exact:
-            return found[-1]
-    return replace(min(found, key=_size), steps=steps)
+    for start in (np.zeros(6), *(shares[:, None] * directions)):
+        for carries in ways:
+            found.append(_nearest(hand, wanted, start, carries))
+            if found[-1].converged:
+                return found[-1]
+    return min(found, key=lambda pose: float(np.abs(pose.residual * SCALE).max()))
 
 
-def _size(pose: WristPose) -> float:
-    return float(np.abs(pose.residual * SCALE).max())
-
-
-def _least(
-    hand: CompliantHand, wanted: Array, first: Array, carries: Array | None
-) -> tuple[Array, int]:
-    """Return the pose of least residual that steps lead to, and their number.
+def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | None) -> WristPose:
+    """Return the pose of least residual that steps lead to.
 
     Of a hand whose palm's shear and pressing carry both ways, or not at all, each as ``carries``
     says; with None as they are, only against the rock.
@@ -145,17 +115,18 @@ def _least(
     def jacobian(x: Array) -> Array:
         return np.nan_to_num(slopes(wrenches(complex_steps(x * units)))) * units
 
-    start = first / units
-    if np.abs(residual(start)).max() <= TOLERANCE:
-        return first, 0
-    found = least_squares(
-        residual,
-        start,
-        jacobian,
-        method="dogbox",
-        ftol=FINEST,
-        xtol=FINEST,
-        gtol=FINEST,
-        max_nfev=STEPS,
-    )
-    return found.x * units, found.nfev
+    at = first
+    if np.abs(residual(first / units)).max() > TOLERANCE:
+        found = least_squares(
+            residual,
+            first / units,
+            jacobian,
+            method="dogbox",
+            ftol=FINEST,
+            xtol=FINEST,
+            gtol=FINEST,
+            max_nfev=STEPS,
+        )
+        at = found.x * units
+    left = wanted - hand.wrenches(hand.loads(at[None]))[0]
+    return WristPose(at, left, float(np.abs(left * SCALE).max()) <= TOLERANCE)

@@ -213,4 +213,4 @@ def even_pulls(count: int, size: Array) -> Array:
 
 
 def _wrenches(gripper: Gripper, poses: Numbers) -> Numbers:
-    return in_paper_signs(gripper.wrenches(gripper.finger_loads(poses)))
+    return in_paper_signs(gripper.loads_at(poses).wrenches)

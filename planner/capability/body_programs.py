@@ -144,15 +144,13 @@ class BodyPrograms:
         data = self.data.turned(np.concatenate([start / WRENCH_UNIT, self.data.wrench[6:]]))
         return _solved(data, goal, columns, self.cap if cap is None else cap)
 
-    def accelerated(self, goal: Array, ways: Array) -> tuple[Reached | None, float]:
-        """Return the farthest acceleration t / unit along columns (k, n) of W, and that unit."""
+    def accelerated(self, goal: Array, ways: Array) -> Reached | None:
+        """Return the farthest acceleration along columns (k, n) of W, t of each."""
         assert self.motion is not None
         assert self.at_rest is not None
         data, cap = self.at_rest
         columns = self.motion.wrench @ ways / WRENCH_UNIT[:, None]
-        unit = float(np.abs(columns).max())
-        K = [torque @ ways / unit for torque in self.motion.torques]
-        return _solved(data, goal, columns / unit, cap, K), unit
+        return _solved(data, goal, columns, cap, [each @ ways for each in self.motion.torques])
 
     def wrench(self, found: Reached) -> Array:
         """Return the body wrench that a program's loads give, shape (6,) [N, N·m]."""
@@ -195,7 +193,9 @@ def _solved(
         If there is no answer that passes the checks; an `UnsupportedError` if it has no bound.
     """
     deadline.check(MISSING)
-    B = np.vstack([columns, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
+    unit = size_of(columns)
+    B = np.vstack([columns / unit, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
+    K = None if K is None else [torque / unit for torque in K]
     found = programs.reach(data, goal / size_of(goal), B, cap, K)
     if not found.outcome.solved:
         if found.outcome.status not in programs.PROVEN:
@@ -203,7 +203,7 @@ def _solved(
         return None
     if _error(data, found, B, cap, K) > SLACK * max(1.0, float(np.abs(found.t).max())):
         raise SolverError("body space: the solver's answer does not pass the checks")
-    return found
+    return found._replace(t=found.t / unit)
 
 
 def size_of(direction: Array) -> float:

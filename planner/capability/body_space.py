@@ -172,7 +172,7 @@ class BodySpace:
             if found is None:
                 return None
             point = (SCALE * programs.wrench(found))[plane]
-            return SupportPoint(point, float(normal @ point), programs.limiting(found.outcome))
+            return SupportPoint(normal, point, programs.limiting(found.outcome))
 
         polygon = enclose(touching)
         scaled = None if polygon is None else polygon.scaled(1.0 / SCALE[plane])
@@ -229,8 +229,8 @@ class BodySpace:
         way = self._ways(finite_vector(direction, len(np.atleast_1d(direction)), "direction"))
         if self._programs.at_rest is None:
             return None
-        found, unit = self._programs.accelerated(np.ones(1), way)
-        return None if found is None else self._end(found, float(found.t[0]) / unit)
+        found = self._programs.accelerated(np.ones(1), way)
+        return None if found is None else self._end(found, float(found.t[0]))
 
     def acceleration_section(
         self, one: ArrayLike, two: ArrayLike, most: int = MOST
@@ -247,11 +247,10 @@ class BodySpace:
         plane = np.hstack(ways)
 
         def touching(normal: Array) -> SupportPoint | None:
-            found, unit = programs.accelerated(normal, plane)
+            found = programs.accelerated(normal, plane)
             if found is None:
                 return None
-            point = found.t / unit
-            return SupportPoint(point, float(normal @ point), programs.limiting(found.outcome))
+            return SupportPoint(normal, found.t, programs.limiting(found.outcome))
 
         return enclose(touching, most)
 
@@ -276,10 +275,8 @@ class BodySpace:
 
     def _along(self, start: Array, direction: ArrayLike, cap: float | None = None) -> End | None:
         d = finite_vector(direction, 6, "direction")
-        unit = size_of(d / WRENCH_UNIT)
-        column = (d / WRENCH_UNIT / unit)[:, None]
-        found = self._programs.reached(np.ones(1), column, start, cap)
-        return None if found is None else self._end(found, float(found.t[0]) / unit)
+        found = self._programs.reached(np.ones(1), (d / WRENCH_UNIT)[:, None], start, cap)
+        return None if found is None else self._end(found, float(found.t[0]))
 
     def _end(self, found: Reached, reach: float) -> End:
         programs, outcome = self._programs, found.outcome

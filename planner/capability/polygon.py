@@ -39,21 +39,25 @@ TURN: Final = 1e-7
 
 
 class SupportPoint(NamedTuple):
-    """How far a set reaches in a direction.
+    """A point of a set that is as far as any in a direction.
 
     Attributes
     ----------
+    normal : ndarray, shape (2,)
+        The direction, of length 1.
     point : ndarray, shape (2,)
-        Of the set, and as far as any.
-    reach : float
-        Its distance from the origin along the direction.
     limiting : LimitName or None
         What ends the way there.
     """
 
+    normal: Array
     point: Array
-    reach: float
     limiting: LimitName | None = None
+
+    @property
+    def reach(self) -> float:
+        """Distance of the point from the origin along the direction."""
+        return float(self.normal @ self.point)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +86,13 @@ class Polygon:
         return Polygon(self.inner * units, self.outer * units, self.gap, self.limiting)
 
 
-class _Side(NamedTuple):
-    """A direction that was asked for, and what it gave."""
-
-    normal: Array
-    touch: SupportPoint
-
-
 def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) -> Polygon | None:
     """Return the polygons of a set; None if it is empty.
 
     Parameters
     ----------
     touching : callable
-        From a unit direction, shape (2,), to how far the set reaches there; None if it is empty.
+        From a unit direction, shape (2,), to a farthest point of the set; None if it is empty.
     most : int
         Directions to ask for at most.
 
@@ -107,8 +104,8 @@ def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) 
     first = touching(FIRST[0])
     if first is None:
         return None
-    sides = [_Side(FIRST[0], first), *(_asked(touching, normal) for normal in FIRST[1:])]
-    lengths = np.array([sides[i].touch.reach + sides[i + 2].touch.reach for i in (0, 1)])
+    sides = [first, *(_asked(touching, normal) for normal in FIRST[1:])]
+    lengths = np.array([sides[i].reach + sides[i + 2].reach for i in (0, 1)])
     slack = ROUNDING * max(1.0, float(lengths.max()))
     units = np.maximum(lengths, slack / TOLERANCE)
     gaps = [_open_gap(a, b, units) for a, b in pairwise([*sides, sides[0]])]
@@ -123,38 +120,37 @@ def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) 
         gaps[i : i + 1] = [_open_gap(before, side, units), _open_gap(side, after, units)]
     pairs = list(pairwise([*sides, sides[0]]))
     corners = np.array([_corner(a, b) for a, b in pairs])
-    points = np.array([side.touch.point for side in sides])
+    points = np.array([side.point for side in sides])
     kept = _corners_of(points, slack)
     return Polygon(
         inner=points[kept],
         outer=corners[_corners_of(corners, 0.1 * slack)],
         gap=max(_gap(a, b) for a, b in pairs),
-        limiting=tuple(sides[k].touch.limiting for k in kept),
+        limiting=tuple(sides[k].limiting for k in kept),
     )
 
 
-def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> _Side:
+def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> SupportPoint:
     touch = touching(normal)
     if touch is None:
         raise SolverError(f"a set that is not empty has no end toward {normal.tolist()}")
-    return _Side(normal, touch)
+    return touch
 
 
-def _corner(a: _Side, b: _Side) -> Array:
+def _corner(a: SupportPoint, b: SupportPoint) -> Array:
     """Return where the borders of two half-planes meet, shape (2,)."""
     turn = _cross(a.normal, b.normal)
     if turn < TURN:
-        return a.touch.point
+        return a.point
     # along a's border from its point, to b's
     along = np.array([-a.normal[1], a.normal[0]])
-    far = (b.touch.reach - float(b.normal @ a.touch.point)) / turn
-    start = a.touch.point + (a.touch.reach - float(a.normal @ a.touch.point)) * a.normal
-    return np.asarray(start + far * along)
+    far = float(b.normal @ (b.point - a.point)) / turn
+    return np.asarray(a.point + far * along)
 
 
-def _between(a: _Side, b: _Side) -> Array | None:
+def _between(a: SupportPoint, b: SupportPoint) -> Array | None:
     """Return the direction to ask for between two: of the edge's normal, if it is between them."""
-    edge = b.touch.point - a.touch.point
+    edge = b.point - a.point
     for way in (np.array([edge[1], -edge[0]]), a.normal + b.normal):
         length = float(np.linalg.norm(way))
         if length > 0.0:
@@ -164,12 +160,12 @@ def _between(a: _Side, b: _Side) -> Array | None:
     return None
 
 
-def _gap(a: _Side, b: _Side, units: Array | float = 1.0) -> float:
+def _gap(a: SupportPoint, b: SupportPoint, units: Array | float = 1.0) -> float:
     """Return how far the outer corner between two directions is from the inner edge."""
-    return _distance(a.touch.point / units, b.touch.point / units, _corner(a, b) / units)
+    return _distance(a.point / units, b.point / units, _corner(a, b) / units)
 
 
-def _open_gap(a: _Side, b: _Side, units: Array) -> float:
+def _open_gap(a: SupportPoint, b: SupportPoint, units: Array) -> float:
     """Return the gap between two directions, zero where there is none to ask for between them."""
     return 0.0 if _between(a, b) is None else _gap(a, b, units)
 

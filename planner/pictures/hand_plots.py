@@ -371,7 +371,7 @@ def _outline(space: WrenchSpace, i: int, j: int) -> Array:
         direction = np.zeros(6)
         direction[[i, j]] = normal * units
         point = space.extreme(direction)[[i, j]] * units
-        return SupportPoint(point, float(normal @ point))
+        return SupportPoint(normal, point)
 
     polygon = enclose(touching, MOST_ENDS)
     return np.zeros((1, 2)) if polygon is None else polygon.inner / units

@@ -304,17 +304,10 @@ def wrenches_inside(wrist, count):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", GRASPS)
-def test_newton_finds_the_pose_of_a_thousand_wrenches(name, capsys):
+def test_newton_finds_the_pose_of_a_thousand_wrenches(name):
     hold, rotation, palm = GRASPS[name]
     wrist = floating(hold, Grasp(outer_rotation=rotation), palm=palm)
     found = [wrist_pose(wrist.hand, w) for w in wrenches_inside(wrist, 250)]
-    steps = np.array([pose.steps for pose in found])
-    with capsys.disabled():
-        print(
-            f"\n{name}: {sum(p.converged for p in found)} of {len(found)} converge, "
-            f"steps median {np.median(steps):g}, 95 % {np.quantile(steps, 0.95):g}, "
-            f"most {steps.max()}"
-        )
     assert all(pose.converged for pose in found)
 
 
@@ -333,7 +326,8 @@ def test_newton_finds_the_pose_of_every_wrench_inside(name):
 def test_the_rest_wrench_needs_no_step():
     wrist = floating()
     pose = wrist_pose(wrist.hand, wrist.evaluate(np.zeros((1, 6))).wrenches[0])
-    assert (pose.steps, pose.converged) == (0, True)
+    assert pose.converged
+    np.testing.assert_array_equal(pose.twist, 0.0)
 
 
 def test_a_wrench_beyond_reach_is_said_to_be_so():

@@ -17,7 +17,7 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 def disc(radius, centre=(0.0, 0.0)):
     centre = np.array(centre)
-    return lambda n: SupportPoint(centre + radius * n, float(centre @ n) + radius)
+    return lambda n: SupportPoint(n, centre + radius * n)
 
 
 def area(points):

@@ -17,6 +17,6 @@ def hull_of(points, calls=None):
         along = points @ normal
         most = along.max()
         far = points[along >= most - 1e-9 * (1.0 + abs(most))]
-        return SupportPoint(far.mean(axis=0), float(most))
+        return SupportPoint(normal, far.mean(axis=0))
 
     return touching
