@@ -54,6 +54,11 @@ class SupportPoint(NamedTuple):
     point: Array
     limiting: LimitName | None = None
 
+    @property
+    def reach(self) -> float:
+        """Distance of the point from the origin along the direction."""
+        return float(self.normal @ self.point)
+
 
 @dataclass(frozen=True, eq=False)
 class Polygon:
@@ -100,7 +105,7 @@ def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) 
     if first is None:
         return None
     sides = [first, *(_asked(touching, normal) for normal in FIRST[1:])]
-    lengths = np.array([float(FIRST[i] @ (sides[i].point - sides[i + 2].point)) for i in (0, 1)])
+    lengths = np.array([sides[i].reach + sides[i + 2].reach for i in (0, 1)])
     slack = ROUNDING * max(1.0, float(lengths.max()))
     units = np.maximum(lengths, slack / TOLERANCE)
     gaps = [_open_gap(a, b, units) for a, b in pairwise([*sides, sides[0]])]
