@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import InvalidInputError
 from hand_models.scans.scan import RawScan
 
 __all__ = ["read_columns", "read_pcd", "read_ply"]
@@ -59,19 +60,26 @@ def read_columns(path: Path) -> RawScan:
     are meant. What is empty is not finite.
     """
     with path.open(encoding="utf-8-sig") as file:
-        lines = (line for line in file if line.strip() and not line.startswith("#"))
-        first = next(lines, "")
-    mark = next((mark for mark in ",;" if mark in first), None)
-    names = [name.strip().strip("\"'/").lower() for name in first.split(mark)]
-    titled = bool(first) and not _all_numbers(names)
-    wanted = [names.index(axis) if axis in names else i for i, axis in enumerate(AXES)]
-    if not first:
+        lines = [line for line in file if line.strip() and not line.startswith("#")]
+    if not lines:
         return RawScan(np.empty((0, 3)))
+    mark = next((mark for mark in ",;" if mark in lines[0]), None)
+    names = [name.strip().strip("\"'/").lower() for name in lines[0].split(mark)]
     if len(names) < len(AXES):
         raise InvalidInputError(
             f"three columns are needed, the first line has {len(names)}: {path}", field="file"
         )
-    return RawScan(_loaded(path, mark, wanted, titled))
+    columns = [names.index(axis) if axis in names else i for i, axis in enumerate(AXES)]
+    if not _all_numbers(names):
+        del lines[0]
+    if not lines:
+        return RawScan(np.empty((0, 3)))
+    read = partial(np.loadtxt, lines, delimiter=mark, usecols=columns, ndmin=2)
+    try:
+        return RawScan(read())
+    except ValueError:
+        # slower, for what has empty cells
+        return RawScan(read(converters=_number, encoding="utf-8"))
 
 
 def _all_numbers(cells: Sequence[str]) -> bool:
@@ -80,23 +88,6 @@ def _all_numbers(cells: Sequence[str]) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _loaded(path: Path, mark: str | None, columns: list[int], titled: bool) -> Array:
-    with path.open(encoding="utf-8-sig") as file:
-        kept = (line for line in file if line.strip() and not line.startswith("#"))
-        if titled:
-            next(kept)
-        lines = list(kept)
-    if not lines:
-        return np.empty((0, 3))
-    try:
-        return np.loadtxt(lines, delimiter=mark, usecols=columns, ndmin=2)
-    except ValueError:
-        # slower, for what has empty cells
-        return np.loadtxt(
-            lines, delimiter=mark, usecols=columns, ndmin=2, converters=_number, encoding="utf-8"
-        )
 
 
 def _number(cell: str) -> float:

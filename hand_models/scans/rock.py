@@ -69,20 +69,9 @@ class ScannedRock:
         """Size along the axes of the rock's frame, shape (3,) [m]."""
         return np.asarray(np.ptp(self.vertices, axis=0))
 
-    def normals(self) -> Array:
-        """Return the normal of each vertex, out of the rock, shape (n, 3), of length one."""
-        return np.array(self._mesh().vertex_normals, dtype=float)
-
-    def _mesh(self) -> trimesh.Trimesh:
-        return trimesh.Trimesh(self.vertices, self.faces, process=False)
-
-    def ply(self) -> bytes:
-        """Return a PLY file of vertices [m] with normals, and faces."""
-        found: bytes = export_ply(self._mesh(), vertex_normal=True)
-        return found
-
 
 def write_rock(rock: ScannedRock, path: Path) -> None:
-    """Write rock as a PLY file, which a mesh hold may name."""
+    """Write rock as a PLY file with normals [m], which a mesh hold may name."""
+    mesh = trimesh.Trimesh(rock.vertices, rock.faces, process=False)
     with whole_file(path) as part:
-        part.write_bytes(rock.ply())
+        part.write_bytes(export_ply(mesh, vertex_normal=True))

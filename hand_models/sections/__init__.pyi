@@ -11,5 +11,10 @@ from .section import (
     Vector2 as Vector2,
 )
 from .smooth import Disc as Disc, SmoothSection as SmoothSection, Wall as Wall
-from .swept_ball import PARALLEL as PARALLEL, Swept as Swept, entry_distances as entry_distances
-from .swept_cuts import FingerPlane as FingerPlane, cut_of as cut_of
+from .swept_cuts import (
+    PARALLEL as PARALLEL,
+    FingerPlane as FingerPlane,
+    Swept as Swept,
+    cut_of as cut_of,
+    entry_distances as entry_distances,
+)
