@@ -1,5 +1,4 @@
 from .bounded_store import BoundedStore as BoundedStore, stores as stores
-from .breaking_off import broken_off_by as broken_off_by, go_on as go_on
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
@@ -18,5 +17,5 @@ from .frames import (
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
-from .progress import Progress as Progress
+from .long_work import Progress as Progress, broken_off_by as broken_off_by, go_on as go_on
 from .whole_files import whole_file as whole_file

@@ -52,16 +52,6 @@ def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
     return vector
 
 
-def _finite_numbers(value: ArrayLike, size: int, field: str) -> list[float]:
-    """Return the same as a list, at once where it is one of floats; raises as `finite_vector`."""
-    if isinstance(value, list) and len(value) == size and {*map(type, value)} == {float}:
-        numbers: list[float] = value
-        if all(map(math.isfinite, numbers)):
-            return numbers
-    found: list[float] = finite_vector(value, size, field).tolist()
-    return found
-
-
 def skew(v: ArrayLike) -> Array:
     """Return the matrix ``[v]×`` of shape (3, 3), so that ``[v]× w`` is the cross product."""
     x, y, z = np.asarray(v, dtype=float)
@@ -108,7 +98,7 @@ class Pose:
             If a number is not finite or the norm is off by more than
             `QUATERNION_NORM_TOLERANCE`.
         """
-        q = _finite_numbers(orientation, 4, "orientation")
+        q = finite_vector(orientation, 4, "orientation").tolist()
         norm = math.hypot(*q)
         if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
             raise InvalidInputError(
@@ -124,7 +114,7 @@ class Pose:
                 [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
             ]
         )
-        place = np.array(_finite_numbers(position, 3, "position"))
+        place = finite_vector(position, 3, "position").copy()
         place.setflags(write=False)
         rotation.setflags(write=False)
         pose = cls(place, rotation)

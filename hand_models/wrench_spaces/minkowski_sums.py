@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces.half_spaces import Facets
@@ -21,11 +22,7 @@ from hand_models.wrench_spaces.polytopes import TOLERANCE, hull
 __all__ = ["Summand", "about_facets", "extreme_points", "facets", "sum_vertices", "sums"]
 
 DEPENDENT: Final = 1e-8
-"""Unit vectors that span no more volume than this count as dependent, as does one on a plane from
-which it rises no more."""
-
-CERTAIN: Final = 1e-6
-"""Volume of unit vectors below which rounding of what is orthogonal to them shows."""
+"""Unit vectors that span no more volume than this count as dependent."""
 
 
 class Summand(NamedTuple):
@@ -76,10 +73,9 @@ def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
     """Return the facets of a sum of segments and polygons that spans R^r, r ≥ 1.
 
     A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
-    plane) of a polygon, each of them where its part reaches farthest along the normal. Several
-    choices of edges may span the same facet: then the same points of the parts lie in it, and by
-    these it is known. Its offset is the support function along the normal, so that no half-space
-    cuts the set, however little its edges differ from dependent ones.
+    plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon. The
+    offset is the support function along the normal, so that no half-space cuts the set, however
+    little its edges differ from dependent ones.
 
     Parameters
     ----------
@@ -87,53 +83,48 @@ def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
         Their points in r dimensions.
     r : int
     rounding : float
-        How far rounding may move points, of parts that are about as large as one.
+        How far rounding may move points.
     """
-    ends, choices = _choices(tuple((len(part.points), part.dimension) for part in parts), r)
-    normals, volumes = _orthogonal(np.vstack([_directions(part) for part in parts]), choices)
-    # the roundest choice first: of those that span the same facet it is taken
-    order = np.argsort(-volumes, kind="stable")
-    order = order[volumes[order] > DEPENDENT]
-    choices, volumes = (np.concatenate([each[order]] * 2) for each in (choices, volumes))
-    normals = np.concatenate([normals[order], -normals[order]])
-    slack = DEPENDENT * np.maximum(1.0, CERTAIN / volumes)
+    shapes = tuple([(len(part.points), part.dimension) for part in parts])
+    ends, whole, choices = _choices(shapes, r)
+    points = np.vstack([part.points for part in parts])
+    edges = points[ends[:, 1]] - points[ends[:, 0]]
+    normals = _cross_products(edges / np.linalg.norm(edges, axis=1)[:, None], choices)
+    lengths = np.linalg.norm(normals, axis=1)
+    # of choices that span the same facet, or nearly, the roundest: its normal is the most exact
+    order = np.argsort(-lengths, kind="stable")
+    order = order[lengths[order] > DEPENDENT]
+    normals, choices = normals[order] / lengths[order, None], choices[order]
+    normals, choices = np.vstack([normals, -normals]), np.vstack([choices, choices])
     offsets, lie = np.zeros(len(normals)), []
     for part in parts:
         # thin products: a threaded BLAS would spend more on waking its threads
         heights = np.einsum("pr,nr->pn", part.points, normals)
-        top, highest = heights.max(axis=0), heights.argmax(axis=0)
-        apart = np.linalg.norm(part.points[:, None] - part.points, axis=2)
-        lie.append(top - heights <= slack * apart[:, highest] + rounding * (1.0 + np.abs(top)))
+        top = heights.max(axis=0)
+        lie.append(heights >= top - rounding * (1.0 + np.abs(top)))
         offsets += top
-    inside = np.vstack([*lie, np.ones(len(normals), dtype=bool)])
-    extreme = inside[ends[choices], np.arange(len(normals))[:, None, None]].all(axis=(1, 2))
-    _, first = np.unique(np.packbits(inside[:, extreme], axis=0), axis=1, return_index=True)
-    found = np.flatnonzero(extreme)[np.sort(first)]
+    extreme = np.vstack(lie)[ends].all(axis=1) | whole[:, None]
+    found = np.flatnonzero(extreme[choices, np.arange(len(normals))[:, None]].all(axis=1))
+    _, first = np.unique(np.round(normals[found], 7) + 0.0, axis=0, return_index=True)
+    found = found[np.sort(first)]
     return Facets(normals[found], offsets[found])
 
 
-def _directions(part: Summand) -> Array:
-    """Return unit vectors along a segment, or along a polygon's edges and two that span it."""
-    edges = np.diff(part.points, axis=0, append=part.points[:1])
-    units: Array = edges / np.linalg.norm(edges, axis=1)[:, None]
-    if part.dimension == 1:
-        return units[:1]
-    return np.vstack([units, np.linalg.svd(part.points - part.points.mean(axis=0))[2][:2]])
+def _cross_products(vectors: Array, choices: Indices) -> Array:
+    """Return the vectors (n, r) orthogonal to choices (n, r − 1) of vectors.
 
-
-def _orthogonal(vectors: Array, choices: Indices) -> tuple[Array, Array]:
-    """Return the unit vectors (n, r) orthogonal to choices (n, r − 1) of vectors, and volumes (n,).
-
-    Volumes are those that the vectors of a choice span.
+    Each is as long as the volume that they span.
     """
     turned, spread = np.linalg.qr(vectors[choices].swapaxes(1, 2), mode="complete")
-    volumes = np.abs(np.diagonal(spread, axis1=1, axis2=2)).prod(axis=1)
-    return turned[:, :, -1], volumes
+    volumes = np.abs(np.diagonal(spread, axis1=1, axis2=2).prod(axis=1))
+    return np.asarray(volumes[:, None] * turned[:, :, -1])
 
 
 @lru_cache(maxsize=16)
-def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Indices, Indices]:
-    """Return the `_directions` of parts, and every choice of r − 1 that may span a facet.
+def _choices(
+    shapes: tuple[tuple[int, int], ...], r: int
+) -> tuple[Indices, NDArray[np.bool_], Indices]:
+    """Return the edges of parts, and every choice of r − 1 of them that may span a facet.
 
     Parameters
     ----------
@@ -144,32 +135,40 @@ def _choices(shapes: tuple[tuple[int, int], ...], r: int) -> tuple[Indices, Indi
     Returns
     -------
     ends : ndarray of int, shape (k, 2)
-        Points of each edge, those of all parts counted one after another; −1 of what is no edge.
+        Points of each edge, those of all parts counted one after another.
+    whole : ndarray of bool, shape (k,)
+        Whether it stands for its whole part, which then lies in the facet: a segment, or one of two
+        edges of a polygon, which are listed again after all of them.
     choices : ndarray of int, shape (n, r − 1)
-        Of each part none, an edge, or of a polygon the two that span it.
+        Into the edges: of each part none, one, or those two.
     """
     ends: list[tuple[int, int]] = []
+    whole: list[bool] = []
+    # of the parts so far, by how many edges are chosen
     choices: list[list[tuple[int, ...]]] = [[()], *[[] for _ in range(r - 1)]]
     start = 0
     for points, dimension in shapes:
         first, count = len(ends), points if dimension == 2 else 1
-        ends += [(start + i, start + (i + 1) % points) for i in range(count)]
-        own: list[list[tuple[int, ...]]] = [[()], [(first + i,) for i in range(count)]]
+        own = [(start + i, start + (i + 1) % points) for i in range(count)]
+        options: list[list[tuple[int, ...]]] = [[()], [(first + i,) for i in range(count)]]
+        ends += own
+        whole += [dimension == 1] * count
         if dimension == 2:
-            own.append([(len(ends), len(ends) + 1)])
-            ends += [(-1, -1)] * 2
+            options.append([(len(ends), len(ends) + 1)])
+            ends += own[:2]
+            whole += [True, True]
         start += points
         choices = [
             [
                 begun + more
-                for used, options in enumerate(own[: size + 1])
+                for used, each in enumerate(options[: size + 1])
                 for begun in choices[size - used]
-                for more in options
+                for more in each
             ]
             for size in range(r)
         ]
     listed = np.array(choices[-1], dtype=np.intp).reshape(len(choices[-1]), r - 1)
-    return np.array(ends, dtype=np.intp), listed
+    return np.array(ends, dtype=np.intp), np.array(whole), listed
 
 
 def sums(parts: list[Summand]) -> Array:

@@ -66,8 +66,8 @@ class TileIndex:
         Tiles of each hand, of which all else follows.
     hand, finger : ndarray of int, shape (T,)
         Of each tile, the fingers counted through all hands.
-    first, first_finger : ndarray of int, shape (H,)
-        Each hand's first tile, and finger.
+    first : ndarray of int, shape (H,)
+        Each hand's first tile.
     first_of_finger : ndarray of int, shape (F,)
         Each finger's first tile.
     phalanges : ndarray of int, shape (F, 3)
@@ -84,7 +84,6 @@ class TileIndex:
     hand: Indices
     finger: Indices
     first: Indices
-    first_finger: Indices
     first_of_finger: Indices
     phalanges: Indices
     tips: Indices
@@ -116,15 +115,13 @@ def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
     ]
     hand, finger = (np.array([part[k] for part in parts], dtype=np.intp) for k in (0, 1))
     phalanx = np.array([part[2] for part in parts])
-    hands = np.arange(len(counts))
     phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
     bases = np.flatnonzero(phalanx == "base")
     places = TileIndex(
         counts=counts,
         hand=hand,
         finger=finger,
-        first=np.searchsorted(hand, hands),
-        first_finger=len(FINGERS) * hands,
+        first=np.searchsorted(hand, np.arange(len(counts))),
         first_of_finger=np.searchsorted(finger, np.arange(len(phalanges))),
         phalanges=phalanges,
         tips=phalanges[:, -1].copy(),
@@ -225,8 +222,6 @@ class HandBatch:
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
-        bends = angles.copy()
-        bends[:, 1:] -= angles[:, :-1]
         limits = [
             (hand.palm.shear_limit, hand.palm.pressing_limit) if hand.palm.engaged else UNLIMITED
             for hand in hands
@@ -247,7 +242,7 @@ class HandBatch:
             engagement,
             concatenated([hand.lateral_shares for hand in hands]),
             angles,
-            bends,
+            np.diff(angles, axis=1, prepend=0.0),
             np.array(limits),
         )
 

@@ -18,7 +18,6 @@ __all__ = [
     "floating_wrist",
     "hand_space",
     "resting_hand",
-    "settle_at",
     "settle_each",
     "settle_hand",
     "settle_stance",
@@ -34,22 +33,22 @@ def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
     return settled
 
 
-def settle_stance(stance: Stance) -> list[SettledHand]:
-    """Close all hands of a stance on their holds, at once.
+def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[SettledHand]:
+    """Close the hands of a stance on their holds, at once; of all by default, or of these indices.
 
     Raises
     ------
     InvalidInputError
         If a hand cannot be where it is; of the first one, its field relative to the question.
     """
-    outcomes = settle_each(stance.robot.hand, stance.hands)
-    return [_or_raise(outcome, i) for i, outcome in enumerate(outcomes)]
-
-
-def settle_at(stance: Stance, index: int) -> SettledHand:
-    """Close the hand of that index; an error's field is relative to the question."""
-    (outcome,) = settle_each(stance.robot.hand, [stance.hands[index]])
-    return _or_raise(outcome, index)
+    indices = range(len(stance.hands)) if which is None else which
+    settled = []
+    outcomes = settle_each(stance.robot.hand, [stance.hands[i] for i in indices])
+    for i, outcome in zip(indices, outcomes, strict=True):
+        if isinstance(outcome, InvalidInputError):
+            raise outcome.within(f"stance.hands[{i}]")
+        settled.append(outcome)
+    return settled
 
 
 def settle_each(
@@ -63,7 +62,11 @@ def settle_each(
     if all(hand.seat == "rest" for hand in hands):
         return kind.settle_each(placements)
     # those that look in the same direction search together
-    ways = [None if hand.seat == "rest" else _direction(hand) for hand in hands]
+    given = [PULL_OFF if each.seat_direction is None else each.seat_direction for each in hands]
+    ways = [
+        None if hand.seat == "rest" else tuple(map(float, way))
+        for hand, way in zip(hands, given, strict=True)
+    ]
     found: dict[int, SettledHand | InvalidInputError] = {}
     for way in set(ways):
         own = [i for i, each in enumerate(ways) if each == way]
@@ -71,17 +74,6 @@ def settle_each(
         seated = kind.settle_each(group) if way is None else best_seats(kind, group, way)
         found.update(zip(own, seated, strict=True))
     return [found[i] for i in range(len(hands))]
-
-
-def _direction(hand: HandOnHold) -> tuple[float, ...]:
-    given = hand.seat_direction
-    return PULL_OFF if given is None else tuple(given.tolist())
-
-
-def _or_raise(outcome: SettledHand | InvalidInputError, index: int) -> SettledHand:
-    if isinstance(outcome, InvalidInputError):
-        raise outcome.within(f"stance.hands[{index}]")
-    return outcome
 
 
 def wrist_at(
@@ -158,7 +150,7 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
 def _hand_at(stance: Stance, limb: str) -> tuple[SettledHand, FloatingWrist | None]:
     for i, hand in enumerate(stance.hands):
         if hand.limb == limb:
-            settled = settle_at(stance, i)
+            (settled,) = settle_stance(stance, [i])
             return settled, wrist_at(stance, i, settled)
     limbs = ", ".join(hand.limb for hand in stance.hands)
     raise InvalidInputError(f"no hand {limb!r} in this stance; it has {limbs}", field="limb")

@@ -12,7 +12,7 @@ from hand_models.base import Pose, wrench_transport
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import Grasp
 from hand_models.rock import Cylinder
-from planner.prepare.settled_stance import settle_at, wrist_at
+from planner.prepare.settled_stance import settle_stance, wrist_at
 from planner.question import HandOnHold, Question, Stance
 from planner.robots import Robot, RobotFile, robot_of
 from tests.suite.helpers.robots import joint, link, urdf
@@ -79,7 +79,7 @@ def given(stance: Stance, chance: np.random.Generator) -> np.ndarray:
     """A body wrench that some loads of the hands give, by their own models."""
     body, total = stance.body.inverse(), np.zeros(6)
     for i, hand in enumerate(stance.hands):
-        settled = settle_at(stance, i)
+        (settled,) = settle_stance(stance, [i])
         wrist = wrist_at(stance, i, settled)
         if wrist is None:
             space = wrench_space(settled)

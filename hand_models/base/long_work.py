@@ -1,4 +1,4 @@
-"""Long work that may be broken off: who asks for it says when, whatever is called on the way."""
+"""Long work: it tells how far it is, and may be broken off, whatever is called on the way."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["broken_off_by", "go_on"]
+__all__ = ["Progress", "broken_off_by", "go_on"]
+
+Progress = Callable[[int, int], None]
+"""Told how many steps are done, of how many."""
 
 _check: ContextVar[Callable[[], object] | None] = ContextVar("_check", default=None)
 
