@@ -173,23 +173,23 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
 def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> None:
     """Draw the scene facing the rock, and from the side."""
     ahead = "toward the rock" if seen.toward else "ahead"
+    _draw_side(side, scene, seen.ahead, UP, (ahead, "up"), "the side")
     if seen.steep:
         below = seen.into[2] > 0.0
-        right = np.cross(UP if below else -UP, seen.ahead)
-        _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead))
-        facing.set_title("seen from below" if below else "seen from above", fontsize=10)
+        right, seen_from = np.cross(UP if below else -UP, seen.ahead), "below" if below else "above"
+        _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead), seen_from)
     else:
         right = np.cross(seen.ahead, UP)
-        _draw_side(facing, scene, right, UP, ("to the right", "up"))
-        facing.set_title("seen from behind", fontsize=10)
-    _draw_side(side, scene, seen.ahead, UP, (ahead, "up"))
-    side.set_title("seen from the side", fontsize=10)
+        _draw_side(facing, scene, right, UP, ("to the right", "up"), "behind")
 
 
-def _draw_side(axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str]) -> None:
+def _draw_side(
+    axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str], seen_from: str
+) -> None:
     def flat(points: Array) -> Array:
         return (np.asarray(points) - scene.body.position) @ np.column_stack([right, up])
 
+    axes.set_title(f"seen from {seen_from}", fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.2, 0.15)
     axes.update_datalim(flat(scene.points))

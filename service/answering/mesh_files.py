@@ -11,6 +11,7 @@ import msgspec
 
 from hand_models.base import BoundedStore, InvalidInputError
 from hand_models.rock import read_mesh
+from service.answering.holds import within
 from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
 
 __all__ = ["MeshFiles"]
@@ -66,14 +67,12 @@ class MeshFiles:
     def _filled(self, hold: K, path: str) -> K:
         if not isinstance(hold, Mesh) or hold.file is None:
             return hold
-        try:
+        with within(path):
             if hold.vertices is not None or hold.faces is not None:
                 raise InvalidInputError(
                     "give a file, or vertices and faces, not both", field="file"
                 )
             known = self._mesh(self._folder / hold.file)
-        except InvalidInputError as error:
-            raise error.within(path) from None
         return msgspec.structs.replace(hold, vertices=known.vertices, faces=known.faces, file=None)
 
     def _mesh(self, path: Path) -> Mesh:
