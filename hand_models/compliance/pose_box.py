@@ -83,7 +83,7 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
     EmptySetError
         If no pose near rest holds.
     """
-    at = np.zeros(len(grasp.linearised().columns))
+    at = np.zeros(len(grasp.columns))
     for _ in range(RECENTRINGS):
         space, centre, axes = _ellipsoid(grasp, at)
         holds = grasp.evaluate(np.stack([centre, at])).holds

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache, partial
 from typing import Final
 
 from hand_models.compliance import PALM_MODES, PalmMode
@@ -69,18 +70,14 @@ def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
         for mode in PALM_MODES.values()
     ]
     common = list(dict.fromkeys(common))
-    ranks = {palms: _rank(hands, palms, factor, budget) for palms in common}
-    best = min(common, key=lambda palms: ranks[palms])
+    rank = cache(partial(_rank, hands, factor, budget))
+    best = min(common, key=rank)
     for i in engaged:
-        others = [_with(best, i, mode) for mode in PALM_MODES.values()]
-        for palms in others:
-            if palms not in ranks:
-                ranks[palms] = _rank(hands, palms, factor, budget)
-        best = min([best, *others], key=lambda palms: ranks[palms])
-    yield from sorted(dict.fromkeys([best, *common]), key=lambda palms: ranks[palms])[:STARTS]
+        best = min([best, *(_with(best, i, mode) for mode in PALM_MODES.values())], key=rank)
+    yield from sorted(dict.fromkeys([best, *common]), key=rank)[:STARTS]
 
 
-def _rank(hands: HandSets, palms: Palms, factor: float, budget: Budget) -> float:
+def _rank(hands: HandSets, factor: float, budget: Budget, palms: Palms) -> float:
     """Return the least utilisation with the sets at rest; more where they have no balance."""
     if deadline.expired():
         return float("inf")
