@@ -94,7 +94,7 @@ class BodyPrograms:
             for limb, space in zip(limbs, spaces, strict=True)
         ]
         for limb in _idle_limbs(question, where):
-            own = question.stance.robot.model.joint_names[limb]
+            own = question.stance.robot.chains[limb].joints
             self._names[0] += [joint_name(limb, name) for name in (*own, *own)]
 
     @property

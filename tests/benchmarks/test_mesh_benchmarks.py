@@ -65,7 +65,7 @@ def test_close_a_placed_hand(benchmark, hold, rotation):
 
 @pytest.mark.benchmark(group="scan of 200,000 triangles")
 def test_seat_a_hand(benchmark, hold):
-    assert benchmark(HAND.seat, hold, Grasp(math.pi)).rule == "pinch"
+    assert benchmark(seating_on, hold, Grasp(math.pi)).rule == "pinch"
 
 
 # Hands all over a wall of 400,000 triangles -------------------------------------------------------
