@@ -6,6 +6,7 @@ from .errors import (
     LimitError as LimitError,
     SolverError as SolverError,
     UnsupportedError as UnsupportedError,
+    within as within,
 )
 from .frames import (
     SKEW as SKEW,

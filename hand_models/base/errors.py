@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copyreg
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Self
 
 __all__ = [
@@ -12,6 +14,7 @@ __all__ = [
     "LimitError",
     "SolverError",
     "UnsupportedError",
+    "within",
 ]
 
 
@@ -83,3 +86,12 @@ class SolverError(CruxError):
     """A numerical method that gave no answer which passes its checks."""
 
     kind = "solver"
+
+
+@contextmanager
+def within(path: str) -> Iterator[None]:
+    """Put a path before the field of an error."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise error.within(path) from None

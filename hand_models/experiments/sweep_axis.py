@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, within
 from hand_models.compliance import Gripper, pulled_off
 from hand_models.experiments.force_limits import PARAMETER_STUDIES
 from hand_models.parameters import (
@@ -62,10 +62,8 @@ class Conditions:
         """
         surface = None
         if self.surface != SANDPAPER:
-            try:
+            with within("surface"):
                 surface = pulled_off(Surface.named(self.surface), table)
-            except InvalidInputError as error:
-                raise error.within("surface") from None
         return Gripper(self.diameter, self.tension, surface, table)
 
 

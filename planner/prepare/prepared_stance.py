@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, BoundedStore, InvalidInputError, wrench_transports
+from hand_models.base import Array, BoundedStore, InvalidInputError, within, wrench_transports
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
@@ -105,10 +105,8 @@ def prepare_stance(question: Question) -> PreparedStance:
     """
     checked_question(question)
     where = posture(question)
-    try:
+    with within("load"):
         wrench = question.needed_wrench(None if where is None else where.body_wrench)
-    except InvalidInputError as error:
-        raise error.within("load") from None
     return PreparedStance(question, where, *assemble(question, where, wrench), wrench)
 
 

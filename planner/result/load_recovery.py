@@ -33,6 +33,14 @@ class LoadRecovery:
         Their sets.
     scaled : sequence of ScaledRows, optional
         Their rows, if these are known.
+
+    Attributes
+    ----------
+    rows, at_rest : ndarray, shapes (H, 6 + nl, m), (H, 6 + nl)
+        Of loads in `LOAD_UNIT`, each hand's filled up with zeros to the most that one has: its
+        wrench on the rock [N, N·m], then the utilisations of its limits.
+    least : ndarray, shape (H, m)
+        What each load may be at least [N].
     """
 
     def __init__(
@@ -59,11 +67,11 @@ class LoadRecovery:
         self._slope[:, 2] = known.lateral_shares
         if len(layout.hooked):
             self._slope[layout.hooked, 0] = 1.0
-        # rows of all hands, each of as many, and as long, as the largest has: wrench, then limits
-        self._rows = np.zeros((*layout.shape, layout.columns.shape[1]))
-        self._at_rest = np.zeros(layout.shape)
+        self.least = layout.least.take(layout.columns)
+        self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
+        self.at_rest = np.zeros(layout.shape)
         of_sets = [scaled_rows(space) for space in spaces] if scaled is None else scaled
-        for mine, rest, own in zip(self._rows, self._at_rest, of_sets, strict=True):
+        for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
             rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
@@ -93,8 +101,8 @@ class LoadRecovery:
         np.maximum(y, layout.least, out=y)
         scaled = y.take(layout.columns)
         scaled /= LOAD_UNIT
-        rows = (self._rows @ scaled[:, :, None])[:, :, 0]
-        rows += self._at_rest
+        rows = (self.rows @ scaled[:, :, None])[:, :, 0]
+        rows += self.at_rest
         wrenches, used = rows[:, :WRENCH], rows.take(layout.limits)
         efforts = used.take(layout.efforts)
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose
+from hand_models.base import Array, Indices, InvalidInputError, Pose, within
 from planner.robots.robot_file import Mount, RobotDescription
 from planner.robots.urdf import JointElement, Urdf, parse_urdf
 
@@ -88,10 +88,8 @@ def _limb_joints(
     owner: dict[str, str] = {}
     for limb, mount in mounts.items():
         field = f"limbs.{limb}.link"
-        try:
+        with within(field):
             chain = tree.chain(body, mount.link)
-        except InvalidInputError as error:
-            raise error.within(field) from None
         if not chain:
             raise InvalidInputError(
                 f"no joint moves between {body!r} and {mount.link!r}; a limb has at least one",
@@ -132,14 +130,10 @@ def build_model(
         If the URDF is none, a link is not in it, or a limb is no chain of turning joints of its
         own.
     """
-    try:
+    with within("urdf"):
         tree = parse_urdf(urdf)
-    except InvalidInputError as error:
-        raise error.within("urdf") from None
-    try:
+    with within("body"):
         tree.require(described.body)
-    except InvalidInputError as error:
-        raise error.within("body") from None
     if not any(link.mass > 0.0 for link in tree.links.values()):
         raise InvalidInputError("no link has a mass; at least one must", field="urdf")
     joints = _limb_joints(tree, described.body, described.mounts)

@@ -15,7 +15,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any, Final
 
-from hand_models.base import InvalidInputError, Pose
+from hand_models.base import InvalidInputError, Pose, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 
 __all__ = ["Mount", "RobotDescription", "RobotFile"]
@@ -237,10 +237,8 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
         _triple(table, section, "position"),
         table.vector(section, "orientation"),
     )
-    try:
+    with within(section):
         pose = Pose.from_quaternion(position, orientation)
-    except InvalidInputError as error:
-        raise error.within(section) from None
     given = "hand_com" in table.sections[section]
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
     value = table.quantity(section, "torque_limit").value

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, UnsupportedError
-from hand_models.hand import FINGERS, NAIL
+from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
-from planner.programs import WRENCH_UNIT, Outcome
+from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
 from planner.solving import KnownStance, is_least, least_utilisation
@@ -24,9 +24,6 @@ from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import Check, LoadsCheck
 
 __all__ = ["LoadEffects", "Solved", "StreamStance", "SupportBound"]
-
-SIGNED: Final = ("/lateral", f"/{NAIL}")
-"""Loads that may be negative."""
 
 
 class Solved(NamedTuple):
@@ -102,33 +99,20 @@ class StreamStance:
         self.limbs = tuple(hand.limb for hand in question.stance.hands)
         spaces, self._data = prepared.at_rest
         self.columns = tuple(space.columns for space in spaces)
-        sizes = [len(names) for names in self.columns]
-        self.shape = len(spaces), max(sizes)
+        self.shape = len(spaces), max(map(len, self.columns))
         reader = LoadRecovery(prepared.batch, spaces)
         check = Check(prepared.question, prepared.batch, prepared.where)
         self.check = LoadsCheck(check, reader, self.columns)
         self.drive = prepared.batch.hands[0].hand.drive
         self.winches = _winches(reader, spaces)
-        self._least = np.zeros(self.shape)
-        limits = max(len(space.s) for space in spaces)
-        self._rows = np.zeros((len(spaces), limits + 6, max(sizes)))
-        self._rest = np.full((len(spaces), limits + 6), -np.inf)
-        for i, (space, size) in enumerate(zip(spaces, sizes, strict=True)):
-            count = len(space.s)
-            self._rows[i, :count, :size] = space.L / space.s[:, None]
-            self._rest[i, :count] = space.l0 / space.s
-            self._rows[i, limits:, :size] = space.generators
-            self._rest[i, limits:] = space.origin
-            signed = [name.endswith(SIGNED) for name in space.columns]
-            self._least[i, :size] = np.where(signed, -np.inf, 0.0)
-        self._limits = limits
+        self._least = reader.least
+        self._rows, self._rest = reader.rows / LOAD_UNIT, reader.at_rest
 
     def read(self, loads: Array) -> LoadEffects:
         """Return what loads (hands, m) do."""
         rows = (self._rows @ loads[:, :, None])[:, :, 0]
         rows += self._rest
-        used = np.maximum.reduce(rows[:, : self._limits], axis=None)
-        return LoadEffects(rows[:, self._limits :], float(used))
+        return LoadEffects(rows[:, :6], float(np.maximum.reduce(rows[:, 6:], axis=None)))
 
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Hashable, Mapping
 from hashlib import blake2b
 from typing import Final, overload
 
 import msgspec
 
 from hand_models import rock
-from hand_models.base import BoundedStore, InvalidInputError, Pose
+from hand_models.base import BoundedStore, InvalidInputError, Pose, within
 from hand_models.parameters import ParameterTable
 from hand_models.rock import Mesh, Profile
 from service import requests
@@ -26,15 +25,6 @@ MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests",
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
 """A stance's rocks by name, and each one's frame in W if that is given."""
-
-
-@contextmanager
-def within(path: str) -> Iterator[None]:
-    """Put a path before the field of an error."""
-    try:
-        yield
-    except InvalidInputError as error:
-        raise error.within(path) from None
 
 
 def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:

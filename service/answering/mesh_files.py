@@ -9,9 +9,8 @@ from typing import Final, TypeVar
 
 import msgspec
 
-from hand_models.base import BoundedStore, InvalidInputError
+from hand_models.base import BoundedStore, InvalidInputError, within
 from hand_models.rock import read_mesh
-from service.answering.holds import within
 from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
 
 __all__ = ["MeshFiles"]

@@ -11,7 +11,7 @@ from typing import Final, Literal, cast
 import msgspec
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, LimitError, Pose
+from hand_models.base import Array, InvalidInputError, LimitError, Pose, within
 from hand_models.fixed_wrist import UP, approach_frame
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
@@ -20,7 +20,7 @@ from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
 from planner.route import Move, Route
 from service import requests
-from service.answering.holds import Rocks, placed, pose_of, rocks_of, within
+from service.answering.holds import Rocks, placed, pose_of, rocks_of
 from service.answering.own_models import ROBOTS, Robots, builder_of
 
 __all__ = ["question", "route", "stance"]

@@ -1,7 +1,7 @@
 """How many modules one plan passes, and how often it goes from one to another.
 
 ``python -m tests.benchmarks.crossings``, from a checkout. Of a new stance of a shape that is known,
-whose hands are closed already.
+from the closed hands on.
 """
 
 from __future__ import annotations
@@ -33,9 +33,13 @@ def passed(diameter: float) -> Passed:
     settle_stance(question.stance)
     found = Passed(Counter(), Counter())
 
+    closed = False
+
     def watch(frame: FrameType, event: str, _: Any) -> None:
+        nonlocal closed
         name = frame.f_globals.get("__name__", "")
-        if event != "call" or not name.startswith(OWN):
+        closed |= event == "return" and frame.f_code is settle_stance.__code__
+        if event != "call" or not closed or not name.startswith(OWN):
             return
         found.modules[name] += 1
         caller = frame.f_back

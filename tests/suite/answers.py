@@ -107,8 +107,9 @@ KERNELS = {"Zen": "Haswell"}
 def libraries() -> dict[str, str]:
     """Return what decides the last digits: versions installed, and kernels for the processor."""
     versions = {name: version(name) for name in ("clarabel", "cvxpy", "numpy", "scipy")}
-    kernels = {each.get("architecture", "unknown") for each in threadpool_info()}
-    return {**versions, "kernels": ", ".join(sorted({KERNELS.get(name, name) for name in kernels}))}
+    own = [each for each in threadpool_info() if "scipy_openblas" in each.get("prefix", "")]
+    kernels = {KERNELS.get(each["architecture"], each["architecture"]) for each in own}
+    return {**versions, "kernels": ", ".join(sorted(kernels))}
 
 
 def recorded_here() -> bool:
