@@ -119,7 +119,9 @@ def tension_path(
     if not reached.outcome.solved:
         return None
     part = float(reached.t[0]) / size
-    if not _holds(start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK):
+    if not programs.holds(
+        start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK
+    ):
         return None
     part = min(max(part, 0.0), 1.0)
     if part >= 1.0 - SLACK:
@@ -194,13 +196,6 @@ def _pinned(
 def _least(data: StanceData, still: float) -> float | None:
     """Return the least utilisation; ``still`` is what hands use that are left out."""
     outcome = programs.margin(data)
-    if not (outcome.solved and _holds(data, outcome.loads, outcome.value + SLACK)):
+    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + SLACK)):
         return None
     return max(outcome.value, still)
-
-
-def _holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
-    """Whether loads balance, and keep to hard rows and to limits at the cap."""
-    error = np.abs(programs.body_wrench(data, loads) - data.wrench).max()
-    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
-    return balances and programs.beyond(data, loads, cap) <= SLACK

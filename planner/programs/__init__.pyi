@@ -18,6 +18,7 @@ from .solvers import (
     SLACK as SLACK,
     curved as curved,
     effort as effort,
+    holds as holds,
     least_tensions as least_tensions,
     load_factor as load_factor,
     margin as margin,

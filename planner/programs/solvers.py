@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from hand_models.base import Array
 from planner import deadline
 from planner.programs.conic import LATE, Outcome, Reached
@@ -18,12 +20,13 @@ from planner.programs.program import (
     TieBreak,
     Unique,
 )
-from planner.programs.stance_data import StanceData
+from planner.programs.stance_data import StanceData, beyond, body_wrench
 
 __all__ = [
     "SLACK",
     "curved",
     "effort",
+    "holds",
     "least_tensions",
     "load_factor",
     "margin",
@@ -96,3 +99,10 @@ def nearest(data: StanceData) -> Outcome:
 def nearest_body(data: StanceData) -> Outcome:
     """Solve `Nearest` with all given wrenches of hands kept."""
     return Nearest(data, len(data.wrench) - 6).solve()
+
+
+def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+    """Whether loads y balance, and keep to hard rows and to limits at a cap, within `SLACK`."""
+    error = np.abs(body_wrench(data, loads) - data.wrench).max()
+    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
+    return balances and beyond(data, loads, cap) <= SLACK

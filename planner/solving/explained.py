@@ -43,8 +43,8 @@ from planner.result import (
 )
 from planner.solving import dual_bounds
 from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
-from planner.solving.prepared_checks import PreparedChecks
-from planner.solving.solution import Reading, Solution
+from planner.solving.prepared_checks import PreparedChecks, Reading
+from planner.solving.solution import Solution
 from planner.solving.unique_plan import is_least
 from planner.solving.why_not import given_wrench, overload, unexplained
 

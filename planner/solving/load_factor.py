@@ -120,10 +120,5 @@ def _most(hands: HandSets, data: StanceData) -> float | None:
     result = programs.load_factor(data)
     if not result.solved:
         return None
-    scaled = data.turned(hands.goal(result.value))
-    error = programs.body_wrench(scaled, result.loads) - scaled.wrench
-    used = max(
-        float(np.max(hand.L @ (y / hand.unit) + hand.l0, initial=0.0))
-        for hand, y in zip(data.hands, result.loads, strict=True)
-    )
-    return max(result.value, 0.0) if np.abs(error).max() <= SLACK and used <= 1.0 + SLACK else None
+    held = programs.holds(data.turned(hands.goal(result.value)), result.loads, 1.0)
+    return max(result.value, 0.0) if held else None

@@ -19,10 +19,9 @@ from planner.result import (
     WristPlan,
     recover_floating_hand,
 )
-from planner.solving.solution import Reading
 from planner.verification import Check
 
-__all__ = ["PreparedChecks", "prepare_checks", "read_loads"]
+__all__ = ["PreparedChecks", "Reading", "prepare_checks", "read_loads"]
 
 
 class PreparedChecks(NamedTuple):
@@ -82,6 +81,38 @@ def _idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
         if limb not in prepared.limbs
         for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)
     )
+
+
+class Reading(NamedTuple):
+    """What loads do, recovered and checked.
+
+    Attributes
+    ----------
+    loads : tuple of ndarray
+        y of each hand.
+    arrays : PlanArrays
+        The plan's numbers.
+    hands : tuple of HandPlan
+        The same hand by hand, where a wrist floats; none yet where none does.
+    used : ndarray, shape (sum of nl,)
+        Utilisation of every limit row, hand by hand.
+    effort : float
+    utilisation : float
+        The largest of the hands.
+    whole : float
+        The largest of these, and of the joints of limbs without a hand.
+    wrong : tuple of str
+        What the check says is wrong with it.
+    """
+
+    loads: tuple[Array, ...]
+    arrays: PlanArrays
+    hands: tuple[HandPlan, ...]
+    used: Array
+    effort: float
+    utilisation: float
+    whole: float
+    wrong: tuple[str, ...]
 
 
 def read_loads(

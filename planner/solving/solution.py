@@ -1,50 +1,19 @@
-"""What solving a prepared stance comes to, and what is read of its loads."""
+"""The plan that is asked for: of fixed wrists, of floating ones, and that of least effort."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from hand_models.base import Array
-from planner.deadline import Unfinished
-from planner.floating import LargestFactor, WristSolution
-from planner.prepare import Sets
-from planner.programs import Outcome
-from planner.result import HandPlan, PlanArrays
+from planner import deadline, programs
+from planner.deadline import Budget, Overlap, Unfinished, late
+from planner.floating import LargestFactor, WristSolution, least_effort, least_use, with_room
+from planner.prepare import PreparedStance, Sets
+from planner.programs import SLACK, Outcome
+from planner.solving.prepared_checks import PreparedChecks, Reading, read_loads
+from planner.solving.unique_plan import least_utilisation
 
-__all__ = ["Reading", "Solution"]
-
-
-class Reading(NamedTuple):
-    """What loads do, recovered and checked.
-
-    Attributes
-    ----------
-    loads : tuple of ndarray
-        y of each hand.
-    arrays : PlanArrays
-        The plan's numbers.
-    hands : tuple of HandPlan
-        The same hand by hand, where a wrist floats; none yet where none does.
-    used : ndarray, shape (sum of nl,)
-        Utilisation of every limit row, hand by hand.
-    effort : float
-    utilisation : float
-        The largest of the hands.
-    whole : float
-        The largest of these, and of the joints of limbs without a hand.
-    wrong : tuple of str
-        What the check says is wrong with it.
-    """
-
-    loads: tuple[Array, ...]
-    arrays: PlanArrays
-    hands: tuple[HandPlan, ...]
-    used: Array
-    effort: float
-    utilisation: float
-    whole: float
-    wrong: tuple[str, ...]
+__all__ = ["Solution", "solve_effort", "solve_fixed", "solve_floating", "solve_in_two"]
 
 
 class Solution(NamedTuple):
@@ -110,3 +79,124 @@ class Solution(NamedTuple):
     def late(self, *names: Unfinished) -> Solution:
         """Return the same with something more that is not finished."""
         return self._replace(unfinished=self.unfinished + names)
+
+
+def solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> Solution:
+    """Return the plan of least utilisation, of these that of least tensions.
+
+    One solve has its utilisation, and mostly its active rows, which give its last digits; else
+    a second solve has these. What reads and checks the loads is prepared meanwhile.
+    """
+    sets, cap = prepared.at_rest, prepared.question.limits.utilisation
+    with checks:
+        found = least_utilisation(sets.data)
+    first = Solution(sets, found.outcome, cap, bound=found.bound if found.proven else None)
+    if found.proven:
+        if found.loads is None:
+            first = _tie_broken(prepared, checks.result(), first)
+        else:
+            reading = read_loads(prepared, checks.result(), sets, found.loads)
+            first = first._replace(reading=reading)
+        if not first.wrong:
+            return first
+    second = solve_in_two(prepared, checks, sets)
+    second = second._replace(unfinished=first.unfinished + second.unfinished)
+    if found.outcome.solved and not second.outcome.solved and deadline.expired():
+        reading = read_loads(prepared, checks.result(), sets, found.outcome.loads)
+        return first._replace(reading=reading).late("least_utilisation")
+    return second
+
+
+def solve_in_two(prepared: PreparedStance, checks: Overlap[PreparedChecks], sets: Sets) -> Solution:
+    """Return the plan of least effort among those of the very least utilisation."""
+    cap, outcome = prepared.question.limits.utilisation, programs.margin(sets.data)
+    found = Solution(sets, outcome, cap)
+    return _tie_broken(prepared, checks.result(), found) if outcome.solved else found
+
+
+def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:
+    """Return the plan of least tensions among those of least utilisation."""
+    sets = found.sets
+    tidy = programs.least_tensions(sets.data, found.outcome.value)
+    if tidy.solved:
+        found = found._replace(reading=read_loads(prepared, checks, sets, tidy.loads))
+    else:
+        found = found.late(*late("tie_break"))
+    if not tidy.solved or found.wrong:
+        found = found._replace(reading=read_loads(prepared, checks, sets, found.outcome.loads))
+    return found
+
+
+def solve_floating(
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget
+) -> Solution:
+    """Find where floating wrists go, and return the plan there."""
+    search, factor = least_use(prepared.hands, budget)
+    found = Solution(
+        sets=prepared.at_rest,
+        outcome=search.outcome,
+        cap=prepared.question.limits.utilisation,
+        search=search,
+        least_use=search,
+        factor=factor,
+        unfinished=late("wrists"),
+    )
+    if search.exact:
+        return _with_wrists(prepared, checks, found, search)
+    return found._replace(sets=prepared.hands.sets(search.point))
+
+
+def _with_wrists(
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    found: Solution,
+    search: WristSolution,
+) -> Solution:
+    """Return a solution with floating wrists, and the plan, where a search has found them."""
+    reading = read_loads(prepared, checks.result(), search.sets, search.point.loads, search)
+    return found._replace(sets=search.sets, search=search, reading=reading)
+
+
+def solve_effort(
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    found: Solution,
+    budget: Budget,
+) -> Solution:
+    """Return the plan of least effort, if any is within the cap; else the one that was found."""
+    if not found.passes:
+        return found
+    if found.search is not None:
+        return _solve_floating_effort(prepared, checks, found, found.search, budget)
+    cap = prepared.question.limits.utilisation
+    if found.outcome.value > cap + SLACK:
+        return found
+    # where the least utilisation is the cap itself, rounding must not empty the set
+    cap = max(cap, found.outcome.value + 0.5 * SLACK)
+    effort = programs.effort(found.sets.data, cap)
+    if not effort.solved and deadline.expired():
+        return found._replace(cap=cap).late("least_effort")
+    found = found._replace(cap=cap, effort=effort)
+    if not effort.solved:
+        return found
+    return found._replace(reading=read_loads(prepared, checks.result(), found.sets, effort.loads))
+
+
+def _solve_floating_effort(
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    found: Solution,
+    plan: WristSolution,
+    budget: Budget,
+) -> Solution:
+    """Return the plan of least effort that floating wrists come to from that of least use."""
+    cap, used = prepared.question.limits.utilisation, plan.measure.utilisation
+    if used > cap + SLACK:
+        return found
+    cap = with_room(cap, used)
+    search = least_effort(prepared.hands, plan, cap, budget)
+    found = found._replace(cap=cap).late(*late("least_effort"))
+    if not search.outcome.solved and deadline.expired():
+        return found
+    effort = search.outcome if search.outcome.solved else None
+    return _with_wrists(prepared, checks, found._replace(effort=effort), search)

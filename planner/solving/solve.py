@@ -5,22 +5,20 @@ from __future__ import annotations
 import time
 from functools import partial
 
+from hand_models.base import Array, finite_vector
 from planner import deadline
 from planner.deadline import Budget, Overlap
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.question import Question
+from planner.question import Question, checked_body_wrench
 from planner.result import Plan, Time
-from planner.solving.effort import solve_effort
 from planner.solving.explained import explained_plan
-from planner.solving.fixed import solve_fixed
-from planner.solving.floating import solve_floating
 from planner.solving.load_factor import FoundFactor, find_load_factor
 from planner.solving.prepared_checks import PreparedChecks, prepare_checks
-from planner.solving.solution import Solution
+from planner.solving.solution import Solution, solve_effort, solve_fixed, solve_floating
 from planner.solving.why_not import look_again
 
-__all__ = ["plan", "plan_on"]
+__all__ = ["KnownStance", "plan", "plan_on"]
 
 
 def plan(question: Question) -> Plan:
@@ -89,3 +87,47 @@ def _solve(prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Bu
     if prepared.question.objective == "min_effort":
         found = solve_effort(prepared, checks, found, budget)
     return found
+
+
+class KnownStance:
+    """A stance on its holds, for a planner that asks about one body wrench after the other.
+
+    Hands are settled, joints found and sets computed once; a query pays for its solver and for the
+    check of its plan.
+
+    Parameters
+    ----------
+    question : Question
+        The stance, and what is asked of it; limits, objective and extras hold for every wrench.
+        Its joints' torques stay those of its load.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question cannot be understood; its ``field`` is relative to the question.
+    """
+
+    def __init__(self, question: Question) -> None:
+        self.prepared = prepared = prepare_stance(question)
+        self._checks: PreparedChecks | None = None
+        # what joints bear changes with the wrench
+        if prepared.where is None and question.stance.joints is None and not prepared.floating:
+            self._checks = prepare_checks(prepared)
+
+    def plan(self, body_wrench: Array) -> Plan:
+        """Answer for another body wrench, as `planner.solving.plan` would.
+
+        Parameters
+        ----------
+        body_wrench : ndarray, shape (6,)
+            In B [N, N·m].
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not six finite numbers, or absurdly large.
+        """
+        start = time.perf_counter()
+        wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
+        with deadline.within(self.prepared.question.deadline, started=start):
+            return plan_on(self.prepared.turned(wrench), start, self._checks)

@@ -14,10 +14,8 @@ from planner.explanation import LimitUse, certify, certify_idle
 from planner.prepare import PreparedStance
 from planner.programs import SLACK, Outcome
 from planner.result import Certificate
-from planner.solving.effort import solve_effort
-from planner.solving.fixed import solve_in_two
 from planner.solving.prepared_checks import PreparedChecks
-from planner.solving.solution import Solution
+from planner.solving.solution import Solution, solve_effort, solve_in_two
 
 __all__ = ["given_wrench", "look_again", "overload", "unexplained"]
 

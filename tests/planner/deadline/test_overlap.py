@@ -118,5 +118,6 @@ def test_a_plan_is_read_and_checked_by_what_was_prepared_beside_its_solver(monke
     assert threads[0] != me()
     # of a stance that is known, it is known, too
     known = KnownStance(question)
+    assert threads[1:] == [me()]
     assert known.plan(known.prepared.wrench).utilisation == found.utilisation
-    assert len(threads) == 1
+    assert len(threads) == 2
