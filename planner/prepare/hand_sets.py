@@ -172,9 +172,9 @@ class HandSets:
         return are_own(self.wrists, self.added)
 
     @cached_property
-    def _fixed(self) -> tuple[HandData, ...]:
+    def _fixed(self) -> StanceData:
         """Data of hands with a fixed wrist; of floating ones a place to fill."""
-        return hands_data(self.scaled, self.transports, self.held)
+        return StanceData(hands_data(self.scaled, self.transports, self.held), self.wrench)
 
     def with_sets(self, spaces: Sequence[WrenchSpace]) -> HandSets:
         """Return the same stance with other sets of its hands."""
@@ -185,8 +185,8 @@ class HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
         aims = self.wrench[len(wrench) :]
         other = replace(self, wrench=np.concatenate([wrench / programs.WRENCH_UNIT, aims]))
-        # the same data, too, so that a solver sees what is new
-        other.__dict__["_fixed"] = self._fixed
+        # the same rows, too
+        other.__dict__["_fixed"] = self._fixed.turned(other.wrench)
         return other
 
     @property
@@ -216,9 +216,9 @@ class HandSets:
             With a range, how far from rest each wrist's twist may be [m, rad].
         """
         if not self.floating:
-            return Sets(self.spaces, StanceData(self._fixed, self.goal(point.factor)))
+            return Sets(self.spaces, self._fixed.turned(self.goal(point.factor)))
         reach = None if within is None else within * TWIST_UNIT
-        spaces, data = list(self.spaces), list(self._fixed)
+        spaces, data = list(self.spaces), list(self._fixed.hands)
         for i, (wrist, y, palm) in enumerate(
             zip(self.wrists, point.loads, point.palms, strict=True)
         ):

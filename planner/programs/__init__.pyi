@@ -35,6 +35,7 @@ from .stance_data import (
     beyond as beyond,
     body_wrench as body_wrench,
     hands_data as hands_data,
+    parted as parted,
     used as used,
     used_effort as used_effort,
 )

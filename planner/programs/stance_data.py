@@ -6,9 +6,10 @@ Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ __all__ = [
     "beyond",
     "body_wrench",
     "hands_data",
+    "parted",
     "used_effort",
 ]
 
@@ -241,9 +243,14 @@ class StanceData:
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
         turned = StanceData(self.hands, wrench)
-        if "rows" in self.__dict__:
-            turned.__dict__["rows"] = self.rows
+        turned.__dict__["rows"] = self.rows
         return turned
+
+
+def parted(whole: Array, sizes: Iterable[int]) -> tuple[Array, ...]:
+    """Return the parts of an array, one after another, of these sizes."""
+    ends = list(accumulate(sizes, initial=0))
+    return tuple([whole[begin:end] for begin, end in pairwise(ends)])
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:

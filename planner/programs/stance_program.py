@@ -30,7 +30,7 @@ from planner.programs.conic import (
     Outcome,
     Solver,
 )
-from planner.programs.stance_data import Columns, StanceData
+from planner.programs.stance_data import Columns, StanceData, parted
 
 __all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "Definition", "StanceProgram"]
 
@@ -105,7 +105,8 @@ class StanceProgram(ABC):
         self.data = data
         rows, balance = data.rows, len(data.wrench)
         self.G = rows.whole[:balance]
-        self.L, self.H = np.split(rows.whole[balance:], [rows.limits])
+        hard = balance + rows.limits
+        self.L, self.H = rows.whole[balance:hard], rows.whole[hard:]
         self.size = len(rows.unit)
         self.l0, self.h = -rows.rest[: rows.limits], rows.rest[rows.limits :]
 
@@ -195,10 +196,8 @@ class StanceProgram(ABC):
         duals: tuple[Array, ...] = ()
         if found.multipliers is not None:
             balance = found.multipliers[program.above : program.above + len(self.G)]
-            limits, hard, _ = np.split(
-                found.multipliers[program.zero :], np.cumsum([len(self.L), len(self.H)])
-            )
-            duals = balance, limits, hard
+            others = found.multipliers[program.zero :]
+            duals = balance, *parted(others, [len(self.L), len(self.H)])
         return self._read(found.status, found.iterations, found.value, found.x, duals)
 
     def _by_definition(self) -> tuple[Outcome, Array | None]:
@@ -248,4 +247,4 @@ class StanceProgram(ABC):
 def _by_hand(whole: Array | None, sizes: Sequence[int]) -> tuple[Array, ...]:
     if whole is None or not sizes:
         return ()
-    return tuple(np.split(whole, np.cumsum(sizes)[:-1]))
+    return parted(whole, sizes)

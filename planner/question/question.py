@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, finite_vector
+from hand_models.base import Array, InvalidInputError, finite_vector, skew
 from hand_models.hand import FINGERS
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
@@ -66,7 +66,7 @@ class Load:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-        return checked_body_wrench(np.concatenate([force, np.cross(com, force)]), None)
+        return checked_body_wrench(np.concatenate([force, skew(com) @ force]), None)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 
 from hand_models.base import Array
 from planner.prepare import concatenated
-from planner.programs import Outcome, StanceData, tie_weight
+from planner.programs import Outcome, StanceData, parted, tie_weight
 
 __all__ = ["ActiveSetOptimum", "active_set_optimum"]
 
@@ -146,8 +146,7 @@ def active_set_optimum(
             continue
         if found is None:
             break
-        ends = np.cumsum([len(hand.unit) for hand in hands[:-1]])
-        loads = tuple(np.split(found.z * unit, ends))
+        loads = parted(found.z * unit, [len(hand.unit) for hand in hands])
         return ActiveSetOptimum(loads, found.u, 0.5 * float(Q @ found.z**2))
     return None
 

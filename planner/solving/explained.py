@@ -124,10 +124,7 @@ def explained_plan(
         path=told.path,
         verified=told.status != "failed",
         reason=told.reason,
-        warnings=(
-            *checks.oddities,
-            *_warnings(prepared, found, factor, told, unfinished),
-        ),
+        warnings=(*checks.oddities, *_warnings(prepared, found, factor, told, unfinished)),
         solver=Solver(SOLVER, found.outcome.status, found.outcome.iterations),
         time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=unfinished,

@@ -217,7 +217,7 @@ class WrenchStream:
         for proof in self._proofs:
             if float(proof.direction @ wrench) > proof.most:
                 return SetPoints("infeasible", wrench, verified=True, reason=NO_PLAN)
-        plan = self._stance.plan(wrench)
+        plan = self._stance.known.plan(wrench)
         if plan.hands is not None and plan.utilisation is not None:
             # of the nearest wrench that can be had: a hair off, by rounding
             loads = self._stance.loads_of(plan)

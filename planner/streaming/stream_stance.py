@@ -67,6 +67,8 @@ class StreamStance:
 
     Attributes
     ----------
+    known : KnownStance
+        What has the whole plan of a wrench, or the proof that there is none.
     first : ndarray, shape (6,)
         That body wrench, in B [N, N·m].
     cap : float
@@ -93,7 +95,7 @@ class StreamStance:
         if question.body_wrench is None:
             # whatever accelerates now does not do so in the wrenches to come
             known = KnownStance(replace(question, body_wrench=known.prepared.wrench))
-        self._known, prepared = known, known.prepared
+        self.known, prepared = known, known.prepared
         self.first = prepared.wrench
         self.cap = question.limits.utilisation
         self.limbs = tuple(hand.limb for hand in question.stance.hands)
@@ -134,10 +136,6 @@ class StreamStance:
     def affine_bound(self, body_wrench: Array, solved: Solved) -> AffineBound | None:
         """Return what the solver's answer proves for every wrench."""
         return affine_bound(self._data.turned(self._scaled(body_wrench)), solved.outcome)
-
-    def plan(self, body_wrench: Array) -> Plan:
-        """Return the whole plan of a wrench, or the proof that there is none."""
-        return self._known.plan(body_wrench)
 
     def proof(self, plan: Plan) -> SupportBound | None:
         """Return what the proof of a plan that is infeasible says of other wrenches."""

@@ -161,7 +161,7 @@ def test_a_proof_serves_all_the_wrenches_that_it_is_for(monkeypatch):
     with WrenchStream(BARE) as stream:
         first = stream.set_points(UP)
         assert (first.status, first.verified) == ("infeasible", True)
-        monkeypatch.setattr(StreamStance, "plan", None)
+        monkeypatch.setattr(KnownStance, "plan", None)
         second = stream.set_points(2.0 * UP)
         assert (second.status, second.verified, second.tensions) == ("infeasible", True, None)
         assert stream.set_points(OFF).status == "optimal"
