@@ -66,7 +66,8 @@ class Load:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-        return checked_body_wrench(np.concatenate([force, skew(com) @ force]), None)
+            moment = skew(com) @ force
+        return checked_body_wrench(np.concatenate([force, moment]), None)
 
 
 @dataclass(frozen=True)
