@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hand_models.base import stores
-from service import processes as proc
+from planner import processes as proc
 from service.answering import dispatch
 from tests.load.asking import (
     PLAN,
