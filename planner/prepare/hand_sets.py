@@ -44,14 +44,11 @@ __all__ = [
 DIFFERENCE: Final = 1e-3
 """Step of the differences of slopes, in `TWIST_UNIT`."""
 
-
 FARTHEST: Final = 50.0
 """Farthest that a wrist may go from rest, in `TWIST_UNIT`: beyond, no twist is small."""
 
-
 BALANCED: Final = 2e-8
 """Largest missing body wrench of a point that is exact, relative, per `WRENCH_UNIT`."""
-
 
 UNBROKEN: Final = 1e-8
 """By how much hard rows of an exact point may be broken, in `stance_data.LOAD_UNIT`."""

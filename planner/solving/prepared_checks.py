@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -66,9 +67,7 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
 def _recovery(prepared: PreparedStance) -> LoadRecovery:
     batch, hands = prepared.batch, prepared.hands
 
-    def made() -> LoadRecovery:
-        return LoadRecovery(batch, hands.spaces, hands.scaled)
-
+    made = partial(LoadRecovery, batch, hands.spaces, hands.scaled)
     cap = prepared.question.limits.tendon_tension
     return made() if hands.own else RECOVERIES.get((batch.hands, cap), made)
 

@@ -51,6 +51,10 @@ def schema() -> dict[str, Any]:
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
     )
+    for part in parts.values():
+        # of a docstring that says more, its first sentence
+        if "description" in part:
+            part["description"] = part["description"].partition("\n\n")[0]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Messages of crux, version 1",
