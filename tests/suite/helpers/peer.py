@@ -86,8 +86,8 @@ def rows(question: Question, sets: list[WrenchSpace] | None = None) -> Rows:
 
 def solve(cost, A, b, E=None, e=None, bounds=(None, None)) -> OptimizeResult:
     """min cost · x with A x ≤ b and E x = e."""
-    # the presolve of an older HiGHS leaves some of these undecided
-    for presolve in (True, False):
+    # the presolve of an older HiGHS leaves some of these undecided, its simplex method others
+    for method, presolve in (("highs", True), ("highs", False), ("highs-ipm", True)):
         found = linprog(
             cost,
             A_ub=A,
@@ -95,7 +95,7 @@ def solve(cost, A, b, E=None, e=None, bounds=(None, None)) -> OptimizeResult:
             A_eq=E,
             b_eq=e,
             bounds=bounds,
-            method="highs",
+            method=method,
             options={**TOLERANCES, "presolve": presolve},
         )
         if found.status in DECIDED:
