@@ -30,7 +30,7 @@ from .study_result import (
     Claim as Claim,
     StudyResult as StudyResult,
     part as part,
-    told as told,
+    track as track,
 )
 from .sweep import (
     Sweep as Sweep,

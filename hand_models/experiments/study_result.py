@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 
 from hand_models.base import Progress
 
-__all__ = ["Claim", "StudyResult", "part", "told"]
+__all__ = ["Claim", "StudyResult", "part", "track"]
 
 Item = TypeVar("Item")
 
@@ -60,7 +60,7 @@ class StudyResult:
     hand: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def told(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
+def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
     """Yield items, and tell how many of them are done."""
     for done, item in enumerate(items):
         progress(done, len(items))

@@ -25,7 +25,7 @@ from hand_models.experiments.force_limits import (
     sharpened,
 )
 from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend, panels
-from hand_models.experiments.study_result import StudyResult, told
+from hand_models.experiments.study_result import StudyResult, track
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
@@ -108,7 +108,7 @@ def sweep_map(
     conditions.gripper(table)
     cells = [
         sweep_cell(y.set(x.set(table, across), up), conditions, measures)
-        for up, across in told(progress, list(itertools.product(y.values, x.values)))
+        for up, across in track(progress, list(itertools.product(y.values, x.values)))
     ]
     shape = len(y.values), len(x.values)
     state = np.array([cell["state"] for cell in cells]).reshape(shape)

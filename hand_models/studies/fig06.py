@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, told
+from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
 from hand_models.parameters import ParameterTable
 from hand_models.tendon import share_load
 
@@ -45,7 +45,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         *(partial(_configuration, experiment, pair) for pair in loaded),
         *(partial(_curve, experiment, pair) for pair in pairs),
     ]
-    found = [job() for job in told(progress, jobs)]
+    found = [job() for job in track(progress, jobs)]
     data = {
         "contact_springs": experiment.springs,
         "preload_stiffness": experiment.preload_stiffness,

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, told
+from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
 from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["plot", "run"]
@@ -40,7 +40,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     others = [replace(experiment, preload_stiffness=stiffness) for stiffness in tried]
     configurations, *for_others = (
         [_configuration(each, sequence) for sequence in sequences]
-        for each in told(progress, [experiment, *others])
+        for each in track(progress, [experiment, *others])
     )
     unlike = _unlike(configurations)
     data: dict[str, Any] = {

@@ -31,7 +31,7 @@ from hand_models.experiments import (
     panels,
     rest_state,
     sharpened,
-    told,
+    track,
     volume,
 )
 from hand_models.parameters import ParameterTable, experiment_table
@@ -74,7 +74,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     tried = np.linspace(least, most, TENSIONS)
     diameters = settings.vector(PARAMETER_STUDIES, "diameters")
     each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
-    found = [_at(conditions.gripper(table)) for conditions in told(progress, each)]
+    found = [_at(conditions.gripper(table)) for conditions in track(progress, each)]
     curves = []
     for i, diameter in enumerate(diameters):
         rows = found[i * TENSIONS : (i + 1) * TENSIONS]

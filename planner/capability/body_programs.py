@@ -85,16 +85,16 @@ class BodyPrograms:
         _, self._hands = assemble(self.question, where, self.plan.body_wrench)
         self._point = _where_planned(self._hands, self.plan)
         self.exact = not self._hands.floating
-        self.data = _data(self.question, where, self._hands, self._point)
+        self._spaces, data = self._hands.sets(self._point)
+        self.data = _with_idle(data, question, where)
         self.motion = _motion(self.question, where, self._point)
         limbs = [hand.limb for hand in question.stance.hands]
-        spaces = self._hands.sets(self._point).spaces
         self._names = [
             [limit_name(limb, row) for row in space.rows[: len(space.s)]]
-            for limb, space in zip(limbs, spaces, strict=True)
+            for limb, space in zip(limbs, self._spaces, strict=True)
         ]
-        for limb in _idle_limbs(question, where):
-            own = question.stance.robot.chains[limb].joints
+        for limb, joints in ({} if where is None else where.idle(question.stance)).items():
+            own = joints.names
             self._names[0] += [joint_name(limb, name) for name in (*own, *own)]
 
     @property
@@ -173,7 +173,7 @@ class BodyPrograms:
         """
         if self.exact:
             return 0.0
-        spaces, worst = self._hands.sets(self._point).spaces, 0.0
+        spaces, worst = self._spaces, 0.0
         for loads in ends:
             deadline.check(MISSING)
             there = self._hands.sets(replace(self._point, loads=tuple(loads))).spaces
@@ -227,22 +227,10 @@ def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
     return LinearisationPoint(tuple(loads), tuple(palms))
 
 
-def _idle_limbs(question: Question, where: Posture | None) -> list[str]:
-    """Return the limbs without a hand whose joints are known."""
-    limbs = {hand.limb for hand in question.stance.hands}
-    return [] if where is None else [limb for limb in where.joints if limb not in limbs]
-
-
-def _data(
-    question: Question, where: Posture | None, hands: HandSets, point: LinearisationPoint
-) -> StanceData:
-    """Return the hands about a point; with the first, rows of limbs without one."""
-    data = hands.sets(point).data
-    first = data.hands[0]
-    idle = []
-    for limb in _idle_limbs(question, where):
-        assert where is not None
-        joints = where.joints[limb]
+def _with_idle(data: StanceData, question: Question, where: Posture | None) -> StanceData:
+    """Return the hands; with the first, rows of limbs without one."""
+    first, idle = data.hands[0], []
+    for joints in () if where is None else where.idle(question.stance).values():
         idle += [joints.gravity / joints.limits, -joints.gravity / joints.limits]
     l0 = np.concatenate([first.l0, *idle])
     L = np.pad(first.L, ((0, len(l0) - len(first.l0)), (0, 0)))
@@ -264,7 +252,7 @@ def _motion(question: Question, where: Posture | None, point: LinearisationPoint
         there = None if where is None else posture_at(moving, where.angles)
         wrench = moving.needed_wrench(None if there is None else there.body_wrench)
         _, hands = assemble(moving, there, wrench)
-        found.append(_data(moving, there, hands, point))
+        found.append(_with_idle(hands.sets(point).data, moving, there))
     rest, *others = found
     return Motion(
         rest,

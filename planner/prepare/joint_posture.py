@@ -49,6 +49,11 @@ class Posture:
     joints: Mapping[str, JointLoads]
     body_wrench: Array
 
+    def idle(self, stance: Stance) -> dict[str, JointLoads]:
+        """Return what the joints bear of limbs that have no hand in a stance."""
+        holding = {hand.limb for hand in stance.hands}
+        return {limb: joints for limb, joints in self.joints.items() if limb not in holding}
+
 
 def posture(question: Question) -> Posture | None:
     """Return where a question's joints are; None if nothing is said of them.

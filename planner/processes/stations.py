@@ -34,9 +34,6 @@ ROOM: Final = 2**14
 PART: Final = 2**13
 """Bytes of an answer that are sent at once: so few that no process can be stopped within them."""
 
-LAST_MOMENT: Final = 0.2
-"""Longest time between the end of a process's pipes and its own [s]."""
-
 UNREADY: Final = 70
 """Exit status of a process that cannot be made ready to answer."""
 
@@ -170,15 +167,16 @@ class Station(Generic[T, R]):
         """Whether it has said that it can work."""
         return all(lane.ready for lane in self.lanes)
 
-    def kill(self, *, dead: bool = False) -> int | None:
+    def kill(self, patience: float = 0.0) -> int | None:
         """End it, whatever it does; return its exit status, or None if it was alive.
 
         Parameters
         ----------
-        dead : bool, optional
-            Whether it has ended by itself: its pipes tell of that a moment earlier than the system.
+        patience : float, optional
+            How long to wait for one that has ended by itself: its pipes tell of that a moment
+            earlier than the system [s].
         """
-        self.process.join(LAST_MOMENT if dead else 0.0)
+        self.process.join(patience)
         died = self.process.exitcode
         self.process.kill()
         self.process.join()

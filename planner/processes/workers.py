@@ -183,8 +183,7 @@ class Workers(Generic[T, R]):
 
     def _bury(self, lane: Numbered[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
-        lane.station.process.join(PATIENCE)
-        status = self._dismiss(lane)
+        status = self._dismiss(lane, PATIENCE)
         how = _ending(status)
         if not lane.ready:
             self.stillborn += 1
@@ -195,9 +194,9 @@ class Workers(Generic[T, R]):
                 log.warning(self._unborn)
         return how
 
-    def _dismiss(self, lane: Numbered[T, R]) -> int | None:
+    def _dismiss(self, lane: Numbered[T, R], patience: float = 0.0) -> int | None:
         del self.hands[lane]
-        return lane.station.kill()
+        return lane.station.kill(patience)
 
 
 def _numbered(make: Make[T, R]) -> Callable[[tuple[int, T]], tuple[int, R]]:

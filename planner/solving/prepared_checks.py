@@ -66,7 +66,6 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
 
 def _recovery(prepared: PreparedStance) -> LoadRecovery:
     batch, hands = prepared.batch, prepared.hands
-
     made = partial(LoadRecovery, batch, hands.spaces, hands.scaled)
     cap = prepared.question.limits.tendon_tension
     return made() if hands.own else RECOVERIES.get((batch.hands, cap), made)
@@ -74,10 +73,10 @@ def _recovery(prepared: PreparedStance) -> LoadRecovery:
 
 def _idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
     where = prepared.where
+    idle = {} if where is None else where.idle(prepared.question.stance)
     return tuple(
         LimitUse(joint_name(limb, name), abs(float(torque)), float(most))
-        for limb, joints in ({} if where is None else where.joints).items()
-        if limb not in prepared.limbs
+        for limb, joints in idle.items()
         for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)
     )
 

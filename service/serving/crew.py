@@ -29,6 +29,9 @@ LONGEST_REST: Final = 30.0
 GROWN: Final = 700 * 2**20
 """Resident memory of a process that is replaced when it has nothing to do [bytes]."""
 
+LAST_MOMENT: Final = 0.2
+"""Longest time between the end of a process's pipes and its own [s]."""
+
 STREAMS_LANES: Final = 2
 """Of the process that has the streams: one for set-points, one for what else is short."""
 
@@ -151,7 +154,7 @@ class Crew:
             self.rests_until = time.perf_counter() + rest
             self.stillborn += 1
         left = [each for each in asked if each is not None and not each.replied]
-        return _ending(station.kill(dead=dead)), left
+        return _ending(station.kill(LAST_MOMENT if dead else 0.0)), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
