@@ -64,7 +64,8 @@ def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Arr
     forces[..., :2, :2] = _of_tiles(hands, "loads").swapaxes(2, 3)
     forces[..., 2, 2] = shares
     forces = (forces @ axes).reshape(*shares.shape, 1, 9)
-    arms = np.insert(places, 0, 1.0, axis=2)
+    arms = np.ones((*shares.shape, 4))
+    arms[..., 1:] = places
     of_tiles = (arms[..., None] * forces).reshape(*shares.shape, 36)
     # not as a product of matrices: its last digits would depend on how many hands there are
     sums = _of_fingers(layout, of_tiles).reshape(len(hands), TENDONS, 4, 3, 3)

@@ -152,7 +152,8 @@ class Columns(NamedTuple):
         """Leave the zeros of a matrix out."""
         height, width = matrix.shape
         flat = matrix.T.ravel()
-        (places,) = flat.nonzero()
+        # of truth values they are found six times as fast as of numbers
+        (places,) = (flat != 0.0).nonzero()
         starts = places.searchsorted(height * np.arange(width + 1))
         return cls(flat.take(places), places % max(height, 1), starts)
 
@@ -200,20 +201,15 @@ class HandRows(NamedTuple):
         limits = sum(len(hand.l0) for hand in hands)
         whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
-        parts = []
         for hand in hands:
             m, nl, nh, _ = hand.shape
             right = left + m
             whole[:balance, left:right] = hand.G
             whole[limit : limit + nl, left:right] = hand.L
             whole[below : below + nh, left:right] = hand.H
-            own = Columns.of(np.concatenate([hand.G, hand.L, hand.H]))
-            skipped = np.array([0, limit - balance, below - balance - nl])
-            rows = own.rows + skipped.repeat([balance, nl, nh])[own.rows]
-            parts.append(own._replace(rows=rows))
             left, limit, below = right, limit + nl, below + nh
         tie = np.concatenate([hand.tie for hand in hands])
-        return cls(whole, Columns.beside(parts), rest, limits, unit, tie)
+        return cls(whole, Columns.of(whole), rest, limits, unit, tie)
 
 
 @dataclass(frozen=True, eq=False)
