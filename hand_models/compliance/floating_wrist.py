@@ -112,9 +112,14 @@ class FloatingWrist(CompliantGrasp):
         s[nl:] = structure.hand_load
         # in newtons of tension, so that rows stay commensurate
         pushed = [1.0 / max(abs(float(torque[1])), 1e-6) for _, _, torque in settled.stops]
-        those = [*range(tension, palm), *np.flatnonzero(settled.touching), *(n + layout.frames)]
+        touching = np.flatnonzero(settled.touching)
+        those = [*range(tension, palm), *touching, *(n + layout.frames)]
         Q = np.zeros((len(those) + len(pushed), size))
         Q[np.arange(len(those)), those] = -1.0
+        row, friction = palm - tension + np.arange(len(touching)), settled.surface.friction
+        Q[row, n + touching] = -friction
+        base = layout.bases
+        Q[row[np.isin(touching, base)], n + base + 1] = -friction * settled.engagement[base]
         Q[len(those) :, stop:] = -np.diag(pushed)
         return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q)
 
@@ -142,7 +147,12 @@ class FloatingWrist(CompliantGrasp):
             P = rows.P[np.ix_(mine, [*own, *n + phalanges, *2 * n + own])]
             with np.errstate(invalid="ignore"):
                 holds = (elements @ P.T <= rows.s[mine]).all(axis=1)
-                holds &= found.reached & (found.shears >= 0.0).all(axis=1)
+                pressed = found.normals
+                if len(own) > len(PHALANGES):
+                    share = self.hand.settled.engagement[own[0]]
+                    pressed = np.column_stack([share * pressed[:, 0], pressed])
+                drags = found.shears + self.hand.settled.surface.friction * pressed
+                holds &= found.reached & (drags >= 0.0).all(axis=1)
             left = left[holds]
         return left
 

@@ -9,7 +9,7 @@ lie on the boundary, and each tells which phalanx of which finger fails there.
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -40,6 +40,14 @@ HALVINGS: Final = 30
 
 EXTREMES: Final = 1024
 """Directions in which extreme wrenches are kept where a full hull would be too large."""
+
+CLOSER: Final = 9
+CLOSEST: Final = 2
+"""Rays sent about each of so many rays that reach farthest in a direction looked at closely."""
+
+CLOSER_ROUNDS: Final = 3
+NEARER: Final = 0.4
+"""How often, and by what share nearer to the last each time, from so near on."""
 
 FEWEST: Final = 2
 """Poses per axis of a grid."""
@@ -151,12 +159,46 @@ def _extremes(points: Array, directions: Array | None) -> Indices:
     return np.arange(len(points))
 
 
-def boundary(grasp: CompliantGrasp, box: SearchBox, rays: int) -> WristSearch:
+def boundary(
+    grasp: CompliantGrasp, box: SearchBox, rays: int, toward: Array | None = None
+) -> WristSearch:
     """Return the wrench space by rays from the middle of a box, evenly spread over its axes.
 
     Finer than a grid of as many poses where the poses that hold are seen from the middle.
+
+    Parameters
+    ----------
+    grasp : CompliantGrasp
+    box : SearchBox
+    rays : int
+    toward : ndarray, shape (k, 6), optional
+        Directions of the wrench in which the set is looked at more closely: about the rays that
+        reach farthest more are sent, ever nearer to them.
     """
-    return _pushed(grasp, box, _sphere(rays, len(box.centre)) * box.range, 0, 0)
+    d = len(box.centre)
+    ways = _sphere(rays, d)
+    found = _pushed(grasp, box, ways * box.range, 0, 0)
+    if toward is None:
+        return found
+    about, poses, limiting, wrenches = (
+        _sphere(CLOSER, d),
+        [found.poses],
+        [*found.limiting],
+        [found.wrenches],
+    )
+    for round_ in range(CLOSER_ROUNDS):
+        reaches = np.vstack(wrenches) @ toward.T
+        best = np.unique(np.argpartition(-reaches, CLOSEST, axis=0)[:CLOSEST])
+        more = (ways[best][:, None, :] + NEARER ** (round_ + 1) * about).reshape(-1, d)
+        more /= np.linalg.norm(more, axis=1, keepdims=True)
+        near = _pushed(grasp, box, more * box.range, 0, 0)
+        ways = np.vstack([ways, more])
+        poses.append(near.poses)
+        wrenches.append(near.wrenches)
+        limiting += near.limiting
+    return replace(
+        found, poses=np.vstack(poses), wrenches=np.vstack(wrenches), limiting=tuple(limiting)
+    )
 
 
 def _pushed(grasp: CompliantGrasp, box: SearchBox, t: Array, tried: int, held: int) -> WristSearch:

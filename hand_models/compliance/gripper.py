@@ -38,6 +38,7 @@ OWN: Final = {
     "pulley_radii": "finger",
     "seated_contact": "finger",
     "engagement": "tile",
+    "contact_stiffness": "tile",
 }
 """Entries of ``[gripper]`` that stand for the hand's own, and their section there."""
 
@@ -59,11 +60,6 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
     if hand is None:
         return table
     changed = hand.difference(bundled)
-    stiffness = changed.sections.get("tile", {}).get("contact_stiffness")
-    if stiffness is not None:
-        spread = [changed.scalar("tile", "contact_stiffness")] * len(PHALANGES)
-        each = Quantity(spread, stiffness.unit, stiffness.source, stiffness.note)
-        table = table.replaced(ParameterTable({"gripper": {"contact_stiffness": each}}))
     return table.replaced(changed)
 
 
@@ -82,6 +78,8 @@ class Gripper(CompliantGrasp):
         What a tile holds; the experiment's sandpaper by default.
     table : ParameterTable, optional
         From `gripper_table`.
+    most_pressing : float, optional
+        Of the wrenches that count as held, the largest F_z; any by default [N].
 
     Raises
     ------
@@ -97,11 +95,17 @@ class Gripper(CompliantGrasp):
         tension: float,
         surface: Surface | None = None,
         table: ParameterTable | None = None,
+        most_pressing: float = math.inf,
     ) -> None:
         if not (math.isfinite(diameter) and diameter > 0.0):
             raise InvalidInputError(f"must be above 0 m, got {diameter:g}", field="diameter")
         if not (math.isfinite(tension) and tension > 0.0):
             raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
+        if not most_pressing > 0.0:
+            raise InvalidInputError(
+                f"must be above 0 N, got {most_pressing:g}", field="most_pressing"
+            )
+        self.most_pressing = most_pressing
         self.table = table = table or gripper_table()
         self.surface = surface or sandpaper(table)
         self.half_spacing = spread = table.scalar("gripper", "base_half_spacing")
@@ -128,7 +132,6 @@ class Gripper(CompliantGrasp):
             self.section,
             replace(
                 tendon,
-                contact_stiffness=table.vector("gripper", "contact_stiffness"),
                 friction=max(table.scalar("tendon", "holding_friction"), tendon.friction),
                 entry_friction=table.scalar("gripper", "entry_friction"),
             ),
@@ -142,15 +145,19 @@ class Gripper(CompliantGrasp):
         tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
         each, pieces = np.eye(len(tiles)), inner_half_planes(self.surface)
         limits = [named_row(*tile, piece.limit, "limit") for tile in tiles for piece in pieces]
+        capped = math.isfinite(self.most_pressing)
+        cap = [named_row(None, None, "most_pressing", "limit")] if capped else []
         slopes = np.array([(piece.a_shear, piece.a_normal) for piece in pieces])
         hard = [named_row(*tile, "dragged_backwards", "hard") for tile in tiles]
         return LoadRows(
-            names=(*limits, *hard),
+            names=(*limits, *cap, *hard),
             P=np.hstack([np.kron(each, slopes[:, :1]), np.kron(each, slopes[:, 1:])]),
             p=np.zeros(len(limits)),
-            D=np.zeros((0, 6)),
-            s=np.array([piece.capacity for piece in pieces] * len(tiles)),
-            Q=np.hstack([-each, 0.0 * each]),
+            D=np.eye(6)[[2] * len(cap)],
+            s=np.array(
+                [piece.capacity for piece in pieces] * len(tiles) + [self.most_pressing] * len(cap)
+            ),
+            Q=np.hstack([-each, -self.surface.friction * each]),
         )
 
     def finger_loads(self, twists: Numbers) -> tuple[FingerLoads, FingerLoads]:
@@ -180,18 +187,19 @@ class Gripper(CompliantGrasp):
 
 
 def sandpaper(table: ParameterTable) -> Surface:
-    """Return what a tile holds on the experiment's sandpaper: T + k P = T_max under pull-off."""
+    """Return what a tile holds on the experiment's sandpaper: T + k P ≤ T_max and T ≥ μ P."""
     limit = table.scalar("gripper", "shear_limit")
     return pulled_off(Surface.from_values({"shear_limit": limit}), table)
 
 
 def pulled_off(surface: Surface, table: ParameterTable) -> Surface:
-    """Return a surface with the pull-off slope that the gripper's experiments ask for."""
+    """Return a surface with the pull-off slope and friction that the experiments ask for."""
     slope = table.scalar("gripper", "pull_off_slope")
     angle = surface.pull_off_angle
     values = {
         "shear_limit": surface.shear_limit,
         "pull_off_limit": surface.shear_limit / (math.cos(angle) + slope * math.sin(angle)),
         "lateral_limit": surface.lateral_limit,
+        "friction": table.scalar("gripper", "friction"),
     }
     return Surface.from_values(values)

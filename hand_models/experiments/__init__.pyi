@@ -7,6 +7,7 @@ from .force_limits import (
     rest_state as rest_state,
     sharpened as sharpened,
 )
+from .gripper_fit import Datum as Datum, GripperFit as GripperFit
 from .hard_stop import PalmExperiment as PalmExperiment
 from .pictures import (
     COLOURS as COLOURS,
@@ -44,9 +45,11 @@ from .wrench_hull import (
     Extents as Extents,
     clipped_vertices as clipped_vertices,
     distance_along as distance_along,
+    edge as edge,
     extents as extents,
     in_paper_signs as in_paper_signs,
     section as section,
     vertices as vertices,
     volume as volume,
+    with_mirrored as with_mirrored,
 )

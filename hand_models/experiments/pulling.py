@@ -31,7 +31,8 @@ __all__ = [
 
 DRAGGED: Final = "dragged_backwards"
 UNBALANCED: Final = "no_pose"
-"""How a load ends, where not at a tile's limit: a tile is without shear, or nothing balances."""
+"""How a load ends, where not at a tile's limit: a tile has less drag than it needs (`Surface`), or
+nothing balances."""
 
 NEWTON_STEPS: Final = 12
 """For each increment of the load, at most."""
@@ -172,7 +173,8 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
         holds = found.holds & balanced
         poses[i[holds]] = tried[holds]
         loads[i[holds]] += increments[i[holds]]
-        shears = np.concatenate([side.shears for side in gripper.finger_loads(tried)], axis=1)
+        friction, fingers = gripper.surface.friction, gripper.finger_loads(tried)
+        drags = np.concatenate([side.shears + friction * side.normals for side in fingers], axis=1)
         for k in np.flatnonzero(~holds):
             row = found.limiting[k]
             if not balanced[k]:
@@ -180,7 +182,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
             elif found.utilisation[k] > 1.0:
                 fails[i[k]] = (*tiles[row // (len(names) // len(tiles))], names[row])
             else:
-                fails[i[k]] = (*tiles[shears[k].argmin()], DRAGGED)
+                fails[i[k]] = (*tiles[drags[k].argmin()], DRAGGED)
         over = i[~holds]
         increments[over] *= 0.5
         going[over] = increments[over] >= FINEST

@@ -33,8 +33,8 @@ SANDPAPER: Final = "sandpaper-36"
 MOST_POINTS: Final = 201
 """Of an axis."""
 
-IDLE: Final = frozenset({("tile", "contact_stiffness"), ("tile", "base_engagement")})
-"""Entries that are read and do nothing: the gripper has its own stiffnesses, and no base tile."""
+IDLE: Final = frozenset({("tile", "base_engagement")})
+"""Entries that are read and do nothing: the gripper has no base tile."""
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,21 @@ __all__ = [
     "Extents",
     "clipped_vertices",
     "distance_along",
+    "edge",
     "extents",
     "in_paper_signs",
     "section",
     "vertices",
     "volume",
+    "with_mirrored",
 ]
 
 UNITS: Final = SCALE[list(PLANAR)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
+
+
+MIRROR: Final = (-1.0, 1.0, -1.0)
+"""What mirrors wrenches (F_x, F_z, M_y) of a gripper that is symmetric."""
 
 
 class Extents(NamedTuple):
@@ -52,6 +58,33 @@ def extents(points: Array) -> Extents:
     """Return how far some wrenches, shape (n, 3), go."""
     largest = np.abs(points).max(axis=0)
     return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
+
+
+def with_mirrored(points: Array) -> Array:
+    """Return wrenches (n, 3) of a symmetric gripper, and their images (−F_x, F_z, −M_y)."""
+    return np.vstack([points, points * MIRROR])
+
+
+def edge(points: Array, at: Array) -> Array:
+    """Return the largest second coordinate of a plane hull at some first ones.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Whose hull it is.
+    at : ndarray, shape (m,)
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Not a number beside the hull.
+    """
+    size = np.abs(points).max(axis=0)
+    normals, offsets = hull_facets(points / size)
+    above = normals[:, 1] > TOLERANCE
+    heights = (offsets[above] - at[:, None] / size[0] * normals[above, 0]) / normals[above, 1]
+    inside = (at >= points[:, 0].min()) & (at <= points[:, 0].max())
+    return np.where(inside, heights.min(axis=1) * size[1], np.nan)
 
 
 def vertices(points: Array) -> Array:

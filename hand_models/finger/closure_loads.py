@@ -42,9 +42,9 @@ def tendon_loads(
         return None
     shears: list[complex] = []
     left: list[complex] = []
-    before, gain = 0.0, model.shear_gain
+    before = 0.0
     for i, (angle, _, _, _, _) in enumerate(laid):
-        loss = (1.0 - model.friction) ** (i + base_tile)
+        loss, gain = (1.0 - model.friction) ** (i + base_tile), model.shear_gain[i]
         shears.append(loss * complex((model.engagement[i] - gain) * closing, gain))
         # what spring and tendon turn its joint with
         spring = model.joint_stiffness[i] * (angle - before) + model.joint_preload[i]
@@ -70,7 +70,7 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
         if normal >= 0.0:
             continue
         shear = t.real + t.imag * tension
-        if shear < 0.0:
+        if shear < -surface.friction * normal:
             return False
         # a tile that slips under shear keeps its contact
         if shear > surface.shear_limit:

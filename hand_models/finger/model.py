@@ -66,8 +66,9 @@ class FingerModel:
         τ, shear over closing tension at the moment of closing.
     base_engagement : float
         The same for the tile on a rotating base.
-    shear_gain : float
-        g = c_p k_c / (k_c + K_p), shear per newton of further tension.
+    shear_gain : tuple of float
+        g = c_p k_c / (k_c + K_p) of each phalanx, shear per newton of further tension; a tile on a
+        rotating base has the proximal one's.
     spine_travel : float
         How far spines reach [m].
     frame_radius : float
@@ -89,7 +90,7 @@ class FingerModel:
     joint_upper: tuple[float, ...]
     engagement: tuple[float, ...]
     base_engagement: float
-    shear_gain: float
+    shear_gain: tuple[float, ...]
     spine_travel: float
     frame_radius: float
     bed_stiffness: float
@@ -104,8 +105,9 @@ class FingerModel:
         InvalidInputError
             If a number is missing or impossible.
         """
-        contact = table.scalar("tile", "contact_stiffness")
+        contact = np.array(table.vector("tile", "contact_stiffness"))
         spring = table.scalar("tile", "spring_stiffness")
+        pulleys = table.scalar("tile", "pulley_ratio")
         model = cls(
             joint_spacing=table.positive("finger", "joint_spacing"),
             tile_height=table.scalar("finger", "tile_height"),
@@ -118,7 +120,7 @@ class FingerModel:
             joint_upper=table.vector("finger", "joint_upper"),
             engagement=table.vector("tile", "engagement"),
             base_engagement=table.scalar("tile", "base_engagement"),
-            shear_gain=table.scalar("tile", "pulley_ratio") * contact / (contact + spring),
+            shear_gain=tuple((pulleys * contact / (contact + spring)).tolist()),
             spine_travel=table.scalar("tile", "spine_travel"),
             frame_radius=table.positive("finger", "frame_radius"),
             bed_stiffness=table.positive("tile", "bed_stiffness"),
@@ -131,6 +133,7 @@ class FingerModel:
             "joint_lower",
             "joint_upper",
             "engagement",
+            "shear_gain",
         ):
             if len(getattr(model, name)) != len(PHALANGES):
                 raise InvalidInputError(f"one number for each of {PHALANGES}", field=name)
@@ -138,7 +141,7 @@ class FingerModel:
             raise InvalidInputError(
                 f"must be in [0, 1), got {model.friction:g}", field="tendon.friction"
             )
-        if model.shear_gain <= 0.0:
+        if not min(model.shear_gain) > 0.0:
             raise InvalidInputError("stiffnesses must be above 0", field="tile.contact_stiffness")
         if not min(model.pulley_radii) > 0.0:
             raise InvalidInputError(
@@ -314,8 +317,9 @@ class SettledFinger:
         """
         model = self.model
         local = self.engagement * model.losses(base_tile)
-        at_zero = (np.asarray(model.engagement) - model.shear_gain) * closing_tension
-        return np.column_stack([local * at_zero, local * model.shear_gain])
+        gain = np.array(model.shear_gain)
+        at_zero = (np.asarray(model.engagement) - gain) * closing_tension
+        return np.column_stack([local * at_zero, local * gain])
 
     def normals(self, shears: Array, base_tile: bool = False) -> Array:
         """Return each phalanx's normal load as an affine function of tension (Eqs. 4 and 14).

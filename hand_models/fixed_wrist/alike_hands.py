@@ -147,11 +147,15 @@ def limit_rows(
 def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
     """Return H (h, nh, m) and h (h, nh): tensions, tiles, stops, nails, friction, the palm."""
     loads, shape = _of_tiles(hands, "loads"), (len(hands), len(layout.hard))
+    friction = np.array([hand.surface.friction for hand in hands])[:, None, None]
+    pressed, base = loads[:, :, 1].copy(), layout.bases
+    pressed[:, base] = _of_tiles(hands, "engagement")[:, base, None] * pressed[:, base + 1]
+    drags = loads[:, :, 0] + friction * pressed
     H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
     H[:, :TENDONS, :TENDONS] = -EACH_TENDON
     k = TENDONS
-    for tiles, component in ((layout.touching, 0), (layout.frames, 1)):
-        row, along = k + np.arange(len(tiles)), loads[:, tiles, component]
+    for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
+        row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
         k += len(tiles)
     if layout.stops:

@@ -69,9 +69,9 @@ class RowLayout:
         Both.
     finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
-    touching, frames, tips, nails : ndarray of int
-        Tiles on rock; tiles whose phalanx rests beside them; distal tiles whose phalanx presses on
-        rock; nails that hook.
+    touching, bases, frames, tips, nails : ndarray of int
+        Tiles on rock; those of them on rotating bases; tiles whose phalanx rests beside them;
+        distal tiles whose phalanx presses on rock; nails that hook.
     plane_tiles, plane_pieces, plane_signs : ndarray of int
         Tile, half-plane, and sign of the lateral load (0 where there is none), of each limit row of
         a tile.
@@ -94,6 +94,7 @@ class RowLayout:
     rows: tuple[Row, ...]
     finger_of: Indices
     touching: Indices
+    bases: Indices
     frames: Indices
     tips: Indices
     nails: Indices
@@ -164,6 +165,7 @@ def row_layout(
     """
     finger_of = [FINGERS.index(tile.finger) for tile in tiles]
     touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
+    bases = [i for i in touching if tiles[i].phalanx == "base"]
     frames = [i for i, tile in enumerate(tiles) if tile.contact == "frame"]
     tips = [i for i, t in enumerate(tiles) if t.phalanx == "distal" and t.contact != "none"]
     nails = [i for i, tile in enumerate(tiles) if tile.contact == NAIL]
@@ -217,6 +219,7 @@ def row_layout(
         rows=limit_rows + hard_rows,
         finger_of=_kept(finger_of),
         touching=_kept(touching),
+        bases=_kept(bases),
         frames=_kept(frames),
         tips=_kept(tips),
         nails=_kept(nails),

@@ -106,7 +106,7 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     engaged = shares.nonzero()
     if not len(engaged[0]):
         return tiles
-    own, gain = tiles[engaged], model.shear_gain
+    own, gain = tiles[engaged], model.shear_gain[0]
     own[:, POSITION.stop - 1] += depths[engaged]
     own[:, SHEAR.start] = (model.base_engagement - gain) * np.array(tensions)[engaged[0]]
     own[:, SHEAR.stop - 1] = gain

@@ -28,6 +28,10 @@ LARGEST_FACTOR: Final = 1e4
 digits."""
 
 
+ONE_FOR_ALL: Final = frozenset({"tile.contact_stiffness"})
+"""Lists that may be given as one number, which then stands for all of them."""
+
+
 def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTable:
     """Read a hand's own entries from a file, and check them.
 
@@ -73,6 +77,7 @@ def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> Paramet
         cannot have; the field is its section and name.
     """
     bundled = hand_table()
+    spread: dict[str, dict[str, Quantity]] = {}
     for section, entries in own.sections.items():
         if section not in bundled.sections:
             raise InvalidInputError(
@@ -83,8 +88,9 @@ def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> Paramet
             field = f"{section}.{name}"
             if name not in known:
                 raise InvalidInputError(f"unknown entry; {_known(name, known)}", field=field)
-            _check(quantity, known[name], field)
-    return (base or bundled).replaced(own)
+            spread.setdefault(section, {})[name] = _of_all(quantity, known[name], field)
+            _check(spread[section][name], known[name], field)
+    return (base or bundled).replaced(ParameterTable(spread))
 
 
 def _known(given: str, known: Iterable[str]) -> str:
@@ -92,6 +98,14 @@ def _known(given: str, known: Iterable[str]) -> str:
     names = list(known)
     like = difflib.get_close_matches(given, names)
     return f"known are {', '.join([*like, *(name for name in names if name not in like)])}"
+
+
+def _of_all(own: Quantity, bundled: Quantity, field: str) -> Quantity:
+    """Return a list of one number for all, where that is meant by it."""
+    if field not in ONE_FOR_ALL or isinstance(own.value, list):
+        return own
+    assert isinstance(bundled.value, list)
+    return Quantity([own.value] * len(bundled.value), own.unit, own.source, own.note)
 
 
 def _check(own: Quantity, bundled: Quantity, field: str) -> None:

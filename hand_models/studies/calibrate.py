@@ -1,342 +1,339 @@
-"""The open question: one set of numbers for Fig. 12 and for the extents of Fig. 13 at once.
+"""One set of the gripper's numbers for Figs. 12 to 14, found globally, and what else they allow.
 
-Least squares from the recorded set, over what of the gripper is not published, each number within
-what is plausible. Residuals are in tolerances: a tenth of a value, or 0.3 N, for the ends of
-Fig. 12's lines, a tenth for the extents in force, a quarter for that in moment. Their third powers
-are fitted, so that the worst count most.
+What of the gripper is not published is searched, each number within what is plausible, by CMA-ES
+(Hansen, *The CMA evolution strategy: a tutorial*, 2016) from several starts: the recorded set, and
+sets at random. It makes least
 
-Which numbers the data fix is read off the Jacobian J at the end: with errors of a tolerance each
-and with the plausible ranges as what is known beforehand, the variance of a number is the diagonal
-of (JᵀJ + R)⁻¹. Then some numbers are held at the hand's own values and the rest fitted again: what
-the data exclude.
+    (Σ r_i⁸)^(1/8) + 0.2 √(mean r_i²),
+
+with r the residuals of `GripperFit` in tolerances, so that the worst count most. All sets that are
+met on the way and whose misfit is at most one meet the data as well as anyone can tell. Of them
+those are kept that are farthest apart: what they leave of a number's plausible range is what the
+data leave of it, and what a plan does over all of them is how sure it is (``draws.toml``).
+
+Then the search begins again at the set that was found, with a number held or a datum asked for more
+closely: what each of these costs.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from hand_models.base import Array, CruxError, Progress, SolverError
-from hand_models.compliance import Gripper, boundary, gripper_table, linear_box
-from hand_models.experiments import (
-    SANDPAPER,
-    Axis,
-    Claim,
-    StudyResult,
-    clipped_vertices,
-    extents,
-    in_paper_signs,
-    panels,
-    pulled_off_poses,
+from hand_models.base import Array, Progress
+from hand_models.compliance import gripper_table
+from hand_models.experiments import Claim, GripperFit, StudyResult, panels
+from hand_models.parameters import ParameterTable
+
+__all__ = ["Met", "global_search", "plot", "run"]
+
+STARTS: Final = 3
+"""Of the search, the recorded set among them."""
+
+EVALUATIONS: Final = 2400
+REFITS: Final = 300
+"""Sets tried from each start, and where something is held or asked for more closely."""
+
+POPULATION: Final = 16
+"""Sets of one generation."""
+
+WIDE: Final = 0.25
+NEAR: Final = 0.06
+"""First standard deviation, in plausible ranges, from a start at random and from a known set."""
+
+POWER: Final = 8
+EVEN: Final = 0.2
+"""Of the objective: how much the worst residual counts, and the weight of all alike."""
+
+BEYOND: Final = 100.0
+"""What a number beyond its range costs, by the square of how far, in ranges."""
+
+SETS: Final = 30
+"""That meet the data, to be kept."""
+
+TRIED: Final = 3
+"""Times as many are looked at on the fine hull."""
+
+MEETS: Final = 1.0
+"""Misfit up to which a set meets the data."""
+
+CLOSER: Final = 0.3
+"""Share of its tolerance within which a datum is asked for more closely."""
+
+VARIANTS: Final = (
+    ("no friction of pressed tiles, T ≥ 0", "friction", 0.0),
+    ("side view of Fig. 13 within 2 N", "pull-off at F_x = 40 N", CLOSER),
 )
-from hand_models.finger import PHALANGES
-from hand_models.parameters import ParameterTable, experiment_table, hand_table
-from hand_models.studies.fig12 import NEAR_FORCE, NEAR_SHARE
-from hand_models.studies.fig13 import NEAR
-from hand_models.tile import Surface
-
-__all__ = ["Fit", "plot", "run"]
-
-FITS: Final = 25
-REFITS: Final = 10
-"""Evaluations of the Jacobian at most, of the fit and of those with a number held."""
-
-BEFOREHAND: Final = 1.0 / np.sqrt(12.0)
-"""Standard deviation of a number that may be anywhere in its plausible range, over that range."""
-
-FIXED: Final = 0.5
-"""A number counts as fixed by the data if they leave this share of what was unknown beforehand."""
-
-RAYS: Final = 3000
-"""Of the wrench space's boundary."""
-
-POWER: Final = 3
-"""To which residuals are raised, sign kept."""
-
-STEP: Final = 2e-3
-"""Of finite differences, in plausible ranges."""
-
-HOPELESS: Final = 30.0
-"""Residual where a set of numbers gives no gripper that holds."""
-
-HELD: Final = (
-    ("tile_height",),
-    ("added_radius",),
-    ("origin_height",),
-    ("base_half_spacing",),
-    ("engagement[0]", "engagement[1]", "engagement[2]"),
-    ("contact_stiffness[0]", "contact_stiffness[1]", "contact_stiffness[2]"),
-    ("pulley_radii[1]", "pulley_radii[2]"),
-    ("shear_limit", "pull_off_slope"),
-)
-"""Numbers that are held in turn at what plans have for the hand and for sandpaper."""
+"""What is held at a value, or asked for within a share of its tolerance, in turn."""
 
 
-def _numbers() -> tuple[Axis, ...]:
-    """Return the gripper's numbers to be found, each from the least to the most plausible."""
-    one, each = (None,), range(len(PHALANGES))
-    places: dict[str, tuple[str, str, Iterable[int | None]]] = {
-        "tile_height": ("finger", "tile_height", one),
-        "seated_contact": ("finger", "seated_contact", one),
-        "middle_radius": ("finger", "pulley_radii", (1,)),
-        "distal_radius": ("finger", "pulley_radii", (2,)),
-        "engagement": ("tile", "engagement", each),
-        "contact_stiffness": ("gripper", "contact_stiffness", each),
-    }
-    table, found = experiment_table(), []
-    for plausible, quantity in table.sections["calibration"].items():
-        section, name, indices = places.get(plausible, ("gripper", plausible, one))
-        ends = table.vector("calibration", plausible)
-        found += [Axis(section, name, index, ends, quantity.unit) for index in indices]
-    return tuple(found)
+@dataclass(frozen=True, eq=False)
+class Met:
+    """Sets that a search has met.
+
+    Attributes
+    ----------
+    best : ndarray, shape (n,)
+        Where the objective is least.
+    sets : ndarray, shape (k, n)
+        Those that meet the data.
+    """
+
+    best: Array
+    sets: Array
 
 
-class Fit:
-    """Residuals of the fifteen data over the numbers, each in plausible ranges from 0 to 1."""
+def global_search(
+    fit: GripperFit,
+    start: Array,
+    spread: float,
+    evaluations: int,
+    seed: int,
+    tick: Callable[[], None],
+    closer: Array | None = None,
+    held: dict[int, float] | None = None,
+) -> Met:
+    """Search the numbers of a gripper by CMA-ES.
 
-    def __init__(self, table: ParameterTable) -> None:
-        self.table = table
-        self.numbers = _numbers()
-        self.names = [number.entry.partition(".")[2] for number in self.numbers]
-        self.low, high = np.array([number.values for number in self.numbers]).T
-        self.width = high - self.low
-        data = experiment_table()
-        self.tension = data.scalar("fig12", "tension")
-        self.diameter = data.scalar("fig12", "diameter")
-        self.pull = data.scalar("fig12", "pull")
-        self.labels: list[str] = []
-        values: list[float] = []
-        for end in ("unloaded", "pulled"):
-            for kind in ("shear", "normal"):
-                values += data.vector("fig12", f"{kind}_{end}")
-                self.labels += [f"{phalanx} {kind}, {end}" for phalanx in PHALANGES]
-        self.labels += ["extent of F_x", "extent of F_z", "extent of M_y"]
-        far = [data.scalar("fig13", name) for name in ("force_x", "force_z", "moment")]
-        self.wanted = np.array([*values, *far])
-        share = [*[NEAR_SHARE] * len(values), *NEAR]
-        least = [*[NEAR_FORCE] * len(values), *[0.0] * len(far)]
-        self.tolerance = np.maximum(share * np.abs(self.wanted), least)
+    Parameters
+    ----------
+    fit : GripperFit
+    start : ndarray, shape (n,)
+        In plausible ranges from 0 to 1.
+    spread : float
+        First standard deviation, in the same.
+    evaluations : int
+        Sets tried, about.
+    seed : int
+        Of the random numbers, above 0.
+    tick : callable
+        Called for each set tried.
+    closer : ndarray, optional
+        Of each datum, the share of its tolerance within which it is asked for; 1 by default.
+    held : dict, optional
+        Numbers that are held, by their index, at a value in plausible ranges.
+    """
+    # a second's work to load, which only this study needs
+    import cma
 
-    def start(self) -> Array:
-        """Return where the table is."""
-        now = [number.current(self.table) for number in self.numbers]
-        return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
+    share = np.ones(len(fit.data)) if closer is None else closer
+    free = [i for i in range(len(start)) if i not in (held or {})]
+    best, least = np.clip(start, 0.0, 1.0), np.inf
+    sets: list[Array] = []
 
-    def values(self, x: Array) -> Array:
-        """Return the numbers in SI units."""
-        return np.asarray(self.low + self.width * x)
+    def whole(part: Array) -> Array:
+        x = best.copy()
+        x[free] = np.clip(part, 0.0, 1.0)
+        for i, value in (held or {}).items():
+            x[i] = value
+        return x
 
-    def gripper(self, x: Array) -> Gripper:
-        """Return the gripper of some numbers."""
-        table = self.table
-        for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
-            table = number.set(table, value)
-        return Gripper(self.diameter, self.tension, table=table)
-
-    def model(self, x: Array) -> Array:
-        """Return what the model has for the fifteen data, shape (15,) [N, N·m].
-
-        Raises
-        ------
-        CruxError
-            If the fingers do not lie on the surface, or nothing holds.
-        """
-        gripper = self.gripper(x)
-        poses = pulled_off_poses(gripper, np.array([0.0, self.pull]))
-        if len(poses) < 2:
-            raise SolverError(f"no pose of the gripper balances a pull of {self.pull:g} N")
-        loads, _ = gripper.finger_loads(poses)
-        space = boundary(gripper, linear_box(gripper), RAYS)
-        far = extents(clipped_vertices(in_paper_signs(space.wrenches)))
-        return np.array([*np.hstack([loads.shears, loads.normals]).flat, *far])
-
-    def residuals(self, x: Array) -> Array:
-        """Return how many tolerances each datum is off, shape (15,)."""
-        try:
-            return np.asarray((self.model(x) - self.wanted) / self.tolerance)
-        except CruxError:
-            return np.full(len(self.wanted), HOPELESS)
-
-    def jacobian(self, x: Array) -> Array:
-        """Return the residuals' slopes over plausible ranges, shape (15, n)."""
-        columns = []
-        for i in range(len(x)):
-            ends = [np.clip(x[i] + side * STEP, 0.0, 1.0) for side in (1.0, -1.0)]
-            there = [self.residuals(np.concatenate([x[:i], [end], x[i + 1 :]])) for end in ends]
-            columns.append((there[0] - there[1]) / (ends[0] - ends[1]))
-        return np.column_stack(columns)
-
-    def fitted(
-        self, x: Array, held: NDArray[np.bool_], rounds: int, tick: Callable[[], None]
-    ) -> Array:
-        """Return the numbers that fit best, some of them held."""
-        free = np.flatnonzero(~held)
-
-        def whole(part: Array) -> Array:
-            found = x.copy()
-            found[free] = part
-            return found
-
-        def cubes(part: Array) -> Array:
-            tick()
-            found = self.residuals(whole(part))
-            return np.asarray(np.sign(found) * np.abs(found) ** POWER)
-
-        best = least_squares(
-            cubes,
-            np.clip(x[free], STEP, 1.0 - STEP),
-            bounds=(0.0, 1.0),
-            diff_step=np.full(len(free), STEP),
-            max_nfev=rounds,
-        )
-        return whole(best.x)
+    left = evaluations
+    options = {"popsize": POPULATION, "verbose": -9, "seed": seed}
+    while left > 0:
+        strategy = cma.CMAEvolutionStrategy(best[free], spread, {**options, "maxfevals": left})
+        while not strategy.stop():
+            tried = strategy.ask()
+            costs = []
+            for part in tried:
+                tick()
+                x = whole(part)
+                off = fit.residuals(x)
+                cost = float(np.linalg.norm(off / share, POWER)) + EVEN * float(
+                    np.sqrt((off**2).mean())
+                )
+                cost += BEYOND * float(((part - x[free]) ** 2).sum())
+                costs.append(cost)
+                if fit.misfit(off) <= MEETS:
+                    sets.append(x)
+                if cost < least:
+                    best, least = x, cost
+            strategy.tell(tried, costs)
+        left -= int(strategy.result.evaluations)
+        # where it has converged with evaluations left, it begins again there
+        spread, options["seed"] = NEAR, options["seed"] + 1
+    return Met(best, np.array(sets).reshape(-1, len(start)))
 
 
-def _own(fit: Fit) -> Array:
-    """Return the numbers as plans have them, of the hand and of sandpaper, shape (n,)."""
-    hand = hand_table()
-    joints = hand.vector("fingers", "inner_joint")
-    axis, reach = hand.vector("fingers", "outer_axis"), hand.scalar("fingers", "outer_reach")
-    paper = Surface.named(SANDPAPER)
-    angle = paper.pull_off_angle
-    of_gripper = {
-        "base_half_spacing": 0.5 * (joints[0] - (axis[0] - reach)),
-        "added_radius": 0.0,
-        "origin_height": -joints[2],
-        "contact_stiffness": hand.scalar("tile", "contact_stiffness"),
-        "shear_limit": paper.shear_limit,
-        # T + k P = T_max goes through f_min at its angle
-        "pull_off_slope": (paper.shear_limit / paper.pull_off_limit - math.cos(angle))
-        / math.sin(angle),
-    }
-    return np.array(
-        [
-            of_gripper[number.name] if number.section == "gripper" else number.current(hand)
-            for number in fit.numbers
-        ]
-    )
+def farthest_apart(sets: Array, count: int) -> list[int]:
+    """Return the indices of sets, each as far as can be from those before it."""
+    chosen = [0]
+    gaps = np.linalg.norm(sets - sets[0], axis=1)
+    while len(chosen) < min(count, len(sets)):
+        chosen.append(int(gaps.argmax()))
+        gaps = np.minimum(gaps, np.linalg.norm(sets - sets[chosen[-1]], axis=1))
+    return chosen
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Fit the gripper's numbers again, and see which of them the data fix."""
-    fit = Fit(gripper_table(hand))
-    n = len(fit.numbers)
-    total = FITS * (n + 1) + 2 * n + len(HELD) * REFITS * n
+    """Search the gripper's numbers, keep what meets the data, and tell what each aim costs."""
+    fit = GripperFit(gripper_table(hand))
+    n, looks = len(fit.numbers), TRIED * SETS
+    total = STARTS * EVALUATIONS + len(VARIANTS) * REFITS + looks + 1
+    done = 0
 
-    def ticking(before: int) -> Callable[[], None]:
-        counts = itertools.count(before + 1)
-        return lambda: progress(min(next(counts), total - 1), total)
+    def tick() -> None:
+        nonlocal done
+        done = min(done + 1, total - 1)
+        progress(done, total)
 
-    start = fit.start()
-    before = fit.residuals(start)
-    x = fit.fitted(start, np.zeros(n, dtype=bool), FITS, ticking(0))
-    after = fit.residuals(x)
-    if np.abs(after).max() > np.abs(before).max():
-        x, after = start, before
-    jacobian = fit.jacobian(x)
-    spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(n) / BEFOREHAND**2)))
-    own = _own(fit)
-    at_own = (own - fit.low) / fit.width
-    held = []
-    for k, labels in enumerate(HELD):
-        those = np.isin(fit.names, labels)
-        fixed = np.where(those, at_own, x)
-        tick = ticking(FITS * (n + 1) + 2 * n + k * REFITS * n)
-        found = fit.residuals(fit.fitted(fixed, those, REFITS, tick))
-        held.append(
-            {
-                "held": labels,
-                "at": own[those],
-                "worst": np.abs(found).max(),
-                "datum": fit.labels[int(np.abs(found).argmax())],
-                "root_mean_square": np.sqrt((found**2).mean()),
-            }
-        )
-    progress(total, total)
-    hand_residuals = fit.residuals(at_own)
-    model = fit.wanted + after * fit.tolerance
-    numbers = {
-        "name": fit.names,
-        "unit": [number.unit for number in fit.numbers],
-        "recorded": fit.values(start),
-        "fitted": fit.values(x),
-        "hand": own,
-        "plausible": [number.values for number in fit.numbers],
-        "standard_error": spread * fit.width,
-        "share_of_range": spread,
-        "left_unknown": spread / BEFOREHAND,
-        "fixed_by_data": spread <= FIXED * BEFOREHAND,
-    }
+    rng = np.random.default_rng(0)
+    starts = [fit.start(), *rng.uniform(0.2, 0.8, (STARTS - 1, n))]
+    met = [
+        global_search(fit, start, WIDE if k else NEAR, EVALUATIONS, k + 1, tick)
+        for k, start in enumerate(starts)
+    ]
+    ends = [fit.residuals(each.best, fine=True) for each in met]
+    valley = int(np.argmin([fit.misfit(end) for end in ends]))
+    x, after = met[valley].best, ends[valley]
     data: dict[str, Any] = {
-        "residuals": [
-            {"datum": label, "wanted": wanted, "model": found, "tolerances_off": off}
-            for label, wanted, found, off in zip(
-                fit.labels, fit.wanted.tolist(), model.tolist(), after.tolist(), strict=True
-            )
+        "residuals": _table(fit, x, after),
+        "starts": [
+            {"misfit": fit.misfit(end), "values": fit.values(each.best), "met": len(each.sets)}
+            for each, end in zip(met, ends, strict=True)
         ],
-        "numbers": [{key: values[i] for key, values in numbers.items()} for i in range(n)],
-        "singular_values": np.linalg.svd(jacobian, compute_uv=False),
-        "held": held,
-        "worst_before": np.abs(before).max(),
-        "worst_after": np.abs(after).max(),
-        "worst_with_the_hands_numbers": np.abs(hand_residuals).max(),
+        "misfit": fit.misfit(after),
+        "misfit_of_recorded": fit.misfit(fit.residuals(fit.start(), fine=True)),
+        "sets": _kept(fit, met, tick),
+        "variants": [_variant(fit, x, *each, tick) for each in VARIANTS],
     }
+    data["numbers"] = _numbers(fit, x, np.array([each["at"] for each in data["sets"]]))
+    progress(total, total)
     claims = tuple(
         Claim(
-            f"{r['datum']} ({'Fig. 13' if r['datum'].startswith('extent') else 'Fig. 12'})",
-            r["wanted"],
-            r["model"],
-            abs(r["tolerances_off"]) <= 1.0,
+            f"{row['datum']} ({row['figure']})",
+            row["wanted"],
+            row["model"],
+            abs(row["tolerances_off"]) <= 1.0,
             role="calibration",
         )
-        for r in data["residuals"]
+        for row in data["residuals"]
+        if row["first"]
     )
-    return StudyResult("calibrate", "one set of numbers for Figs. 12 and 13", data, claims)
+    return StudyResult("calibrate", "one set of numbers for Figs. 12 to 14", data, claims)
+
+
+def _table(fit: GripperFit, x: Array, off: Array) -> list[dict[str, Any]]:
+    """Return each datum, and what a set of numbers has for it."""
+    model = fit.wanted + off * fit.tolerance
+    return [
+        {
+            "datum": datum.label,
+            "figure": _figure(datum.label),
+            "unit": datum.unit,
+            "wanted": datum.wanted,
+            "model": got,
+            "tolerance": datum.tolerance,
+            "tolerances_off": tolerances,
+            "first": datum.first,
+        }
+        for datum, got, tolerances in zip(fit.data, model.tolist(), off.tolist(), strict=True)
+    ]
+
+
+def _figure(label: str) -> str:
+    if label.startswith("M_y : F_x"):
+        return "Fig. 14"
+    return "Fig. 13" if label.startswith(("extent", "edge", "pull-off")) else "Fig. 12"
+
+
+def _kept(fit: GripperFit, met: list[Met], tick: Callable[[], None]) -> list[dict[str, Any]]:
+    """Return sets from all valleys that meet the data on the fine hull, and are far apart."""
+    found = []
+    for valley, each in enumerate(met, start=1):
+        if not len(each.sets):
+            continue
+        for i in farthest_apart(each.sets, TRIED * SETS // len(met)):
+            tick()
+            misfit = fit.misfit(fit.residuals(each.sets[i], fine=True))
+            if misfit <= MEETS:
+                found.append({"valley": valley, "misfit": misfit, "at": each.sets[i]})
+    if len(found) > SETS:
+        far = farthest_apart(np.array([each["at"] for each in found]), SETS)
+        found = [found[i] for i in far]
+    return [{**each, "values": fit.values(each["at"])} for each in found]
+
+
+def _variant(
+    fit: GripperFit, x: Array, words: str, name: str, value: float, tick: Callable[[], None]
+) -> dict[str, Any]:
+    """Return what is found where a number is held, or a datum asked for more closely."""
+    labels = [datum.label for datum in fit.data]
+    closer, held = np.ones(len(labels)), {}
+    if name in labels:
+        closer[labels.index(name)] = value
+    else:
+        i = fit.names.index(name)
+        held[i] = (value - fit.low[i]) / fit.width[i]
+    met = global_search(fit, x, NEAR, REFITS, 1, tick, closer, held)
+    off = fit.residuals(met.best, fine=True)
+    worst = int(np.abs(np.where(fit.first, off, 0.0)).argmax())
+    return {
+        "variant": words,
+        "misfit": fit.misfit(off),
+        "worst": labels[worst],
+        "root_mean_square": float(np.sqrt((off**2).mean())),
+        "residuals": off,
+        "values": fit.values(met.best),
+    }
+
+
+def _numbers(fit: GripperFit, x: Array, kept: Array) -> list[dict[str, Any]]:
+    """Return each number: what was found, recorded, plausible, and what the sets leave of it."""
+    recorded = fit.values(fit.start())
+    some = kept if len(kept) else x[None]
+    low, high = fit.values(some.min(axis=0)), fit.values(some.max(axis=0))
+    return [
+        {
+            "name": number.name if number.index is None else f"{number.name}[{number.index}]",
+            "unit": number.unit,
+            "recorded": recorded[i],
+            "fitted": fit.values(x)[i],
+            "plausible": number.values,
+            "of_sets": [low[i], high[i]],
+            "left_of_range": (high[i] - low[i]) / fit.width[i],
+        }
+        for i, number in enumerate(fit.numbers)
+    ]
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw residuals, what the data fix, and what they exclude."""
+    """Draw residuals, what the data leave of each number, and what else was asked for."""
     figure, (left, middle, right) = panels(
-        1, 3, (16.0, 6.0), grid="x", width_ratios=(1.0, 1.2, 1.0)
+        1, 3, (17.0, 7.0), grid="x", width_ratios=(1.1, 1.2, 0.8)
     )
     residuals = result.data["residuals"]
     places = np.arange(len(residuals))[::-1]
-    left.barh(places, [r["tolerances_off"] for r in residuals], color="tab:blue")
-    left.set_yticks(places, [r["datum"] for r in residuals])
+    colours = ["tab:blue" if row["first"] else "0.6" for row in residuals]
+    left.barh(places, [row["tolerances_off"] for row in residuals], color=colours)
+    left.set_yticks(places, [row["datum"] for row in residuals])
     for side in (-1.0, 1.0):
         left.axvline(side, color="tab:red", linestyle="--", linewidth=1.0)
-    left.set(xlabel="model less figure [tolerances]", title="residuals")
-    numbers_found = result.data["numbers"]
-    rows = np.arange(len(numbers_found))[::-1]
-    for row, number in zip(rows, numbers_found, strict=True):
+    left.set(xlabel="model less figure [tolerances]", title="residuals; grey: where they can")
+    numbers = result.data["numbers"]
+    rows = np.arange(len(numbers))[::-1]
+    for row, number in zip(rows, numbers, strict=True):
         low, high = number["plausible"]
-        at, own = ((number[which] - low) / (high - low) for which in ("fitted", "hand"))
-        share = number["share_of_range"]
-        colour = "tab:blue" if number["fixed_by_data"] else "0.6"
-        middle.errorbar(at, row, xerr=share, fmt="o", color=colour, capsize=3)
-        middle.plot(own, row, "D", markerfacecolor="white", markeredgecolor="black")
-    middle.set_yticks(rows, [number["name"] for number in numbers_found])
+        least, most = ((end - low) / (high - low) for end in number["of_sets"])
+        fitted, recorded = ((number[k] - low) / (high - low) for k in ("fitted", "recorded"))
+        middle.plot([least, most], [row, row], color="tab:blue", linewidth=5.0, alpha=0.35)
+        middle.plot(fitted, row, "o", color="tab:blue")
+        middle.plot(recorded, row, "D", markerfacecolor="none", markeredgecolor="black")
+    middle.set_yticks(rows, [number["name"] for number in numbers])
     middle.set(
-        xlabel="share of the plausible range [1]; diamonds: in plans",
-        title="numbers; blue: narrowed to half or less by the data",
-        xlim=(-0.15, 1.15),
+        xlabel="share of the plausible range [1]; diamonds: recorded",
+        title=f"numbers; bars: {len(result.data['sets'])} sets that meet the data",
+        xlim=(-0.05, 1.05),
     )
-    held = result.data["held"]
-    lines = np.arange(len(held) + 1)[::-1]
-    worst = [result.data["worst_after"], *(h["worst"] for h in held)]
-    right.barh(lines, worst, color=["tab:blue"] + ["0.6"] * len(held))
-    names = ["all free", *(h["held"][0].split("[")[0] for h in held)]
-    right.set_yticks(lines, names)
+    variants = result.data["variants"]
+    lines = np.arange(len(variants) + 1)[::-1]
+    worst = [result.data["misfit"], *(each["misfit"] for each in variants)]
+    right.barh(lines, worst, color=["tab:blue"] + ["0.6"] * len(variants))
+    right.set_yticks(lines, ["all free", *(each["variant"] for each in variants)], wrap=True)
     right.axvline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
-    right.set(
-        xlabel="largest residual [tolerances]",
-        title="numbers held as in plans, the rest fitted again",
-    )
+    right.set(xlabel="largest residual [tolerances]", title="what else was asked for")
     return {"calibrate": figure}

@@ -97,12 +97,13 @@ def _surface(gripper: Gripper, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
     progress(0, STEPS)
     unloaded(gripper)
-    found = search(gripper, PER_AXIS)
-    shown = clipped_vertices(in_paper_signs(found.wrenches))
+    found = in_paper_signs(search(gripper, PER_AXIS).wrenches)
+    directions = even_pulls(DIRECTIONS, np.abs(clipped_vertices(found)).max(axis=0))
+    pulled = pull(gripper, directions, part(progress, SEARCHED, STEPS, STEPS))
+    # a pull that the search of poses has missed is held all the same
+    shown = clipped_vertices(np.vstack([found, pulled.wrenches]))
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
-    directions = even_pulls(DIRECTIONS, np.abs(shown).max(axis=0))
-    pulled = pull(gripper, directions, part(progress, SEARCHED, STEPS, STEPS))
     # in how many of the directions each phalanx fails in each way
     counts = Counter(zip(pulled.phalanx, pulled.way, strict=True))
     return {

@@ -104,11 +104,12 @@ class FingerTendon:
             Whether a tile on the finger's base comes first.
         """
         radii = table.vector("finger", "pulley_radii")
+        stiffness = table.vector("tile", "contact_stiffness")
         if base_tile:
-            radii = (0.0, *radii)
+            radii, stiffness = (0.0, *radii), (stiffness[0], *stiffness)
         return cls(
             pulley_ratio=table.scalar("tile", "pulley_ratio"),
-            contact_stiffness=(table.scalar("tile", "contact_stiffness"),) * len(radii),
+            contact_stiffness=stiffness,
             spring_stiffness=table.scalar("tile", "spring_stiffness"),
             pulley_radii=radii,
             friction=table.scalar("tendon", "friction"),

@@ -13,7 +13,18 @@ a fit to the spine array (``spine_array.py``): channels lean along the drag, so 
 less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
 times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
 pull-off, where it has no meaning. Pressed into the rock, a tile holds F(0, θ) + γ N in its plane,
-with γ the compression gain. Half-planes inside and outside the surface are in
+with γ the compression gain.
+
+Spines cling only while they are dragged toward the finger's base. A tile that is dragged the other
+way is held by Coulomb friction alone, as far as it is pressed, and one that is pulled off needs the
+drag in proportion: both are
+
+    T ≥ −μ N
+
+(Section 6.1 has Coulomb friction for pressed tiles; that the same μ ends the pull-off at the angle
+atan(1 / μ) is ``assumed``, and what the extents of Fig. 13 ask for). A base tile, which bears no
+normal of its own, is pressed as its finger's proximal phalanx is, by as much of it as it has spines
+on the rock (``assumed``). Half-planes inside and outside the surface are in
 `hand_models.tile.half_planes`.
 """
 
@@ -60,6 +71,8 @@ class Surface:
         What is left at ``pull_off_angle`` of the share λ that holds sideways; above 0, at most 1.
     shear_scatter : float
         Standard deviation of ``shear_limit`` from place to place [N].
+    friction : float
+        μ, Coulomb friction of a tile that is dragged away from the finger's base.
     """
 
     shear_limit: float
@@ -70,6 +83,7 @@ class Surface:
     half_planes: int = 1
     lateral_pull_off_ratio: float = 1.0
     shear_scatter: float = 0.0
+    friction: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -91,7 +105,7 @@ class Surface:
             raise InvalidInputError(
                 f"must be in (0, pi/2] rad, got {self.pull_off_angle:g}", field="pull_off_angle"
             )
-        for name in ("compression_gain", "shear_scatter"):
+        for name in ("compression_gain", "shear_scatter", "friction"):
             if getattr(self, name) < 0.0:
                 raise InvalidInputError(
                     f"must not be negative, got {getattr(self, name):g}", field=name
@@ -108,6 +122,12 @@ class Surface:
                 f"must be at most {bounds.compression_gain:g}, got {self.compression_gain:g}: "
                 "newtons of shear strength for each newton of pressing",
                 field="compression_gain",
+            )
+        if self.friction > bounds.friction:
+            raise InvalidInputError(
+                f"must be at most {bounds.friction:g}, got {self.friction:g}: newtons of drag for "
+                "each newton of pull-off",
+                field="friction",
             )
         if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
             raise InvalidInputError(
@@ -260,6 +280,7 @@ def _from_ratios(shear_limit: float, section: str) -> Surface:
         compression_gain=ratio("compression_gain"),
         lateral_pull_off_ratio=ratio("lateral_pull_off_ratio"),
         shear_scatter=shear_limit * ratio("scatter_ratio"),
+        friction=ratio("friction"),
     )
 
 
@@ -268,6 +289,7 @@ class _Bounds(NamedTuple):
 
     lateral_ratio: float
     compression_gain: float
+    friction: float
     tile_strength: float
 
 

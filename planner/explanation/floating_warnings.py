@@ -43,7 +43,8 @@ def idle_preloads(
         needs = []
         for t in np.flatnonzero(hand.touching):
             finger = int(hand.finger_of[t])
-            at_zero, per_newton = (float(value) for value in hand.loads[t, 0])
+            drag = hand.loads[t, 0] + hand.surface.friction * hand.loads[t, 1]
+            at_zero, per_newton = (float(value) for value in drag)
             shear = at_zero + per_newton * float(wrist.hand.preload[finger])
             if shear < -BACKWARDS and per_newton > 0.0:
                 needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))

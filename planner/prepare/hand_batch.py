@@ -247,6 +247,12 @@ class HandBatch:
         )
 
     @cached_property
+    def friction(self) -> Array:
+        """Of each tile's surface, shape (T,)."""
+        each = np.array([hand.surface.friction for hand in self.hands])
+        return each[self.places.hand]
+
+    @cached_property
     def stops(self) -> NDArray[np.int8]:
         """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])

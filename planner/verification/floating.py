@@ -162,7 +162,8 @@ def _tendon(
     table = hand.hand.table
     known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
     # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
-    gains = hand.engagement[own] * hand.hand.finger.shear_gain
+    of_each = hand.hand.finger.shear_gain
+    gains = hand.engagement[own] * (*of_each[: len(own) - len(PHALANGES)], *of_each)
     stiffness = known.spring_stiffness * gains / (known.pulley_ratio - gains)
     friction = max(known.friction, hand.hand.tendon_friction)
     tendon = FingerTendon(

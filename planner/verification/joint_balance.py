@@ -61,13 +61,15 @@ def wrenches_of(points: Array, forces: Array) -> Array:
 
 
 @lru_cache(maxsize=KEPT)
-def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array]:
+def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array, Array]:
     """Return what the tendons of hands do, all of one model whose tiles all touch.
 
     Returns
     -------
     pull : ndarray, shape (F, 3)
         M r of the joints [m].
+    left : ndarray, shape (T,)
+        What is left of the tension at each tile; of nails zero.
     gain, engaged : ndarray, shape (T,)
         Shear of each tile per newton of tension, and at zero tension per newton of closing tension;
         of nails zero.
@@ -77,12 +79,13 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array]
     # what is left of the tension at each phalanx's tile; a base tile comes first
     local: Array = np.full((len(places.phalanges), JOINTS), loss) ** np.arange(JOINTS)
     local[places.base_fingers] *= loss
-    gain, engaged = np.zeros((2, len(places.hand)))
+    left, gain, engaged = np.zeros((3, len(places.hand)))
+    left[places.phalanges], left[places.bases] = local, 1.0
     gain[places.phalanges] = local * model.shear_gain
-    gain[places.bases] = model.shear_gain
+    gain[places.bases] = model.shear_gain[0]
     engaged[places.phalanges] = local * (np.array(model.engagement) - model.shear_gain)
-    engaged[places.bases] = model.base_engagement - model.shear_gain
-    return local * model.pulley_radii, gain, engaged
+    engaged[places.bases] = model.base_engagement - model.shear_gain[0]
+    return local * model.pulley_radii, left, gain, engaged
 
 
 class Fingers(NamedTuple):
@@ -125,7 +128,7 @@ class JointBalance:
     def __init__(self, known: HandBatch) -> None:
         hands, places, touch = known.hands, known.places, known.touch
         self._known, body = known, hands[0].hand
-        self._pull, gain, engaged = tendons_of(places, body)
+        self._pull, _, gain, engaged = tendons_of(places, body)
         closing = np.array([hand.closing_tension for hand in hands])
         self._shear = engaged * closing.take(places.hand) * known.engagement
         self._gain = gain * known.engagement

@@ -69,7 +69,7 @@ class LimitCurves:
         Parameters
         ----------
         shear, normal, lateral : ndarray, shape (n,)
-            The last of either sign. Shear is not below zero but by rounding.
+            The last of either sign. Shear below zero is Coulomb friction's, not the spines'.
         relative : float
             Part of its strength by which a load may exceed it.
 
@@ -78,6 +78,7 @@ class LimitCurves:
         ndarray, shape (n,)
             Negative inside.
         """
+        shear = np.maximum(shear, 0.0)
         along = np.hypot(shear, lateral)
         pull = np.minimum(normal, 0.0)
         # pressed, a tile holds what it does in its own plane, and more by the gain

@@ -59,10 +59,10 @@ def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> tuple[Array
     per_shear : ndarray, shape (8, 1)
         Per newton of the shears of a finger's tiles together, which pull them away from the winch.
     """
-    drive, (_, gain, _) = hand.drive, tendons_of(places, hand)
+    drive, (_, left, _, _) = hand.drive, tendons_of(places, hand)
     # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
     travel = drive.pulley_ratio / drive.tile_stiffness / drive.winch_radius
-    strands = np.add.reduceat(gain, places.first_of_finger) / hand.finger.shear_gain
+    strands = np.add.reduceat(left, places.first_of_finger)
     torque = drive.winch_radius / drive.gear_ratio / drive.efficiency
     current, idle = torque / drive.torque_constant, drive.no_load_current
     driven = [torque / drive.maximum_torque, current / drive.maximum_current]

@@ -160,9 +160,12 @@ class Recomputed(NamedTuple):
 
     def signed(self) -> tuple[Array, ...]:
         """Return what may not be below zero, and is affine in the loads."""
+        bases = self.known.places.bases
+        pressed = self.normal.copy()
+        pressed[bases] = self.known.engagement[bases] * self.normal[bases + 1]
         return (
             self.arrays.tensions,
-            self.shear,
+            self.shear + self.known.friction * pressed,
             self.normal * self.known.touch.framed,
             self.arrays.palms[:, ::2] * PALM_SIGNS,
             self.slackened,
@@ -281,7 +284,10 @@ class Recomputed(NamedTuple):
         return f"{self.tile(t)} carries {shear:.6g}, {normal:.6g} N, not what the plan says"
 
     def backwards(self, t: int) -> str:
-        return f"{self.tile(t)} would be dragged backwards with {-self.shear[t]:.3g} N"
+        shear, normal = self.shear[t], self.normal[t]
+        if normal < 0.0:
+            return f"{self.tile(t)} is pulled off with {-normal:.3g} N at a drag of {shear:.3g} N"
+        return f"{self.tile(t)} would be dragged backwards with {-shear:.3g} N"
 
     def pulled_off(self, t: int) -> str:
         return f"{self.tile(t)}: its bare frame would be pulled off with {-self.normal[t]:.3g} N"

@@ -55,6 +55,9 @@ TileForce = Annotated[float, Meta(ge=1e-3, le=1e5, description="of one tile [N]"
 PullOffAngle = Annotated[float, Meta(ge=1e-3, le=math.pi / 2, description="[rad]")]
 Gain = Annotated[float, Meta(ge=0.0, le=1e3)]
 LateralShare = Annotated[float, Meta(ge=1e-3, le=1.0)]
+Friction = Annotated[
+    float, Meta(ge=0.0, le=1e3, description="of a tile dragged backwards: T ≥ −friction N")
+]
 Scatter = Annotated[float, Meta(ge=0.0, le=1e5, description="standard deviation, of one tile [N]")]
 Count = Annotated[int, Meta(ge=1, le=64)]
 
@@ -144,3 +147,4 @@ class Surface(Strict, frozen=True, kw_only=True):
     half_planes: Count | None = None
     lateral_pull_off_ratio: LateralShare | None = None
     shear_scatter: Scatter | None = None
+    friction: Friction | None = None

@@ -55,13 +55,16 @@ def _finger(settled: SettledHand, name: str, finger: SettledFinger, step: float)
         forces = contact_forces(finger, tension, settled.closing_tension)
         if base:
             share = settled.engagement[mine[0]]
-            gain = finger.model.shear_gain
+            gain = finger.model.shear_gain[0]
             engagement = finger.model.base_engagement
             shear = engagement * settled.closing_tension + gain * (
                 tension - settled.closing_tension
             )
             forces = np.vstack([[share * shear, 0.0], forces])
-        if (forces[:, 0] >= 0.0).all():
+        pressed = forces[:, 1].copy()
+        if base:
+            pressed[0] = settled.engagement[mine[0]] * forces[1, 1]
+        if (forces[:, 0] + settled.surface.friction * pressed >= 0.0).all():
             shares = settled.engagement[mine]
             if not all(
                 _holds(settled, force / share)
@@ -99,7 +102,7 @@ def contact_forces(finger: SettledFinger, tension: float, closing: float) -> np.
         b[i] = tension * model.pulley_radii[i]
         b[i] -= model.joint_stiffness[i] * bend + model.joint_preload[i]
         A[3 + i, 2 * i] = 1.0
-        b[3 + i] = model.engagement[i] * closing + model.shear_gain * (tension - closing)
+        b[3 + i] = model.engagement[i] * closing + model.shear_gain[i] * (tension - closing)
     return np.linalg.solve(A, b).reshape(3, 2)
 
 

@@ -72,9 +72,9 @@ def test_every_entry_that_is_offered_does_something_or_is_read_with_reason(table
     assert "\n" not in message
     listed = message.partition("known are ")[2].split(", ")
     assert listed == sorted(listed)
-    for name in ("finger.pulley_radii[2]", "gripper.contact_stiffness[0]", "tile.spring_stiffness"):
+    for name in ("finger.pulley_radii[2]", "tile.contact_stiffness[0]", "tile.spring_stiffness"):
         assert name in message
-    for name in ("tile.contact_stiffness", "palm.length", "gripper.pulley_radii"):
+    for name in ("tile.base_engagement", "palm.length", "gripper.pulley_radii"):
         assert name not in message
 
 

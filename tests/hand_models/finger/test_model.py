@@ -231,7 +231,7 @@ def test_with_its_middle_tile_in_the_air_two_phalanges_become_one_link():
     finger = SettledFinger(MODEL, tuple(straight))
     f, r, k = 50.0, MODEL.pulley_radii, 0.05
     shear, normal, stop = (v.sum(axis=1) for v in loads(finger, f))
-    expected_shear = FIG12_SHEAR + MODEL.shear_gain * (f - 37.0)
+    expected_shear = FIG12_SHEAR + np.array(MODEL.shear_gain) * (f - 37.0)
     np.testing.assert_allclose(shear, expected_shear * [1, 0, 1], rtol=1e-6)
     # shear acts H off every joint's line, along the straight finger: moment −H T
     distal = (f * r[2] - H * shear[2]) / 0.02

@@ -52,7 +52,7 @@ def equation_6(settled, i, tension):
         distal = -settled.axes[tile, 0]
         row = np.zeros(6)
         row[2 * j : 2 * j + 2] = [distal @ frame.along, distal @ up]
-        shear = model.engagement[j] * closing + model.shear_gain * (tension - closing)
+        shear = model.engagement[j] * closing + model.shear_gain[j] * (tension - closing)
         shear *= settled.engagement[tile]
         rows.append(row)
         values.append(0.0 if contact.kind == "frame" else shear)

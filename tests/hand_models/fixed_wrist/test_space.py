@@ -48,7 +48,10 @@ def interval(settled, i, surface):
     pieces = inner_half_planes(surface)
     for t in own_tiles(settled, i):
         (t0, t1), (n0, n1) = settled.loads[t]
-        least = max(least, -t0 / t1)
+        # a base tile is pressed as the proximal phalanx after it is
+        base = settled.tiles[t].phalanx == "base"
+        p0, p1 = settled.engagement[t] * settled.loads[t + 1, 1] if base else (n0, n1)
+        least = max(least, -(t0 + surface.friction * p0) / (t1 + surface.friction * p1))
         for p in pieces:
             constant = p.capacity - p.a_shear * t0 - p.a_normal * n0
             slope = p.a_shear * t1 + p.a_normal * n1
@@ -172,7 +175,12 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
         shear, normal, _ = loads[tile.finger, tile.phalanx]
         name = f"{tile.finger}/{tile.phalanx}"
         if tile.contact in ("face", "edge"):
-            assert kept[f"{name}/dragged_backwards"] == (shear >= -1e-9)
+            pressed = normal
+            if tile.phalanx == "base":
+                pressed = holds[tile.finger, "base"] * loads[tile.finger, "proximal"][1]
+            assert kept[f"{name}/dragged_backwards"] == (
+                shear + settled.surface.friction * pressed >= -1e-9
+            )
         if tile.contact == "frame":
             assert kept[f"{name}/frame_pulled"] == (normal >= -1e-9)
     for i, joint, torque in settled.stops:

@@ -16,11 +16,13 @@ def test_its_vertices_are_the_sums_of_each_finger_at_its_least_and_its_largest_t
     settled = pinch()
     space = parallelepiped(settled)
     largest = [limit.tension for limit in tension_limits(settled)]
-    loads = settled.loads
-    least = [
-        max(-t[0, 0] / t[0, 1] for t in loads[(settled.finger_of == i) & settled.touching])
-        for i in range(4)
-    ]
+    friction = settled.surface.friction
+    least = []
+    for i in range(4):
+        own = (settled.finger_of == i) & settled.touching
+        pressed = own & np.array([tile.phalanx != "base" for tile in settled.tiles])
+        drags = settled.loads[pressed, 0] + friction * settled.loads[pressed, 1]
+        least.append(max(-drag[0] / drag[1] for drag in drags))
     corners = np.array(
         [space.wrench(choice) for choice in itertools.product(*zip(least, largest, strict=True))]
     )

@@ -81,7 +81,14 @@ class ByHand:
             self.hard[f"{finger}/{phalanx}/frame_pulled"] = {tension: -more_normal}, 0.0, normal
         if contact not in ("face", "edge"):
             return
-        self.hard[f"{finger}/{phalanx}/dragged_backwards"] = {tension: -more_shear}, 0.0, shear
+        friction, pressed = settled.surface.friction, (normal, more_normal)
+        if phalanx == "base":
+            pressed = settled.engagement[t] * settled.loads[t + 1, 1]
+        self.hard[f"{finger}/{phalanx}/dragged_backwards"] = (
+            {tension: -more_shear - friction * pressed[1]},
+            0.0,
+            shear + friction * pressed[0],
+        )
         engagement = settled.engagement[t]
         share = engagement / self.shares[finger]
         if settled.grasp.lateral:

@@ -117,7 +117,7 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
                 settled.positions[row], place + (gap if on else 0.0) * UP, atol=1e-11
             )
             np.testing.assert_allclose(settled.engagement[row], share, atol=1e-8)
-            gain = hand.finger.shear_gain
+            gain = hand.finger.shear_gain[0]
             drag = share * np.array([(hand.finger.base_engagement - gain) * closing, gain])
             np.testing.assert_allclose(settled.loads[row], [drag, (0.0, 0.0)], atol=1e-7)
             row += 1

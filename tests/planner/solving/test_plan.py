@@ -105,16 +105,20 @@ def test_every_hand_finger_and_tile_is_there_in_order(seeds):
 
 @many
 def test_hard_limits_hold_at_any_utilisation(seeds):
-    for _, answer in feasible(seeds):
+    for question, answer in feasible(seeds):
         tiny = 1e-6 * max(1.0, *(np.abs(hand.wrench).max() for hand in answer.hands))
-        for hand in answer.hands:
+        for hand, place in zip(answer.hands, question.stance.hands, strict=True):
+            friction = place.surface.friction
             assert hand.palm.force[0] <= tiny
             assert hand.palm.force[1] == 0.0
             assert hand.palm.force[2] >= -tiny
             for finger in hand.fingers:
                 assert finger.tendon_tension >= 0.0
-                for tile in finger.tiles:
-                    assert tile.shear >= -tiny
+                normals = [tile.normal for tile in finger.tiles]
+                for i, tile in enumerate(finger.tiles):
+                    # a base tile is pressed as the proximal phalanx after it is
+                    pressed = max(normals[i + 1], 0.0) if tile.phalanx == "base" else tile.normal
+                    assert tile.shear >= -friction * pressed - tiny
                     if tile.contact == "none":
                         assert not any(tile.force)
 

@@ -1,0 +1,228 @@
+"""What Figs. 12 to 14 say of the paper's gripper, and how far a set of its numbers is from it.
+
+Each datum has a tolerance, and a residual is what the model is off in tolerances. First come the
+ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the edge of its
+surface seen along F_z (0.2 N·m everywhere, 0.1 on average); the misfit of a set is the largest of
+these residuals. Where it can, a set is also to have the surface's side view and the best planes of
+loading, whose tolerances are wide. Wrenches are those really held, as far as the paper's surface
+goes: none that press more than that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, CruxError, SolverError
+from hand_models.compliance import PLANAR, Gripper, boundary, gripper_table, linear_box, search
+from hand_models.experiments.pulling import pulled_off_poses
+from hand_models.experiments.sweep_axis import Axis
+from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, with_mirrored
+from hand_models.finger import PHALANGES
+from hand_models.parameters import ParameterTable, experiment_table
+
+__all__ = ["Datum", "GripperFit"]
+
+NEAR_SHARE: Final = 0.1
+NEAR_FORCE: Final = 0.3
+"""By what share a force of Fig. 12 or an extent may be off, a force at least by so much [N]."""
+
+NEAR_EDGE: Final = 0.2
+NEAR_EDGE_ON_AVERAGE: Final = 0.1
+"""By how much the edge of the surface may be off [N·m]."""
+
+WIDE: Final = 1.0
+ABOUT: Final = 0.4
+"""Shares by which the side view and the planes may be off: what they count beside the others."""
+
+RAYS: Final = 350
+"""Of the boundary of the wrenches held; more are sent in the directions `TOWARD`."""
+
+PER_AXIS: Final = 60
+"""Poses of the wrist along each axis of the fine search, as of the studies."""
+
+TOWARD: Final = np.array(
+    [
+        (1.0, 0.0, 0.0),
+        (1.0, 0.0, 0.5),
+        (1.0, 0.0, 1.0),
+        (0.5, 0.0, 1.0),
+        (0.3, 0.0, 1.0),
+        (0.0, 0.0, 1.0),
+        (-0.5, 0.0, 1.0),
+        (-1.0, 0.0, 1.0),
+        (-1.0, 0.0, 0.5),
+        (1.0, 0.0, -0.3),
+        (0.0, -1.0, 0.0),
+        (0.5, -1.0, 0.0),
+        (1.0, -1.0, 0.0),
+        (1.0, -0.5, 0.0),
+        (1.0, -0.5, 0.3),
+    ]
+)
+"""Directions of the data over the extents: along F_x, F_z and M_y, of the paper's signs."""
+
+HOPELESS: Final = 30.0
+"""Residual where a set of numbers gives no gripper that holds."""
+
+
+class Datum(NamedTuple):
+    """One number that the figures give.
+
+    Attributes
+    ----------
+    label, unit : str
+    wanted, tolerance : float
+    first : bool
+        Whether it counts in the misfit.
+    """
+
+    label: str
+    unit: str
+    wanted: float
+    tolerance: float
+    first: bool
+
+
+def _numbers() -> tuple[Axis, ...]:
+    """Return the gripper's numbers to be found, each from the least to the most plausible."""
+    one, each = (None,), range(len(PHALANGES))
+    places: dict[str, tuple[str, str, Iterable[int | None]]] = {
+        "tile_height": ("finger", "tile_height", one),
+        "seated_contact": ("finger", "seated_contact", one),
+        "middle_radius": ("finger", "pulley_radii", (1,)),
+        "distal_radius": ("finger", "pulley_radii", (2,)),
+        "engagement": ("tile", "engagement", each),
+        "contact_stiffness": ("tile", "contact_stiffness", each),
+    }
+    table, found = experiment_table(), []
+    for plausible, quantity in table.sections["calibration"].items():
+        section, name, indices = places.get(plausible, ("gripper", plausible, one))
+        ends = table.vector("calibration", plausible)
+        found += [Axis(section, name, index, ends, quantity.unit) for index in indices]
+    return tuple(found)
+
+
+class GripperFit:
+    """Residuals of the data over the gripper's numbers, each in its plausible range from 0 to 1.
+
+    Parameters
+    ----------
+    table : ParameterTable, optional
+        From `gripper_table`, with all other numbers.
+    """
+
+    def __init__(self, table: ParameterTable | None = None) -> None:
+        self.table = table or gripper_table()
+        self.numbers = _numbers()
+        self.names = [number.entry.partition(".")[2] for number in self.numbers]
+        self.low, high = np.array([number.values for number in self.numbers]).T
+        self.width = high - self.low
+        self._settings = settings = experiment_table()
+        self._edge_at = np.array(settings.vector("fig13", "edge_force_x"))
+        self._edge = np.array(settings.vector("fig13", "edge_moment"))
+        self.data = tuple(self._data())
+        self.wanted = np.array([datum.wanted for datum in self.data])
+        self.tolerance = np.array([datum.tolerance for datum in self.data])
+        self.first = np.array([datum.first for datum in self.data])
+
+    def _data(self) -> Iterable[Datum]:
+        settings = self._settings
+        for end in ("unloaded", "pulled"):
+            for kind in ("shear", "normal"):
+                values = settings.vector("fig12", f"{kind}_{end}")
+                for phalanx, value in zip(PHALANGES, values, strict=True):
+                    near = max(NEAR_SHARE * abs(value), NEAR_FORCE)
+                    yield Datum(f"{phalanx} {kind}, {end}", "N", value, near, True)
+        for name, words, unit in (
+            ("force_x", "F_x", "N"),
+            ("force_z", "F_z", "N"),
+            ("moment", "M_y", "N·m"),
+        ):
+            value = settings.scalar("fig13", name)
+            yield Datum(f"extent of {words}", unit, value, NEAR_SHARE * abs(value), True)
+        for force, moment in zip(self._edge_at.tolist(), self._edge.tolist(), strict=True):
+            yield Datum(f"edge at F_x = {force:g} N", "N·m", moment, NEAR_EDGE, True)
+        yield Datum("edge, off on average", "N·m", 0.0, NEAR_EDGE_ON_AVERAGE, True)
+        side = settings.scalar("fig13", "side_force_z")
+        words = f"pull-off at F_x = {settings.scalar('fig13', 'side_force_x'):g} N"
+        yield Datum(words, "N", side, WIDE * abs(side), False)
+        for kind in ("force", "moment"):
+            arm = 1.0 / settings.scalar("fig14", f"{kind}_ratio")
+            yield Datum(f"M_y : F_x best for {kind}", "m", arm, ABOUT * arm, False)
+
+    def start(self) -> Array:
+        """Return where the table is."""
+        now = [number.current(self.table) for number in self.numbers]
+        return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
+
+    def values(self, x: Array) -> Array:
+        """Return the numbers in SI units."""
+        return np.asarray(self.low + self.width * x)
+
+    def gripper(self, x: Array) -> Gripper:
+        """Return the gripper of some numbers, on the surface of Fig. 13."""
+        table, settings = self.table, self._settings
+        for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
+            table = number.set(table, value)
+        diameter, tension = (settings.scalar("fig13", name) for name in ("diameter", "tension"))
+        return Gripper(
+            diameter, tension, table=table, most_pressing=settings.scalar("fig13", "top")
+        )
+
+    def wrenches(self, gripper: Gripper, *, fine: bool = False) -> Array:
+        """Return the outermost wrenches held, (F_x, F_z, M_y) in the paper's signs, shape (n, 3).
+
+        Parameters
+        ----------
+        gripper : Gripper
+        fine : bool, optional
+            Whether by the grid of the studies; else by rays, some per cent short and sooner.
+        """
+        if fine:
+            found = search(gripper, PER_AXIS)
+        else:
+            toward = np.zeros((len(TOWARD), 6))
+            size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
+            toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
+            found = boundary(gripper, linear_box(gripper), RAYS, toward)
+        return with_mirrored(in_paper_signs(found.wrenches))
+
+    def model(self, x: Array, *, fine: bool = False) -> Array:
+        """Return what the model has for the data.
+
+        Raises
+        ------
+        CruxError
+            If the fingers do not lie on the surface, or nothing holds.
+        """
+        gripper, settings = self.gripper(x), self._settings
+        pull = settings.scalar("fig12", "pull")
+        poses = pulled_off_poses(gripper, np.array([0.0, pull]))
+        if len(poses) < 2:
+            raise SolverError(f"no pose of the gripper balances a pull of {pull:g} N")
+        loads, _ = gripper.finger_loads(poses)
+        held = self.wrenches(gripper, fine=fine)
+        along_z = edge(held[:, [0, 2]], self._edge_at)
+        down = held[:, [0, 1]] * (1.0, -1.0)
+        side = -edge(down, np.array([settings.scalar("fig13", "side_force_x")]))
+        strengths = np.hypot(held[:, 0], held[:, 1]), np.abs(held[:, 2])
+        best = [held[strength.argmax()] for strength in strengths]
+        off = float(np.abs(along_z - self._edge).mean())
+        arms = [wrench[2] / wrench[0] for wrench in best]
+        lines = np.hstack([loads.shears, loads.normals]).ravel()
+        return np.array([*lines, *extents(held), *along_z, off, *side, *arms])
+
+    def residuals(self, x: Array, *, fine: bool = False) -> Array:
+        """Return how many tolerances each datum is off."""
+        try:
+            off = (self.model(x, fine=fine) - self.wanted) / self.tolerance
+        except CruxError:
+            return np.full(len(self.data), HOPELESS)
+        return np.asarray(np.nan_to_num(np.clip(off, -HOPELESS, HOPELESS), nan=HOPELESS))
+
+    def misfit(self, residuals: Array) -> float:
+        """Return the largest residual of the data that come first."""
+        return float(np.abs(residuals[self.first]).max())
