@@ -11,6 +11,7 @@ from .mesh_files import MeshFiles as MeshFiles
 from .own_models import (
     Robots as Robots,
     builder_of as builder_of,
+    read_draws as read_draws,
     read_hand as read_hand,
     read_robot as read_robot,
     robots_of as robots_of,
