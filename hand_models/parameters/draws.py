@@ -85,8 +85,11 @@ def own_draw(raw: Mapping[str, Any]) -> Draw:
         raise InvalidInputError(f"unknown; a draw has {valid}", field=unknown[0])
     tables = {}
     for name in Draw._fields:
+        entries = raw.get(name) or {}
+        if not isinstance(entries, Mapping):
+            raise InvalidInputError("sections of entries are needed", field=name)
         with within(name):
-            tables[name] = ParameterTable.of(raw.get(name) or {})
+            tables[name] = ParameterTable.of(entries)
     draw = Draw(**tables)
     _check(draw, None)
     if not (list(draw.hand) or list(draw.surfaces)):
