@@ -34,7 +34,12 @@ from service.commands.rock import rock
 from service.commands.spaces import body_space, wrench_space
 from service.commands.stances import read_request, read_route
 from service.commands.stream import stream
-from service.commands.studies import chosen_study, print_study, sweep_options
+from service.commands.studies import (
+    NAMES as STUDY_NAMES,
+    chosen_study,
+    print_study,
+    sweep_options,
+)
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -235,7 +240,7 @@ def route(
     return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
 
 
-@crux.command(epilog=f"NAME is one of {', '.join(studies.STUDIES)}.")
+@crux.command(epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
 @click.argument("name")
 @folder_option("Where result.json and the pictures go.")
 @sweep_options
