@@ -258,15 +258,16 @@ class Question:
             )
 
     def _check_draws(self) -> None:
-        if self.draws is None:
-            return
         if "spread" not in self.want:
-            raise InvalidInputError("only spread is told over draws; want it", field="draws")
-        object.__setattr__(self, "draws", tuple(self.draws))
-        if not 1 <= len(self.draws) <= MOST_DRAWS:
-            raise InvalidInputError(
-                f"from 1 to {MOST_DRAWS} draws are needed, got {len(self.draws)}", field="draws"
-            )
+            if self.draws is not None:
+                raise InvalidInputError("only spread is told over draws; want it", field="draws")
+            return
+        if self.draws is not None:
+            object.__setattr__(self, "draws", tuple(self.draws))
+            if not 1 <= len(self.draws) <= MOST_DRAWS:
+                raise InvalidInputError(
+                    f"from 1 to {MOST_DRAWS} draws are needed, got {len(self.draws)}", field="draws"
+                )
         with within("draws"):
             drawn_hands(self.stance.robot.hand, self.draws)
 
