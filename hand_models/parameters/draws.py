@@ -174,30 +174,11 @@ def _fitted(sets: ParameterTable) -> Iterator[tuple[str, str, Quantity]]:
 
 def _checked_count(sets: ParameterTable) -> int:
     """Return how many sets there are."""
-    counts = {}
-    for name in OF_FIT:
-        counts[f"fit.{name}"] = len(sets.vector("fit", name))
+    counts = {f"fit.{name}": len(sets.vector("fit", name)) for name in OF_FIT}
     sets.vector(FITTED, "shear_limit")
-    hand, surfaces = hand_table().sections, surface_table().sections
     for section, name, quantity in _fitted(sets):
-        field = f"{section}.{name}"
-        found = PATH.fullmatch(name)
-        entry = found[1] if found else name
-        shared = surfaces["defaults"] if section in ("defaults", FITTED) else {}
-        entries = {**shared, **surfaces.get(section, {}), **hand.get(section, {})}
-        if section not in (*hand, "defaults", FITTED) or entry not in entries:
-            raise InvalidInputError("no entry of hand.toml or surfaces.toml", field=field)
-        value = entries[entry].value
-        size = len(value) if isinstance(value, list) else 0
-        if (found is None or found[2] is None) if size else found is None or found[2] is not None:
-            form = f"{entry}[i] for each of its numbers" if size else entry
-            raise InvalidInputError(f"must be {form}", field=field)
-        if size and found is not None and int(found[2]) >= size:
-            raise InvalidInputError(f"{entry} has {size} numbers, from [0]", field=field)
-        if quantity.unit != entries[entry].unit:
-            wanted = entries[entry].unit
-            raise InvalidInputError(f"must be in {wanted!r}, got {quantity.unit!r}", field=field)
-        counts[field] = len(sets.vector(section, name))
+        _check_entry(section, name, quantity)
+        counts[f"{section}.{name}"] = len(sets.vector(section, name))
     count = counts["fit.misfit"]
     for field, other in counts.items():
         if other != count:
@@ -206,7 +187,33 @@ def _checked_count(sets: ParameterTable) -> int:
             )
     if count < LEAST_SETS:
         raise InvalidInputError(f"at least {LEAST_SETS} sets are needed, got {count}", field="fit")
+    for k, misfit in enumerate(sets.vector("fit", "misfit")):
+        if not 0.0 <= misfit <= 1.0:
+            raise InvalidInputError(
+                f"must be from 0 to 1, the tolerances of the data, got {misfit:g}",
+                field=f"fit.misfit.value[{k}]",
+            )
+    if len(sets.vector("ranges", "rock_ratio")) != 2:
+        raise InvalidInputError("two numbers are needed", field="ranges.rock_ratio")
     return count
+
+
+def _check_entry(section: str, name: str, quantity: Quantity) -> None:
+    """Refuse a list over the sets of what is no number of a hand, or of a fitted tile."""
+    field, hand, surfaces = f"{section}.{name}", hand_table().sections, surface_table().sections
+    of_tile = {**surfaces["defaults"], **surfaces[FITTED]}
+    entries = of_tile if section in ("defaults", FITTED) else hand.get(section, {})
+    found = PATH.fullmatch(name)
+    entry, index = (name, None) if found is None else (found[1], found[2])
+    if entry not in entries:
+        raise InvalidInputError("no number of hand.toml or of a tile's law", field=field)
+    usual = entries[entry]
+    size = len(usual.value) if isinstance(usual.value, list) else 0
+    if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):
+        form = f"one of {entry}[0] to {entry}[{size - 1}]" if size else entry
+        raise InvalidInputError(f"must be {form}", field=field)
+    if quantity.unit != usual.unit:
+        raise InvalidInputError(f"must be in {usual.unit!r}, got {quantity.unit!r}", field=field)
 
 
 def _hand_of(
@@ -232,7 +239,8 @@ def _hand_of(
             assert path is not None  # of a checked table
             value = sets.vector(section, name)[k]
             change(section, path[1], value, quantity, int(path[2] or 0))
-            if (section, name) == ("tile", "engagement[0]"):
+            drawn = path[1] in found.get(section, {})
+            if (section, name) == ("tile", "engagement[0]") and drawn:
                 # a base tile engages as a proximal one
                 change(section, "base_engagement", value, quantity, 0)
     aside = sets.quantity("ranges", "seated_contact")

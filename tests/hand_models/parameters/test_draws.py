@@ -109,11 +109,19 @@ def test_numbers_that_the_caller_knows_are_not_drawn():
         }
 
 
+def test_where_engagement_is_known_so_is_that_of_base_tiles():
+    mine = {"tile": {"engagement": own([0.13, 0.19, 0.21], "1")}}
+    for draw in bundled_draws(own_hand(ParameterTable.of(mine))):
+        assert set(draw.hand.sections["tile"]) == {"contact_stiffness"}
+
+
 @pytest.mark.parametrize(
     ("table", "field"),
     [
         (changed("fit", "misfit"), "fit.misfit"),
         (changed("fit", "valley", value=[1.0] * 29), "fit.valley"),
+        (changed("fit", "misfit", value=[0.5] * 29 + [1.2]), "fit.misfit.value[29]"),
+        (changed("ranges", "rock_ratio", value=[2.0]), "ranges.rock_ratio"),
         (changed("sandpaper-36", "shear_limit"), "sandpaper-36.shear_limit"),
         (changed("tile", "engagement[0]", value=[0.1] * 31), "tile.engagement[0]"),
         (changed("tile", "engagement[3]", value=[0.1] * 30), "tile.engagement[3]"),
