@@ -1,8 +1,21 @@
-from .own import LARGEST as LARGEST, load_own_hand as load_own_hand, own_hand as own_hand
+from .draws import (
+    Draw as Draw,
+    bundled_draws as bundled_draws,
+    draws_of as draws_of,
+    even_quantiles as even_quantiles,
+    own_draw as own_draw,
+)
+from .own import (
+    LARGEST as LARGEST,
+    load_own_hand as load_own_hand,
+    own_hand as own_hand,
+    own_surfaces as own_surfaces,
+)
 from .tables import (
     LONGEST_QUOTE as LONGEST_QUOTE,
     ParameterTable as ParameterTable,
     Quantity as Quantity,
+    draw_table as draw_table,
     experiment_table as experiment_table,
     hand_table as hand_table,
     scan_table as scan_table,

@@ -1,4 +1,4 @@
-"""A hand of the caller's own: some entries in place of the bundled hand's.
+"""A hand, or surfaces, of the caller's own: some entries in place of the bundled ones.
 
 An entry must be one that the bundled table has, in its unit and of its shape, and of a sign that it
 can have. What only several numbers together make impossible, the models that read them refuse.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from textwrap import shorten
 from typing import Final
@@ -16,9 +16,15 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError
-from hand_models.parameters.tables import LONGEST_QUOTE, ParameterTable, Quantity, hand_table
+from hand_models.parameters.tables import (
+    LONGEST_QUOTE,
+    ParameterTable,
+    Quantity,
+    hand_table,
+    surface_table,
+)
 
-__all__ = ["load_own_hand", "own_hand"]
+__all__ = ["load_own_hand", "own_hand", "own_surfaces"]
 
 LARGEST: Final = {"m": 1.0, "rad": 2.0 * math.pi}
 """By unit, what no number of a hand exceeds; larger ones are in millimetres or degrees."""
@@ -77,20 +83,45 @@ def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> Paramet
         cannot have; the field is its section and name.
     """
     bundled = hand_table()
-    spread: dict[str, dict[str, Quantity]] = {}
+    return (base or bundled).replaced(_checked(own, bundled.sections))
+
+
+def own_surfaces(own: ParameterTable) -> ParameterTable:
+    """Return all numbers of the surfaces, some of them the caller's own.
+
+    Parameters
+    ----------
+    own : ParameterTable
+        Entries that differ: of a preset, or of the ``defaults`` that hold for all presets which
+        have no such entry.
+
+    Raises
+    ------
+    InvalidInputError
+        As `own_hand`.
+    """
+    bundled = surface_table()
+    shared = bundled.sections["defaults"]
+    presets = {name: each for name, each in bundled.sections.items() if name != "bounds"}
+    known = {name: {**shared, **each} for name, each in presets.items()}
+    return bundled.replaced(_checked(own, known))
+
+
+def _checked(own: ParameterTable, known: Mapping[str, Mapping[str, Quantity]]) -> ParameterTable:
+    """Return entries that are known, and can stand in the place of the known ones."""
+    found: dict[str, dict[str, Quantity]] = {}
     for section, entries in own.sections.items():
-        if section not in bundled.sections:
-            raise InvalidInputError(
-                f"unknown section; {_known(section, bundled.sections)}", field=section
-            )
-        known = bundled.sections[section]
+        if section not in known:
+            raise InvalidInputError(f"unknown section; {_known(section, known)}", field=section)
         for name, quantity in entries.items():
             field = f"{section}.{name}"
-            if name not in known:
-                raise InvalidInputError(f"unknown entry; {_known(name, known)}", field=field)
-            spread.setdefault(section, {})[name] = _of_all(quantity, known[name], field)
-            _check(spread[section][name], known[name], field)
-    return (base or bundled).replaced(ParameterTable(spread))
+            if name not in known[section]:
+                like = _known(name, known[section])
+                raise InvalidInputError(f"unknown entry; {like}", field=field)
+            usual = known[section][name]
+            each = found.setdefault(section, {})[name] = _of_all(quantity, usual, field)
+            _check(each, usual, field)
+    return ParameterTable(found)
 
 
 def _known(given: str, known: Iterable[str]) -> str:

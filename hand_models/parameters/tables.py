@@ -2,8 +2,9 @@
 
 The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those of a tile's
 spines in ``spines.toml``, those of reading scanned rock in ``scan.toml``, those of the paper's
-experiments in ``experiments.toml``, beside this file. A caller's own file in the form of
-``hand.toml`` may replace some or all of the hand's (`hand_models.parameters.own`).
+experiments in ``experiments.toml``, sets of numbers that meet the published data in ``draws.toml``,
+beside this file. A caller's own file in the form of ``hand.toml`` may replace some or all of the
+hand's (`hand_models.parameters.own`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from hand_models.base import InvalidInputError
 __all__ = [
     "ParameterTable",
     "Quantity",
+    "draw_table",
     "experiment_table",
     "hand_table",
     "scan_table",
@@ -251,3 +253,9 @@ def scan_table() -> ParameterTable:
 def spine_table() -> ParameterTable:
     """Return the numbers of a tile's spines and of the rock's asperities, ``spines.toml``."""
     return _bundled("spines.toml")
+
+
+@cache
+def draw_table() -> ParameterTable:
+    """Return sets of numbers that meet the published data, ``draws.toml``."""
+    return _bundled("draws.toml")

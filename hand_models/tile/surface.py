@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, lru_cache
 from typing import Final, NamedTuple
 
@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.parameters import surface_table
+from hand_models.parameters import ParameterTable, surface_table
 
 __all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
 
@@ -73,6 +73,9 @@ class Surface:
         Standard deviation of ``shear_limit`` from place to place [N].
     friction : float
         μ, Coulomb friction of a tile that is dragged away from the finger's base.
+    name : str or None
+        Of the preset; None for a caller's own numbers. Surfaces of equal numbers are equal whatever
+        their names.
     """
 
     shear_limit: float
@@ -84,12 +87,13 @@ class Surface:
     lateral_pull_off_ratio: float = 1.0
     shear_scatter: float = 0.0
     friction: float = 0.0
+    name: str | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name in self._numbers():
+            value = getattr(self, name)
             if not math.isfinite(value):
-                raise InvalidInputError(f"must be finite, got {value}", field=field.name)
+                raise InvalidInputError(f"must be finite, got {value}", field=name)
         for name in ("shear_limit", "pull_off_limit", "lateral_limit"):
             if getattr(self, name) <= 0.0:
                 raise InvalidInputError(
@@ -145,7 +149,12 @@ class Surface:
     @cached_property
     def _hash(self) -> int:
         # worked out once: surfaces are keys wherever hands are
-        return hash(tuple([getattr(self, field.name) for field in fields(self)]))
+        return hash(tuple([getattr(self, name) for name in self._numbers()]))
+
+    @classmethod
+    def _numbers(cls) -> list[str]:
+        """Return the names of the numbers."""
+        return [each.name for each in fields(cls) if each.compare]
 
     @property
     def strongest_tile(self) -> float | None:
@@ -154,8 +163,14 @@ class Surface:
         return most if self.shear_limit > most else None
 
     @classmethod
-    def named(cls, name: str) -> Surface:
+    def named(cls, name: str, table: ParameterTable | None = None) -> Surface:
         """Return a preset of ``parameters/surfaces.toml``.
+
+        Parameters
+        ----------
+        name : str
+        table : ParameterTable, optional
+            All numbers of the surfaces; the bundled ones by default.
 
         Raises
         ------
@@ -166,7 +181,7 @@ class Surface:
             raise InvalidInputError(
                 f"unknown surface {name!r}; known are {', '.join(surface_names())}"
             )
-        return _preset(name)
+        return _preset(name) if table is None else _from_table(name, table)
 
     @classmethod
     def from_values(cls, values: Mapping[str, float]) -> Surface:
@@ -178,7 +193,7 @@ class Surface:
             ``shear_limit`` [N], and any other attribute; those left out follow from it by the
             default ratios of ``parameters/surfaces.toml``.
         """
-        known = [field.name for field in fields(cls)]
+        known = cls._numbers()
         for key in values:
             if key not in known:
                 raise InvalidInputError(f"unknown; known are {', '.join(known)}", field=key)
@@ -188,7 +203,7 @@ class Surface:
             raise InvalidInputError(
                 f"must be a force above 0 N, got {values['shear_limit']:g}", field="shear_limit"
             )
-        base = _from_ratios(values["shear_limit"], "defaults")
+        base = _from_ratios(values["shear_limit"], "defaults", surface_table())
         return replace(base, **values)  # type: ignore[arg-type]
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
@@ -265,9 +280,7 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     return np.where(share > LEAST, share, 0.0)
 
 
-def _from_ratios(shear_limit: float, section: str) -> Surface:
-    table = surface_table()
-
+def _from_ratios(shear_limit: float, section: str, table: ParameterTable) -> Surface:
     def ratio(name: str) -> float:
         own = name in table.sections.get(section, {})
         return table.scalar(section if own else "defaults", name)
@@ -304,6 +317,10 @@ def surface_names() -> tuple[str, ...]:
     return tuple(name for name in surface_table().sections if name not in ("bounds", "defaults"))
 
 
+def _from_table(name: str, table: ParameterTable) -> Surface:
+    return replace(_from_ratios(table.scalar(name, "shear_limit"), name, table), name=name)
+
+
 @lru_cache(maxsize=64)
 def _preset(name: str) -> Surface:
-    return _from_ratios(surface_table().scalar(name, "shear_limit"), name)
+    return _from_table(name, surface_table())

@@ -49,6 +49,7 @@ Unfinished = Literal[
     "certificate",
     "explanation",
     "robust",
+    "spread",
 ]
 
 UNFINISHED: Final[dict[Unfinished, str]] = {
@@ -61,6 +62,7 @@ UNFINISHED: Final[dict[Unfinished, str]] = {
     "certificate": "it was found what keeps the hands from a plan within the limits",
     "explanation": "it was found which limits alone leave no balance",
     "robust": "the load factor was found at all places of the hands",
+    "spread": "a plan was found in all draws of the numbers",
 }
 """What was not there yet."""
 

@@ -25,6 +25,7 @@ from hand_models.base import Array, whole_file
 from planner.pictures.plan_scene import UP, Scene, ViewDirections, scene_of, view_directions
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
+from planner.pictures.spread_plots import draw_spread
 from planner.question import Question
 from planner.result import Plan
 
@@ -44,6 +45,12 @@ TOP: Final = 0.875
 
 WORDS: Final = (0.7, BOTTOM, 0.28, TOP - BOTTOM)
 """Left, bottom, width and height of what is said where there are no loads, over the picture's."""
+
+SPREAD: Final = (0.045, BOTTOM, 0.33, 0.11)
+"""The same of the load factor's spread, under the view from behind."""
+
+ABOVE_SPREAD: Final = 0.3
+"""Where that view begins then, over the picture's height."""
 
 REASON: Final = 0.45
 """From the upper edge down to the reason [inch]."""
@@ -95,7 +102,11 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
     FigureCanvasAgg(figure)  # which tells how large texts are
     places = {"bottom": BOTTOM, "top": TOP}
-    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=0.0, top=TOP)
+    under = 0.0
+    if plan.spread is not None and plan.spread.load_factor is not None:
+        draw_spread(figure.add_axes(SPREAD), plan.spread, plan.load_factor)
+        under = ABOVE_SPREAD
+    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=TOP)
     _draw_space(figure, space[0], scene, seen)
     sides = figure.add_gridspec(2, 1, left=0.435, right=0.665, hspace=0.3, **places)
     _draw_sides(figure.add_subplot(sides[0]), figure.add_subplot(sides[1]), scene, seen)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -11,7 +11,9 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, BoundedStore, InvalidInputError, within, wrench_transports
+from hand_models.compliance import FloatingWrist
 from hand_models.fixed_wrist import wrench_spaces
+from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
 from planner.prepare.hand_sets import HandSets, Sets, are_own
@@ -81,6 +83,21 @@ class PreparedStance:
         question = replace(self.question, body_wrench=wrench)
         return replace(self, question=question, hands=self.hands.turned(wrench), wrench=wrench)
 
+    def with_hands(self, settled: Sequence[SettledHand]) -> PreparedStance:
+        """Return the same stance, body, joints and all, with its hands closed otherwise.
+
+        Raises
+        ------
+        InvalidInputError
+            If a floating hand does not hold its preload there; the field begins with
+            ``stance.hands``.
+        """
+        stance, cap = self.question.stance, self.question.limits.tendon_tension
+        wrists = tuple([wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)])
+        spaces, scaled = _sets_of(settled, wrists, self.hands.added, cap)
+        hands = replace(self.hands, spaces=spaces, scaled=scaled, wrists=wrists)
+        return replace(self, batch=HandBatch.of(settled), hands=hands)
+
 
 def checked_question(question: Question) -> Question:
     """Return a question.
@@ -128,12 +145,7 @@ def assemble(
     added = _added_rows(question, where)
 
     def made() -> tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
-        fixed = [hand for hand, wrist in zip(settled, wrists, strict=True) if wrist is None]
-        of_fixed = iter(wrench_spaces(fixed, cap))
-        plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
-        pairs = zip(plain, added, strict=True)
-        spaces = tuple([each if rows is NOTHING else rows.on(each) for each, rows in pairs])
-        return HandBatch.of(settled), spaces, tuple([scaled_rows(each) for each in spaces])
+        return HandBatch.of(settled), *_sets_of(settled, wrists, added, cap)
 
     own = are_own(wrists, added)
     batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)
@@ -148,6 +160,24 @@ def assemble(
         added=added,
     )
     return batch, hands
+
+
+def _sets_of(
+    settled: Sequence[SettledHand],
+    wrists: Sequence[FloatingWrist | None],
+    added: Sequence[StanceConstraints],
+    cap: float | None,
+) -> tuple[tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
+    """Return the sets of hands with what the stance adds to them, and these as programs need them.
+
+    ``cap``: on tensions [N].
+    """
+    fixed = [hand for hand, wrist in zip(settled, wrists, strict=True) if wrist is None]
+    of_fixed = iter(wrench_spaces(fixed, cap))
+    plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
+    pairs = zip(plain, added, strict=True)
+    spaces = tuple([each if rows is NOTHING else rows.on(each) for each, rows in pairs])
+    return spaces, tuple([scaled_rows(each) for each in spaces])
 
 
 def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstraints, ...]:

@@ -1,4 +1,10 @@
+from .draws import (
+    DrawnHand as DrawnHand,
+    drawn_hands as drawn_hands,
+    drawn_quantities as drawn_quantities,
+)
 from .question import (
+    MOST_DRAWS as MOST_DRAWS,
     ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,

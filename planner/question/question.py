@@ -9,11 +9,13 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, finite_vector, skew
+from hand_models.base import Array, InvalidInputError, finite_vector, skew, within
 from hand_models.hand import FINGERS
+from hand_models.parameters import Draw
+from planner.question.draws import drawn_hands
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["ForceCap", "Limits", "Load", "Objective", "Question"]
+__all__ = ["MOST_DRAWS", "ForceCap", "Limits", "Load", "Objective", "Question"]
 
 Frame = Literal["hand", "body", "world"]
 
@@ -171,10 +173,13 @@ Objective = Literal["max_margin", "min_effort"]
 OBJECTIVES: Final = get_args(Objective)
 """What a plan may be the best in."""
 
-Want = Literal["load_factor", "prices", "model", "robust"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread"]
 
 WANTS: Final = get_args(Want)
 """What may be wanted beside a plan."""
+
+MOST_DRAWS: Final = 100
+"""Of a caller's own: each costs a plan and a load factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +193,7 @@ class Question:
         In B [N, N·m]; computed from ``load`` if it is not given.
     load : Load
     limits : Limits
-    want : frozenset of {'load_factor', 'prices', 'model', 'robust'}
+    want : frozenset of {'load_factor', 'prices', 'model', 'robust', 'spread'}
         Extras.
     objective : {'max_margin', 'min_effort'}
         Least utilisation; or least sum of squared relative tensions and joint torques, at a
@@ -197,6 +202,8 @@ class Question:
         Tensions of tendons now, by limb [N].
     deadline : float, optional
         How long the answer may take [s]; as long as it takes by default.
+    draws : tuple of Draw, optional
+        Over which the ``spread`` is told; those of ``draws.toml`` by default.
     """
 
     stance: Stance
@@ -207,6 +214,7 @@ class Question:
     objective: Objective = "max_margin"
     present: Mapping[str, Array] = field(default_factory=dict)
     deadline: float | None = None
+    draws: tuple[Draw, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:
@@ -224,6 +232,7 @@ class Question:
         if self.deadline is not None and not 0.0 < self.deadline < math.inf:
             raise InvalidInputError(f"must be above 0 s, got {self.deadline:g}", field="deadline")
         self._check_limits()
+        self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         if "robust" in self.want and "floating" in wrists.values():
             raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
@@ -247,6 +256,20 @@ class Question:
             raise InvalidInputError(
                 "a change from nothing; present tensions are needed", field="limits.tension_change"
             )
+
+    def _check_draws(self) -> None:
+        if "spread" not in self.want:
+            if self.draws is not None:
+                raise InvalidInputError("only spread is told over draws; want it", field="draws")
+            return
+        if self.draws is not None:
+            object.__setattr__(self, "draws", tuple(self.draws))
+            if not 1 <= len(self.draws) <= MOST_DRAWS:
+                raise InvalidInputError(
+                    f"from 1 to {MOST_DRAWS} draws are needed, got {len(self.draws)}", field="draws"
+                )
+        with within("draws"):
+            drawn_hands(self.stance.robot.hand, self.draws)
 
     def _check_limits(self) -> None:
         robot, limits = self.stance.robot, self.limits

@@ -18,3 +18,9 @@ from .plan import (
     SetPointSource as SetPointSource,
     Status as Status,
 )
+from .spread import (
+    DrawnPlan as DrawnPlan,
+    Influence as Influence,
+    Quantiles as Quantiles,
+    Spread as Spread,
+)

@@ -20,6 +20,7 @@ from planner.result.plain_parts import (
     TensionPath,
     Time,
 )
+from planner.result.spread import Spread
 
 __all__ = ["Certificate", "Plan", "SetPointSource", "SetPoints", "Status"]
 
@@ -140,6 +141,8 @@ class Plan:
     robust : RobustLoadFactor or None
         The load factor over a scatter of the hands' places, if it was asked for; None where the
         body wrench is zero, any multiple of which is the same.
+    spread : Spread or None
+        Utilisation and load factor over draws of the numbers, if it was asked for.
     """
 
     status: Status
@@ -165,6 +168,7 @@ class Plan:
     time: Time
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
+    spread: Spread | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

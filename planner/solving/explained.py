@@ -41,11 +41,10 @@ from planner.result import (
     TensionPath,
     Time,
 )
-from planner.solving import dual_bounds
 from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
 from planner.solving.prepared_checks import PreparedChecks, Reading
-from planner.solving.solution import Solution
-from planner.solving.unique_plan import is_least
+from planner.solving.solution import Solution, not_least
+from planner.solving.spread import find_spread
 from planner.solving.why_not import given_wrench, overload, unexplained
 
 __all__ = ["explained_plan"]
@@ -97,11 +96,15 @@ def explained_plan(
         told = _Verdict("infeasible", reason, proof=proof)
     else:
         told = _Verdict("failed", _no_answer(prepared, found))
-    robust, unfinished = None, found.unfinished + factor.unfinished + told.unfinished
+    robust, spread = None, None
+    unfinished = found.unfinished + factor.unfinished + told.unfinished
     if "robust" in question.want and needs_hands(prepared):
-        # last: it takes the longest
+        # last: they take the longest
         robust = find_robust_load_factor(prepared, checks.idle)
         unfinished += late("robust") if robust is None else ()
+    if "spread" in question.want:
+        spread = find_spread(prepared, checks.idle)
+        unfinished += late("spread") if spread is None else ()
     read, hands = told.plan, None if told.plan is None else told.plan.hands
     return Plan(
         status=told.status,
@@ -129,6 +132,7 @@ def explained_plan(
         time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=unfinished,
         robust=robust,
+        spread=spread,
     )
 
 
@@ -137,7 +141,7 @@ def _of_plan(
 ) -> _Verdict:
     """Return what is to be said of a plan."""
     question, idle = prepared.question, checks.idle
-    wrong = found.wrong or _not_least(found)
+    wrong = found.wrong or not_least(found)
     if wrong:
         return _Verdict("failed", f"the solver's plan does not pass the checks: {wrong[0]}")
     if checks.recovery is not None:
@@ -209,33 +213,6 @@ def _warnings(
         yield NO_FACTOR
     if factor.least:
         yield LEAST_FACTOR
-
-
-def _not_least(found: Solution) -> list[str]:
-    """Return what is wrong if the multipliers do not prove the plan the best.
-
-    With floating hands, the best of their sets about the plan.
-    """
-    if found.unproven or "least_utilisation" in found.unfinished:
-        return []
-    data, bound = found.sets.data, found.bound
-    if found.effort is None:
-        used = found.utilisation
-    else:
-        used = found.outcome.value
-        if found.least_use is not None:
-            # of these sets, which are about another point, the outcome is
-            data = found.least_use.sets.data
-    if bound is None:
-        bound = dual_bounds.least_bound(data, found.outcome)
-    if not is_least(used, bound):
-        return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
-    if found.effort is not None:
-        effort = found.effort.value if found.search is None else found.search.measure.effort
-        bound = dual_bounds.least_effort_bound(found.sets.data, found.effort, found.cap)
-        if not is_least(effort, bound):
-            return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
-    return []
 
 
 def _residual(prepared: PreparedStance, read: Reading) -> Array:

@@ -10,10 +10,11 @@ from planner.deadline import Budget, Overlap, Unfinished, late
 from planner.floating import LargestFactor, WristSolution, least_effort, least_use, with_room
 from planner.prepare import PreparedStance, Sets
 from planner.programs import SLACK, Outcome
+from planner.solving import dual_bounds
 from planner.solving.prepared_checks import PreparedChecks, Reading, read_loads
-from planner.solving.unique_plan import least_utilisation
+from planner.solving.unique_plan import is_least, least_utilisation
 
-__all__ = ["Solution", "solve_effort", "solve_fixed", "solve_floating", "solve_in_two"]
+__all__ = ["Solution", "not_least", "solve_effort", "solve_in_two", "solve_question"]
 
 
 class Solution(NamedTuple):
@@ -81,7 +82,20 @@ class Solution(NamedTuple):
         return self._replace(unfinished=self.unfinished + names)
 
 
-def solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> Solution:
+def solve_question(
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget
+) -> Solution:
+    """Return the plan that is asked for."""
+    if prepared.hands.floating:
+        found = _solve_floating(prepared, checks, budget)
+    else:
+        found = _solve_fixed(prepared, checks)
+    if prepared.question.objective == "min_effort":
+        found = solve_effort(prepared, checks, found, budget)
+    return found
+
+
+def _solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> Solution:
     """Return the plan of least utilisation, of these that of least tensions.
 
     One solve has its utilisation, and mostly its active rows, which give its last digits; else
@@ -127,7 +141,7 @@ def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solutio
     return found
 
 
-def solve_floating(
+def _solve_floating(
     prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget
 ) -> Solution:
     """Find where floating wrists go, and return the plan there."""
@@ -200,3 +214,30 @@ def _solve_floating_effort(
         return found
     effort = search.outcome if search.outcome.solved else None
     return _with_wrists(prepared, checks, found._replace(effort=effort), search)
+
+
+def not_least(found: Solution) -> list[str]:
+    """Return what is wrong if the multipliers do not prove the plan the best.
+
+    With floating hands, the best of their sets about the plan.
+    """
+    if found.unproven or "least_utilisation" in found.unfinished:
+        return []
+    data, bound = found.sets.data, found.bound
+    if found.effort is None:
+        used = found.utilisation
+    else:
+        used = found.outcome.value
+        if found.least_use is not None:
+            # of these sets, which are about another point, the outcome is
+            data = found.least_use.sets.data
+    if bound is None:
+        bound = dual_bounds.least_bound(data, found.outcome)
+    if not is_least(used, bound):
+        return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
+    if found.effort is not None:
+        effort = found.effort.value if found.search is None else found.search.measure.effort
+        bound = dual_bounds.least_effort_bound(found.sets.data, found.effort, found.cap)
+        if not is_least(effort, bound):
+            return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
+    return []

@@ -15,7 +15,7 @@ from planner.result import Plan, Time
 from planner.solving.explained import explained_plan
 from planner.solving.load_factor import FoundFactor, find_load_factor
 from planner.solving.prepared_checks import PreparedChecks, prepare_checks
-from planner.solving.solution import Solution, solve_effort, solve_fixed, solve_floating
+from planner.solving.solution import solve_question
 from planner.solving.why_not import look_again
 
 __all__ = ["KnownStance", "plan", "plan_on"]
@@ -63,7 +63,7 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
     question, modelled = prepared.question, time.perf_counter()
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
-    found, proof = _solve(prepared, checks, budget), None
+    found, proof = solve_question(prepared, checks, budget), None
     if not found.passes:
         if found.outcome.balance_dual is None:
             deadline.check("a plan was found")
@@ -76,17 +76,6 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
     solved = time.perf_counter()
     times = Time(modelled - start, solved - modelled, 0.0)
     return explained_plan(prepared, ready, found, proof, factor, times, start)
-
-
-def _solve(prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget) -> Solution:
-    """Return the plan that is asked for."""
-    if prepared.hands.floating:
-        found = solve_floating(prepared, checks, budget)
-    else:
-        found = solve_fixed(prepared, checks)
-    if prepared.question.objective == "min_effort":
-        found = solve_effort(prepared, checks, found, budget)
-    return found
 
 
 class KnownStance:

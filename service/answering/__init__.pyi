@@ -11,11 +11,12 @@ from .mesh_files import MeshFiles as MeshFiles
 from .own_models import (
     Robots as Robots,
     builder_of as builder_of,
+    read_draws as read_draws,
     read_hand as read_hand,
     read_robot as read_robot,
     robots_of as robots_of,
     with_hand as with_hand,
     with_robot as with_robot,
 )
-from .questions import route as route, stance as stance
+from .questions import question as question, route as route, stance as stance
 from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

@@ -53,6 +53,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         hands=None if answer.hands is None else [hand_reply(h, model) for h in answer.hands],
         certificate=certificate,
         robust=answer.robust or UNSET,
+        spread=answer.spread or UNSET,
     )
 
 

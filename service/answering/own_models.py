@@ -9,6 +9,7 @@ that is there, and a stance that names another is refused.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -16,12 +17,13 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, within
 from hand_models.hand import spiny_hand
-from hand_models.parameters import ParameterTable, load_own_hand, own_hand
+from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_hand
 from planner.robots import Robot, RobotFile, robosimian, robot_of
 from service.requests import (
     BodySpaceRequest,
+    Draw,
     PlanRequest,
     RouteRequest,
     StreamRequest,
@@ -35,6 +37,7 @@ __all__ = [
     "Robots",
     "builder_of",
     "over_default",
+    "read_draws",
     "read_hand",
     "read_robot",
     "robots_of",
@@ -70,6 +73,35 @@ def read_hand(path: Path) -> ParameterTable:
     except InvalidInputError as error:
         raise InvalidInputError(str(error), field=str(path)) from None
     return own
+
+
+def read_draws(path: Path) -> list[Draw]:
+    """Return a file's draws: TOML with a list ``draws``, each as in a request.
+
+    Raises
+    ------
+    InvalidInputError
+        In one line that names file, draw, entry and value.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        given = raw.get("draws")
+        if list(raw) != ["draws"] or not isinstance(given, list) or not given:
+            raise InvalidInputError("a list is needed, [[draws]], and nothing else", field="draws")
+        found = []
+        for i, draw in enumerate(given):
+            with within(f"draws[{i}]"):
+                if not isinstance(draw, Mapping):
+                    raise InvalidInputError("hand or surfaces is needed")
+                own_draw(draw)
+            found.append(Draw(**draw))
+    except OSError as error:
+        raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
+    except UnicodeDecodeError:
+        raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
+    except (tomllib.TOMLDecodeError, InvalidInputError) as error:
+        raise InvalidInputError(str(error), field=str(path)) from None
+    return found
 
 
 def with_hand(request: R, own: ParameterTable | None) -> R:

@@ -14,7 +14,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError, LimitError, Pose, within
 from hand_models.fixed_wrist import UP, approach_frame
 from hand_models.hand import Grasp, SpinyHand
-from hand_models.parameters import ParameterTable, own_hand
+from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner.prepare import settle_each
 from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
@@ -66,6 +66,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         objective=cast(Objective, request.objective),
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
+        draws=_draws(request.draws),
     )
 
 
@@ -143,6 +144,15 @@ def _limits(message: requests.Limits) -> Limits:
             per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
             tension_change=message.tension_change,
         )
+
+
+def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
+    """Return a caller's own draws; None for the bundled ones."""
+    found = []
+    for i, message in enumerate(messages):
+        with within(f"draws[{i}]"):
+            found.append(own_draw(msgspec.structs.asdict(message)))
+    return tuple(found) or None
 
 
 def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:

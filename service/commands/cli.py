@@ -23,6 +23,7 @@ from service.commands.holds import holds
 from service.commands.network import demo, query, serve
 from service.commands.options import (
     asked,
+    draws_option,
     folder_option,
     hand_option,
     json_option,
@@ -33,7 +34,12 @@ from service.commands.rock import rock
 from service.commands.spaces import body_space, wrench_space
 from service.commands.stances import read_request, read_route
 from service.commands.stream import stream
-from service.commands.studies import chosen_study, print_study, sweep_options
+from service.commands.studies import (
+    NAMES as STUDY_NAMES,
+    chosen_study,
+    print_study,
+    sweep_options,
+)
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -48,7 +54,7 @@ from service.commands.terminal import (
     waiting,
 )
 from service.replies import BriefPlanReply, PlanReply
-from service.requests import PlanRequest, Want
+from service.requests import Draw, PlanRequest, Want
 from service.tables import console, print_plan
 from service.wire import REQUEST_KINDS, schema as message_schema
 
@@ -129,6 +135,12 @@ def crux() -> None:
     is_flag=True,
     help="And the least load factor where every hand is a little elsewhere.",
 )
+@click.option(
+    "--spread",
+    is_flag=True,
+    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
+)
+@draws_option
 @hand_option
 @robot_option
 @json_option
@@ -136,6 +148,8 @@ def plan(
     stance: str,
     picture: Path | None,
     robust: bool,
+    spread: bool,
+    draws: list[Draw] | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -146,7 +160,10 @@ def plan(
     from service.answering import robots_of
 
     extras: list[Want] = ["robust"] if robust else []
+    extras += ["spread"] if spread or draws else []
     request = asked(read_request(stance), hand, robot)
+    if draws:
+        request = msgspec.structs.replace(request, draws=draws)
     request = with_extras(request, *extras, whole=not as_json)
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
@@ -173,8 +190,9 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
+    alone = replace(request, stance=stance, want=["load_factor"], draws=[])
     try:
-        reply = answering.plan(replace(request, stance=stance, want=["load_factor"]), robots)
+        reply = answering.plan(alone, robots)
     except DeadlineError:
         return None
     assert isinstance(reply, PlanReply)  # of a whole request
@@ -222,7 +240,7 @@ def route(
     return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
 
 
-@crux.command(epilog=f"NAME is one of {', '.join(studies.STUDIES)}.")
+@crux.command(epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
 @click.argument("name")
 @folder_option("Where result.json and the pictures go.")
 @sweep_options

@@ -11,8 +11,8 @@ import click
 import msgspec
 
 from hand_models.parameters import ParameterTable
-from service.answering import read_hand, with_hand
-from service.requests import PlanRequest, RouteRequest, Want
+from service.answering import read_draws, read_hand, with_hand
+from service.requests import Draw, PlanRequest, RouteRequest, Want
 from service.serving import TIMEOUT
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ __all__ = [
     "PICTURES",
     "FiniteRange",
     "asked",
+    "draws_option",
     "folder_option",
     "hand_option",
     "json_option",
@@ -106,6 +107,10 @@ def _read_hand(
     return read_hand(paths[0])
 
 
+def _read_draws(_: click.Context, __: click.Parameter, path: Path | None) -> list[Draw] | None:
+    return None if path is None else read_draws(path)
+
+
 def _read_robot(_: click.Context, __: click.Parameter, path: Path | None) -> RobotFile | None:
     if path is None:
         return None
@@ -135,6 +140,13 @@ hand_option = click.option(
     callback=_read_hand,
     metavar="FILE",
     help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
+)
+draws_option = click.option(
+    "--draws",
+    type=click.Path(path_type=Path),
+    callback=_read_draws,
+    metavar="FILE",
+    help="TOML with draws of your own, over which the spread is told; --spread is then meant.",
 )
 limb_option = click.option(
     "--hand",

@@ -13,14 +13,20 @@ from rich.markup import escape
 
 from hand_models.base import InvalidInputError
 from hand_models.experiments import Claim, StudyResult
-from hand_models.studies import Study, load_study
+from hand_models.studies import STUDIES, Study
 from hand_models.tile import surface_names
 from service.tables import table_of
 
-__all__ = ["chosen_study", "print_study", "sweep_options"]
+__all__ = ["NAMES", "chosen_study", "print_study", "sweep_options"]
 
 SWEEP: Final = "sweep"
 """The one study that takes options."""
+
+MEASURE: Final = "measure"
+"""The study that asks the planner, and so is not among those of one hand."""
+
+NAMES: Final = (*STUDIES, MEASURE)
+"""Of all studies."""
 
 AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
 
@@ -71,18 +77,34 @@ def chosen_study(name: str, **options: Any) -> str | Study:
         If a study other than the sweep is given options.
     """
     given = {key: value for key, value in options.items() if value not in (None, ())}
+    if name not in NAMES:
+        raise InvalidInputError(f"{name!r}: valid are {', '.join(NAMES)}", field="NAME")
     if name != SWEEP or not given:
-        load_study(name)
         if given:
             option = "--measure" if "measures" in given else f"--{min(given)}"
             raise InvalidInputError(f"only the study {SWEEP} takes it, not {name}", field=option)
-        return name
+        return _measurements() if name == MEASURE else name
     from hand_models.experiments import Conditions, Sweep
 
     of_rock = {key: given.pop(key) for key in ("diameter", "tension", "surface") if key in given}
     if "measures" in given:
         given["measures"] = tuple(dict.fromkeys(given["measures"]))
     return Sweep(conditions=replace(Conditions.of_fig16()[0], **of_rock), **given)
+
+
+def _measurements() -> Study:
+    """Return the study of measurements, over all bundled stances whose wrists are fixed."""
+    from planner.capability import MeasurementStudy
+    from service.answering import question
+    from service.commands.stances import bundled, read_request
+
+    asked = {name: question(read_request(name)) for name in bundled()}
+    fixed = {
+        name: each
+        for name, each in asked.items()
+        if all(hand.wrist == "fixed" for hand in each.stance.hands)
+    }
+    return MeasurementStudy(fixed)
 
 
 def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> None:

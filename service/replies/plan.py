@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import LimitName, Price, RobustLoadFactor, Solver, TensionPath, Time
+from planner.result import LimitName, Price, RobustLoadFactor, Solver, Spread, TensionPath, Time
 from service.replies.hand import Hand, WrenchSet
 from service.replies.reply import StanceReply, Vector
 from service.replies.stream import HandSetPoints
@@ -52,8 +52,9 @@ class PlanReply(StanceReply, kw_only=True):
     would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a
     deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
     proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
-    ``certificate``, ``explanation``, ``robust``. ``robust`` comes with ``"want": ["robust"]``, but
-    not for a body wrench of zero.
+    ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
+    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
+    ``"want": ["spread"]``.
     """
 
     status: str
@@ -80,6 +81,7 @@ class PlanReply(StanceReply, kw_only=True):
     warnings: list[str] = []
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
+    spread: Spread | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):

@@ -15,6 +15,7 @@ from .questions import (
     Axis as Axis,
     AxisForce as AxisForce,
     BodySpaceRequest as BodySpaceRequest,
+    Draw as Draw,
     ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,

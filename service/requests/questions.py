@@ -28,12 +28,13 @@ from service.requests.request import (
     Tensions,
     Wrench,
 )
-from service.requests.stance import Hand, Stance
+from service.requests.stance import Entries, Hand, HandEntries, Stance
 
 __all__ = [
     "Axis",
     "AxisForce",
     "BodySpaceRequest",
+    "Draw",
     "ForceCap",
     "Limits",
     "Load",
@@ -72,7 +73,7 @@ ObjectiveName = Annotated[
         "max_reliability is not supported in this version"
     ),
 ]
-Want = Literal["load_factor", "prices", "model", "robust"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]
@@ -126,6 +127,19 @@ class Limits(Strict, frozen=True, kw_only=True):
     ] = None
 
 
+class Draw(Strict, frozen=True, kw_only=True):
+    """One set of numbers that hand and rock may have; what it leaves open stays as it is."""
+
+    hand: HandEntries | None = None
+    surfaces: Annotated[
+        Entries | None,
+        Meta(
+            description="numbers of presets in place of the bundled ones, by section and entry of "
+            "their parameter file surfaces.toml"
+        ),
+    ] = None
+
+
 class PlanRequest(Query, frozen=True, kw_only=True):
     """Asks who carries what in a stance."""
 
@@ -144,7 +158,17 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     detail: Detail = "full"
     want: Annotated[
         list[Want],
-        Meta(description="robust: the least load factor over a scatter of the hands' places, too"),
+        Meta(
+            description="robust: the least load factor over a scatter of the hands' places, too. "
+            "spread: utilisation and load factor over draws of the hand's and the rock's numbers"
+        ),
+    ] = []
+    draws: Annotated[
+        list[Draw],
+        Meta(
+            max_length=100,
+            description="over which the spread is told; by default those of draws.toml",
+        ),
     ] = []
 
 

@@ -43,17 +43,22 @@ Angles = Annotated[
     list[Angle],
     Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [rad]"),
 ]
-HandEntries = Annotated[
+Entries = Annotated[
     dict[Name, Any],
     Meta(
-        description="numbers of the hand in place of the service's own, by section and entry of "
-        "its parameter file hand.toml",
         extra_json_schema={
             "additionalProperties": {
                 "type": "object",
                 "additionalProperties": {"$ref": "#/$defs/Quantity"},
             }
         },
+    ),
+]
+HandEntries = Annotated[
+    Entries,
+    Meta(
+        description="numbers of the hand in place of the service's own, by section and entry of "
+        "its parameter file hand.toml"
     ),
 ]
 

@@ -22,6 +22,9 @@ READ: Final = 2**20
 LARGE: Final = 2**18
 """Bytes beyond which one is large: it may take long, and its bytes count while it waits."""
 
+DEAR: Final = ("robust", "spread")
+"""Extras that take many plans."""
+
 SMALL: Final = 2**12
 """Bytes of a field that is read of it; what is longer is left to a process, too."""
 
@@ -159,7 +162,8 @@ def _read(question: Question) -> None:
     # what no request may have is refused by its process, in the service's own time
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
-    question.dear = question.dear or (isinstance(want, list) and "robust" in want)
+    many = isinstance(want, list) and any(each in want for each in DEAR)
+    question.dear = question.dear or many
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 
 

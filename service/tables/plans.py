@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from planner.explanation import constraint_words
-from planner.result import LimitName, Price, RobustLoadFactor, TensionPath
+from planner.result import LimitName, Price, RobustLoadFactor, Spread, TensionPath
 from service.replies import (
     AXES,
     AxisCapability,
@@ -23,6 +23,7 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
+from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = [
     "console",
@@ -67,14 +68,10 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     without_palm : PlanReply, optional
         The same question's answer with every palm left out.
     """
-    parts = [f"[bold]{reply.status.upper()}[/bold]"]
-    if reply.utilisation is not None:
-        parts.append(f"utilisation {reply.utilisation:.3f}")
-    parts.append(f"load factor {_load_factor(reply)}")
-    if reply.effort is not None:
-        parts.append(f"effort {reply.effort:.3g}")
-    parts.append(f"{1e3 * reply.time.total:.0f} ms")
-    out.print("   ".join(parts))
+    spread = reply.spread if isinstance(reply.spread, Spread) else None
+    out.print("   ".join(_first_line(reply, spread)))
+    if spread is not None:
+        out.print(spread_sentence(spread), markup=False)
     out.print(reply.reason, markup=False)
     for warning in reply.warnings:
         out.print(f"[bold]warning:[/bold] {escape(warning)}")
@@ -87,7 +84,7 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if isinstance(reply.robust, RobustLoadFactor):
-        out.print(_robust_sentence(reply.robust), markup=False)
+        out.print(robust_sentence(reply.robust), markup=False)
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
@@ -109,6 +106,22 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
             show(title, _price_table(prices[:MOST_PRICES]), out)
     if reply.certificate is not None:
         _print_certificate(reply.certificate, reply.body_wrench, out)
+
+
+def _first_line(reply: PlanReply, spread: Spread | None) -> Iterator[str]:
+    """Yield what is most to be known of a plan; intervals of it in place of lesser things."""
+    yield f"[bold]{reply.status.upper()}[/bold]"
+    used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
+    if reply.utilisation is not None:
+        yield f"utilisation {within(reply.utilisation, used)}"
+    if reply.load_factor is None:
+        yield f"load factor {_load_factor(reply)}"
+    else:
+        yield f"load factor {within(reply.load_factor, factor)}"
+    if spread is None:
+        if reply.effort is not None:
+            yield f"effort {reply.effort:.3g}"
+        yield f"{1e3 * reply.time.total:.0f} ms"
 
 
 def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
@@ -280,19 +293,6 @@ def _load_factor(reply: PlanReply) -> str:
     if reply.load_factor_unbounded:
         return "unbounded"
     return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
-
-
-def _robust_sentence(robust: RobustLoadFactor) -> str:
-    """Say what is left of the load factor where the hands are a little elsewhere."""
-    said = "there is none in any"
-    if robust.worst is not None and robust.tenth is not None:
-        said = f"nine in ten above {robust.tenth:.3f}, the worst {robust.worst:.3f}"
-        said += f", leaving out {robust.without} draws without any" if robust.without else ""
-    said += "".join(f"; in {n} {limb} cannot be there" for limb, n in robust.refused.items())
-    return (
-        f"load factor with each hand up to {1e3 * robust.position:g} mm and "
-        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
-    )
 
 
 def show(title: str, table: Table, out: Console) -> None:

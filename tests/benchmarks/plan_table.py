@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hand_models.parameters import bundled_draws
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
 from planner.programs import conic, program, solvers, stance_program
@@ -199,6 +200,9 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
     overloaded = [heavy(number, 8, None) for number in count]
     hurried = [heavy(number, 9, SOON) for number in count]
     alone = race({"shape": lambda k: plan(shapes[k]), "first": first}, rounds)
+    sure = [question_of(number, twin=11, want=("spread",)) for number in count]
+    bare = [question_of(number, twin=12) for number in count]
+    spread = race({"spread": lambda k: plan(sure[k]), "plan": lambda k: plan(bare[k])}, rounds)
     beyond = race({"explained": lambda k: plan(overloaded[k]), "soon": soon}, rounds)
     among = race(
         {
@@ -219,6 +223,11 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         Line(
             f"… the same with a deadline of {span(SOON)}: the explanation is left out",
             (span(beyond.median("soon")), *blank),
+        ),
+        Line(
+            f"spread over {len(bundled_draws())} draws: a plan and a load factor of each, "
+            f"{spread.ratio('spread', 'plan'):.0f} plans",
+            (span(spread.median("spread")), *blank),
         ),
         Line(
             "first stance: no solver is set up",

@@ -41,6 +41,12 @@ def test_plan_with_load_factor_and_prices(benchmark):
     assert answer.prices
 
 
+@pytest.mark.benchmark(group="plan, from holds to a verified plan")
+def test_plan_with_its_spread(benchmark):
+    answer = benchmark(plan, question_of(4, "spread"))
+    assert answer.spread.without == 0
+
+
 @pytest.mark.benchmark(group="least utilisation of four hands")
 @pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
 def test_margin_with_new_data(benchmark, hold):

@@ -77,7 +77,7 @@ def dear_questions(seed: int = 0) -> Iterator[Asked]:
             asked = {"v": 1, "stance": stance, "others": "free", "directions": directions}
             yield BODY_SPACE, msgspec.json.encode(asked), "application/json"
         else:
-            request["want"] = ["robust", "load_factor", "prices", "model"]
+            request["want"] = ["robust", "spread", "load_factor", "prices", "model"]
             yield PLAN, msgspec.json.encode(request), "application/json"
 
 

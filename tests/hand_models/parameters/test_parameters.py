@@ -8,6 +8,7 @@ import pytest
 from hand_models import InvalidInputError, SpinyHand
 from hand_models.parameters import (
     ParameterTable,
+    draw_table,
     experiment_table,
     hand_table,
     scan_table,
@@ -23,6 +24,7 @@ ENTRIES = [
         ("spines", spine_table()),
         ("scan", scan_table()),
         ("experiments", experiment_table()),
+        ("draws", draw_table()),
     )
     for section, name, quantity in table
 ]

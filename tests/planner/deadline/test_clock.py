@@ -227,6 +227,16 @@ def test_the_robust_load_factor_is_left_out_and_nothing_else(monkeypatch, clock)
     assert told(answer).endswith("before the load factor was found at all places of the hands")
 
 
+def test_the_spread_is_left_out_and_nothing_else(monkeypatch, clock):
+    late_at(monkeypatch, clock, programs, "load_factor", 3)
+    answer = late(ask(on_wall(), "load_factor", "spread"))
+    assert answer.unfinished == ("spread",)
+    assert answer.spread is None
+    assert answer.load_factor is not None
+    assert answer.status == "optimal"
+    assert told(answer).endswith("before a plan was found in all draws of the numbers")
+
+
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):
     monkeypatch.setattr(unique_plan, "active_set_optimum", lambda *_: None)
     monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)

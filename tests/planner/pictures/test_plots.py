@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
@@ -40,7 +41,7 @@ from service.commands.stances import read_request
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
 from tests.suite.helpers.rocks import cylinder_mesh
-from tests.suite.helpers.stances import attainable_wrench, on_wall, wall
+from tests.suite.helpers.stances import ask, attainable_wrench, on_wall, wall
 
 found = solve.plan
 
@@ -551,3 +552,21 @@ def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
     bars = {line.get_color() for line in panels[0].lines if line.get_linewidth() in (3, 4)}
     assert named[hand_plots.PALM] == "palm"
     assert bars <= set(named)
+
+
+def test_a_plans_spread_is_drawn_where_it_was_asked_for():
+    def titles(*want: str) -> list[str]:
+        asked = ask(on_wall(), *want)
+        answer = solve.plan(asked)
+        axes = draw_plan(answer, asked).axes
+        for each in axes:
+            if each.get_xlabel() == "load factor [1]":
+                heights = [bar.get_height() for bar in each.patches if bar.get_height() > 0.0]
+                factors = [f for f in answer.spread.load_factors if f is not None]
+                assert sum(round(height) for height in heights[1:]) == len(factors)
+                assert each.get_ylabel() == "draws"
+        return [each.get_title() for each in axes]
+
+    (told,) = (title for title in titles("spread", "load_factor") if "draws" in title)
+    assert re.fullmatch(r"holds in \d+ of \d+ draws; hangs most on rock.shear_limit", told)
+    assert not any("draws" in title for title in titles("load_factor"))

@@ -327,6 +327,61 @@ def test_a_plan_tells_its_load_factor_where_the_hands_are_a_little_elsewhere():
     assert "robust" not in msgspec.to_builtins(plain)
 
 
+def own_draw(value: float, unit: str = "N") -> dict:
+    entry = {"value": value, "unit": unit, "source": "measured"}
+    return {"surfaces": {"rock": {"shear_limit": entry}}}
+
+
+def test_a_plan_tells_its_spread_over_draws():
+    asked = flat_request() | {"want": ["load_factor", "spread"]}
+    reply = answering.plan(plan_request(asked))
+    spread = reply.spread
+    assert spread.draws == len(spread.load_factors) >= 30
+    assert spread.holds == sum(used <= 1.0 for used in spread.utilisations if used is not None)
+    assert spread.load_factor.low < reply.load_factor < spread.load_factor.high
+    assert departures("PlanRequest", asked) == []
+    assert departures("PlanReply", msgspec.to_builtins(reply)) == []
+    plain = answering.plan(plan_request(flat_request()))
+    assert "spread" not in msgspec.to_builtins(plain)
+
+
+def test_a_plans_spread_over_draws_of_the_callers_own_travels():
+    draws = [own_draw(strength) for strength in (45.0, 63.0, 85.0)]
+    asked = flat_request() | {"want": ["load_factor", "spread"], "draws": draws}
+    assert departures("PlanRequest", asked) == []
+    for encoding, coder in (("application/json", msgspec.json), (MSGPACK, msgspec.msgpack)):
+        answer = dispatch.handle(PLAN, coder.encode(asked), encoding)
+        assert answer.good, answer.payload
+        reply = coder.decode(answer.payload)
+        low, usual, high = reply["spread"]["load_factors"]
+        assert low < usual < high
+        assert usual == pytest.approx(reply["load_factor"], rel=1e-6)
+        assert reply["spread"]["hangs_on"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+
+
+@pytest.mark.parametrize(
+    ("draws", "field"),
+    [
+        ([own_draw(60.0), own_draw(60.0, "kN")], "draws[1].surfaces.rock.shear_limit"),
+        ([own_draw(-1.0)], "draws[0].surfaces.rock.shear_limit"),
+        ([own_draw(0.0)], "draws[0].surfaces.rock.shear_limit"),
+        ([{"hand": {"finger": {"reach": 1.0}}}], "draws[0].hand.finger.reach"),
+        ([{"hand": 3}], "draws[0].hand"),
+        ([{"stance": {}}], "draws[0].stance"),
+        ([{}], "draws[0]"),
+        ([own_draw(60.0)] * 101, "draws"),
+    ],
+)
+def test_draws_that_cannot_be_are_refused_by_their_field(draws, field):
+    asked = flat_request() | {"want": ["spread"], "draws": draws}
+    answer = dispatch.handle(PLAN, json.dumps(asked).encode())
+    assert not answer.good
+    error = json.loads(answer.payload)["error"]
+    assert error["kind"] == "invalid"
+    assert error["field"] == field
+    assert "\n" not in error["message"]
+
+
 def test_robust_is_told_of_fixed_wrists_only():
     request = plan_request(wall_request())
     first, *others = request.stance.hands

@@ -13,7 +13,7 @@ from tests.suite.helpers.requests import request_with_joints, stream_request, wa
 
 FORMS = tuple(Format)
 LIMBS = ("front_right", "rear_left")
-WANT = ["load_factor", "prices", "model", "robust"]
+WANT = ["load_factor", "prices", "model", "robust", "spread"]
 
 
 def hanging(mass: float = 50.0, limbs: tuple[str, ...] = LIMBS, **entries: object) -> dict:

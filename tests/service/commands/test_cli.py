@@ -118,6 +118,66 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(
     assert "off its place" not in capfd.readouterr().out
 
 
+DRAWS = """
+[[draws]]
+hand.finger.pulley_radii = { value = [0.0055, 0.0028, 0.0022], unit = "m", source = "assumed" }
+surfaces.rock.shear_limit = { value = 50, unit = "N", source = "measured" }
+
+[[draws]]
+surfaces.rock.shear_limit = { value = 90, unit = "N", source = "measured" }
+"""
+
+
+def test_a_plan_says_how_sure_it_is(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+    path = stance_file(flat_request())
+    run(["plan", path, "--spread", "--json"])
+    reply = result(capfd)
+    spread, ends = reply["spread"], reply["spread"]["load_factor"]
+    run(["plan", path, "--spread"])
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    interval = f"({ends['low']:.1f} to {ends['high']:.1f})"
+    assert f"load factor {reply['load_factor']:.2f} {interval}" in out
+    most = spread["hangs_on"][0]
+    assert f"holds in {spread['holds']} of {spread['draws']} draws; hangs most on " in out
+    assert f"{most['quantity']} ({100 * most['share']:.0f} %)" in out
+    run(["plan", path])
+    assert "draws" not in capfd.readouterr().out
+
+
+def test_a_spread_over_draws_of_the_callers_own(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, file = stance_file(flat_request()), tmp_path / "draws.toml"
+    file.write_text(DRAWS, encoding="utf-8")
+    run(["plan", path, "--draws", str(file), "--json"])
+    spread = result(capfd)["spread"]
+    assert spread["draws"] == 2
+    assert spread["load_factors"][0] < spread["load_factors"][1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("0.0028", "2.8", "draws[0].hand.finger.pulley_radii: must be from 0 to 1 m"),
+        ("rock.shear_limit = { value = 90", "ice.a = { value = 90", "draws[1].surfaces.ice: unk"),
+        ("[[draws]]", "[[sets]]", "draws: a list is needed"),
+        ("[[draws]]", "[[draws", "at line 2"),
+        (DRAWS, "draws = [3]", "draws[0]: hand or surfaces is needed"),
+        (DRAWS, "draws = [{hand = 3}]", "draws[0].hand: "),
+    ],
+)
+def test_a_file_of_draws_that_cannot_be_is_refused_in_one_line(
+    old, new, told, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "draws.toml"
+    file.write_text(DRAWS.replace(old, new), encoding="utf-8")
+    assert run(["plan", "wall-300", "--draws", str(file)]) == BAD_INPUT
+    said = complaint(capfd)
+    assert str(file) in said
+    assert told in said
+
+
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -45,6 +45,35 @@ def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.Captur
     assert len(json.loads(lines[2])) == 4
 
 
+def test_the_examples_of_draws_tell_how_sure_a_plan_is(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    text, _ = blocks("toml")
+    file = tmp_path / "draws.toml"
+    file.write_text(text, encoding="utf-8")
+    assert run(["plan", "wall-300", "--draws", str(file), "--json"]) == 0
+    spread = json.loads(capfd.readouterr().out)["spread"]
+    assert spread["draws"] == 2
+    assert spread["load_factors"][0] < spread["load_factors"][1]
+    scope: dict[str, object] = {}
+    for word in ("up_the_wall =", "own_draw"):
+        (example,) = (block for block in blocks("python") if word in block)
+        exec(compile(example, "README.md", "exec"), scope)
+    holds, draws, median, quantity = capfd.readouterr().out.splitlines()[-1].split()
+    assert (holds, draws, quantity) == ("2", "3", "rock.shear_limit")
+    assert float(median) == pytest.approx(1.1, abs=0.1)
+
+
+def test_what_is_printed_of_how_sure_a_plan_is_looks_as_it_is_told(
+    capfd: pytest.CaptureFixture[str],
+):
+    (told,) = re.findall(r"^OPTIMAL .*\nholds in .*$", README, re.MULTILINE)
+    assert run(["plan", "wall-300", "--spread"]) == 0
+    printed = capfd.readouterr().out.splitlines()[:2]
+    for line, shown in zip(printed, told.splitlines(), strict=True):
+        assert re.sub(r"[0-9.]+", "0", line) == re.sub(r"[0-9.]+", "0", shown)
+
+
 def test_the_examples_of_a_stance_that_stays_go_on_from_the_first(
     capsys: pytest.CaptureFixture[str],
 ):
@@ -74,7 +103,7 @@ def test_the_example_of_a_floating_hand_prints_stiffness_pose_and_limit(
 def test_the_example_of_an_own_hand_changes_the_plan(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
-    (text,) = blocks("toml")
+    _, text = blocks("toml")
     file = tmp_path / "mine.toml"
     file.write_text(text, encoding="utf-8")
     assert run(["plan", "wall-300", "--hand", str(file), "--json"]) == 0

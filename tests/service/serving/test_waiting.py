@@ -104,6 +104,24 @@ def test_a_deadline_that_is_over_already_is_not_slept_through():
 # Heads --------------------------------------------------------------------------------------------
 
 
+class Payload(bytes):
+    def to_bytes(self) -> bytes:
+        return bytes(self)
+
+
+def taken_of(payload: bytes, encoding: str) -> Question:
+    query = SimpleNamespace(payload=Payload(payload), encoding=encoding, source_info=None)
+    return take(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("want", "dear"), [("load_factor", False), ("robust", True), ("spread", True)]
+)
+def test_what_takes_many_plans_is_known_by_its_head(want: str, dear: bool):
+    payload = f'{{"want": ["prices", "{want}"]}}'.encode()
+    assert taken_of(payload, "application/json").dear == dear
+
+
 @pytest.mark.parametrize(
     ("payload", "encoding"),
     [
@@ -115,12 +133,7 @@ def test_a_deadline_that_is_over_already_is_not_slept_through():
     ],
 )
 def test_a_head_with_what_is_no_number_is_left_to_a_process(payload: bytes, encoding: str):
-    class Payload(bytes):
-        def to_bytes(self) -> bytes:
-            return bytes(self)
-
-    query = SimpleNamespace(payload=Payload(payload), encoding=encoding, source_info=None)
-    taken = take(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
+    taken = taken_of(payload, encoding)
     assert (taken.id, taken.seconds, taken.dear) == (None, 10.0, False)
     assert taken.payload == payload
 

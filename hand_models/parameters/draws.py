@@ -1,0 +1,284 @@
+"""Draws: sets of the hand's and the surfaces' numbers that all meet what is published.
+
+What the published data leave open is in ``draws.toml``: of each quantity that was fitted a list
+over the sets, and the ranges of what no fit can tell. One set makes one draw. Of everything that
+has a range (the strength of a tile on each surface but the fitted sandpaper, and the seat) the
+draws have evenly spaced quantiles, u = (r + ½) / n with r = 0 … n − 1 the rank of the draw's term
+in an additive recurrence of low discrepancy,
+
+    x_kj = k φ⁻ʲ mod 1,    φ^(d+1) = φ + 1,    k = 1 … n draws,  j = 1 … d ranges,
+
+so that the same sets make the same draws everywhere. A caller's own draws are entries in the form
+of ``hand.toml`` and ``surfaces.toml`` (`own_draw`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from hand_models.base import Array, InvalidInputError, within
+from hand_models.parameters.own import own_hand, own_surfaces
+from hand_models.parameters.tables import (
+    ParameterTable,
+    Quantity,
+    draw_table,
+    hand_table,
+    surface_table,
+)
+
+__all__ = ["Draw", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
+
+LEAST_SETS: Final = 30
+"""Fewer sets tell too little of a 5 % quantile."""
+
+FITTED: Final = "sandpaper-36"
+"""The surface on which a set's tile was fitted; the strength on it is the set's own."""
+
+RATIO: Final = "rock"
+"""The surface that is so many times as strong as the fitted one."""
+
+OF_FIT: Final = ("misfit", "valley")
+"""Entries of the section ``fit``: of each set how far it is from the data, and where it lies."""
+
+PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
+"""An entry, or one number of an entry that is a list."""
+
+
+class Draw(NamedTuple):
+    """One set of numbers that hand and rock may have: the entries that it changes.
+
+    Attributes
+    ----------
+    hand : ParameterTable
+        In the form of ``hand.toml``.
+    surfaces : ParameterTable
+        In the form of ``surfaces.toml``; of presets, since a caller's own surface is known.
+    """
+
+    hand: ParameterTable
+    surfaces: ParameterTable
+
+
+def own_draw(raw: Mapping[str, Any]) -> Draw:
+    """Return a draw of the caller's own.
+
+    Parameters
+    ----------
+    raw : mapping
+        ``hand`` and ``surfaces``, each ``{section: {entry: {value, unit, source}}}``; either may be
+        missing, not both.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none; the field is the entry's path.
+    """
+    unknown = sorted(set(raw) - set(Draw._fields))
+    if unknown:
+        valid = " and ".join(Draw._fields)
+        raise InvalidInputError(f"unknown; a draw has {valid}", field=unknown[0])
+    tables = {}
+    for name in Draw._fields:
+        entries = raw.get(name) or {}
+        if not isinstance(entries, Mapping):
+            raise InvalidInputError("sections of entries are needed", field=name)
+        with within(name):
+            tables[name] = ParameterTable.of(entries)
+    draw = Draw(**tables)
+    _check(draw, None)
+    if not (list(draw.hand) or list(draw.surfaces)):
+        raise InvalidInputError("is empty; at least one entry of hand or surfaces is needed")
+    return draw
+
+
+def _check(draw: Draw, hand: ParameterTable | None) -> None:
+    """Refuse a draw with entries that are unknown, or of numbers that they cannot have."""
+    with within("hand"):
+        own_hand(draw.hand, hand)
+    with within("surfaces"):
+        own_surfaces(draw.surfaces)
+
+
+@lru_cache(maxsize=8)
+def bundled_draws(hand: ParameterTable | None = None) -> tuple[Draw, ...]:
+    """Return the draws of ``draws.toml``, one for each of its sets.
+
+    Parameters
+    ----------
+    hand : ParameterTable, optional
+        All numbers of the hand; the bundled ones by default. Entries in which it is not the bundled
+        hand are known to the caller: no draw changes them.
+    """
+    return draws_of(draw_table(), hand)
+
+
+def draws_of(sets: ParameterTable, hand: ParameterTable | None = None) -> tuple[Draw, ...]:
+    """Return the draws that a table of sets and ranges makes.
+
+    Parameters
+    ----------
+    sets : ParameterTable
+        In the form of ``draws.toml``.
+    hand : ParameterTable, optional
+        As of `bundled_draws`.
+
+    Raises
+    ------
+    InvalidInputError
+        If an entry is unknown or missing, in another unit, of another length than the others, or of
+        a number that it cannot have.
+    """
+    hand = hand or hand_table()
+    count = _checked_count(sets)
+    known = hand.difference(hand_table())
+    quantiles = even_quantiles(count, len(_ranged()) + 1)
+    draws = []
+    for k in range(count):
+        strengths = _strengths(sets, k, quantiles[k, :-1])
+        draw = Draw(_hand_of(sets, k, hand, known, float(quantiles[k, -1])), strengths)
+        with within(f"[{k}]"):
+            _check(draw, hand)
+        draws.append(draw)
+    return tuple(draws)
+
+
+def even_quantiles(count: int, ranges: int) -> Array:
+    """Return the quantiles of ranges in so many draws, shape (count, ranges), in (0, 1).
+
+    Each range has every (r + ½) / count once; see the module for the order.
+    """
+    ratio = 1.0
+    for _ in range(64):
+        ratio = (1.0 + ratio) ** (1.0 / (ranges + 1))
+    terms = np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, ranges + 1)) % 1.0
+    ranks = terms.argsort(axis=0).argsort(axis=0)
+    return np.asarray((ranks + 0.5) / count)
+
+
+def _ranged() -> list[str]:
+    """Return the surfaces whose strength is drawn from a range."""
+    presets = surface_table().sections
+    return [name for name in presets if name not in ("bounds", "defaults", FITTED)]
+
+
+def _fitted(sets: ParameterTable) -> Iterator[tuple[str, str, Quantity]]:
+    """Yield what was fitted: section, entry, and the list over the sets."""
+    return (each for each in sets if each[0] not in ("fit", "ranges"))
+
+
+def _checked_count(sets: ParameterTable) -> int:
+    """Return how many sets there are."""
+    counts = {f"fit.{name}": len(sets.vector("fit", name)) for name in OF_FIT}
+    sets.vector(FITTED, "shear_limit")
+    for section, name, quantity in _fitted(sets):
+        _check_entry(section, name, quantity)
+        counts[f"{section}.{name}"] = len(sets.vector(section, name))
+    count = counts["fit.misfit"]
+    for field, other in counts.items():
+        if other != count:
+            raise InvalidInputError(
+                f"must have a number for each of the {count} sets, got {other}", field=field
+            )
+    if count < LEAST_SETS:
+        raise InvalidInputError(f"at least {LEAST_SETS} sets are needed, got {count}", field="fit")
+    for k, misfit in enumerate(sets.vector("fit", "misfit")):
+        if not 0.0 <= misfit <= 1.0:
+            raise InvalidInputError(
+                f"must be from 0 to 1, the tolerances of the data, got {misfit:g}",
+                field=f"fit.misfit.value[{k}]",
+            )
+    if len(sets.vector("ranges", "rock_ratio")) != 2:
+        raise InvalidInputError("two numbers are needed", field="ranges.rock_ratio")
+    return count
+
+
+def _check_entry(section: str, name: str, quantity: Quantity) -> None:
+    """Refuse a list over the sets of what is no number of a hand, or of a fitted tile."""
+    field, hand, surfaces = f"{section}.{name}", hand_table().sections, surface_table().sections
+    of_tile = {**surfaces["defaults"], **surfaces[FITTED]}
+    entries = of_tile if section in ("defaults", FITTED) else hand.get(section, {})
+    found = PATH.fullmatch(name)
+    entry, index = (name, None) if found is None else (found[1], found[2])
+    if entry not in entries:
+        raise InvalidInputError("no number of hand.toml or of a tile's law", field=field)
+    usual = entries[entry]
+    size = len(usual.value) if isinstance(usual.value, list) else 0
+    if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):
+        form = f"one of {entry}[0] to {entry}[{size - 1}]" if size else entry
+        raise InvalidInputError(f"must be {form}", field=field)
+    if quantity.unit != usual.unit:
+        raise InvalidInputError(f"must be in {usual.unit!r}, got {quantity.unit!r}", field=field)
+
+
+def _hand_of(
+    sets: ParameterTable, k: int, hand: ParameterTable, known: ParameterTable, quantile: float
+) -> ParameterTable:
+    """Return what a draw changes of a hand, but for entries that are known."""
+    found: dict[str, dict[str, Quantity]] = {}
+
+    def change(section: str, name: str, value: float, quantity: Quantity, place: int) -> None:
+        if name in known.sections.get(section, {}):
+            return
+        entries = found.setdefault(section, {})
+        now = entries.get(name, hand.quantity(section, name)).value
+        if isinstance(now, list):
+            changed: float | list[float] = [*now[:place], value, *now[place + 1 :]]
+        else:
+            changed = value
+        entries[name] = Quantity(changed, quantity.unit, quantity.source, quantity.note)
+
+    for section, name, quantity in _fitted(sets):
+        if section in hand_table().sections:
+            path = PATH.fullmatch(name)
+            assert path is not None  # of a checked table
+            value = sets.vector(section, name)[k]
+            change(section, path[1], value, quantity, int(path[2] or 0))
+            drawn = path[1] in found.get(section, {})
+            if (section, name) == ("tile", "engagement[0]") and drawn:
+                # a base tile engages as a proximal one
+                change(section, "base_engagement", value, quantity, 0)
+    aside = sets.quantity("ranges", "seated_contact")
+    middle, half = hand.scalar("finger", "seated_contact"), sets.scalar("ranges", "seated_contact")
+    change("finger", "seated_contact", middle + half * (2.0 * quantile - 1.0), aside, 0)
+    return ParameterTable(found)
+
+
+def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable:
+    """Return what a draw changes of the surfaces.
+
+    Rock is evenly distributed between its least and largest ratio to the set's own tile. Others
+    are normal about their ``shear_limit``, with the standard deviation ``scatter_ratio`` of it, but
+    for the tail below ``ranges.least_strength`` of it.
+    """
+    table = surface_table()
+    found: dict[str, dict[str, Quantity]] = {}
+    for section, name, quantity in _fitted(sets):
+        if section in table.sections:
+            value = sets.vector(section, name)[k]
+            found.setdefault(section, {})[name] = Quantity(
+                value, quantity.unit, quantity.source, quantity.note
+            )
+    tile = sets.vector(FITTED, "shear_limit")[k]
+    least, most = sets.vector("ranges", "rock_ratio")
+    floor = sets.scalar("ranges", "least_strength")
+    for name, u in zip(_ranged(), quantiles.tolist(), strict=True):
+        usual = table.quantity(name, "shear_limit")
+        if name == RATIO:
+            strength, source = tile * (least + (most - least) * u), "ranges.rock_ratio"
+        else:
+            scatter = table.scalar(name, "scatter_ratio")
+            cut = ndtr((floor - 1.0) / scatter)
+            strength = table.scalar(name, "shear_limit") * (
+                1.0 + scatter * float(ndtri(cut + (1.0 - cut) * u))
+            )
+            source = "scatter_ratio"
+        found.setdefault(name, {})["shear_limit"] = Quantity(
+            float(strength), usual.unit, usual.source, f"drawn by {source}"
+        )
+    return ParameterTable(found)

@@ -1,0 +1,261 @@
+"""Which measurement on a real hand would narrow the spread of load factors most.
+
+The draws of what is not known (`hand_models.parameters.draws`) stand for all hands that there may
+be. Each in turn is taken for the truth: a measurement that gives m* there and m_i in draw i, with
+the standard deviation σ, leaves draw i the weight
+
+    w_i = exp(−Σ (m_i − m*)² / (2 σ²)),
+
+summed over the numbers that one measurement gives. The narrower the weighted 5 to 95 % of the load
+factor, averaged over the truths, the better the measurement: its *width* is that over the width of
+all draws alike. Weights leave few draws, and few draws are less wide by chance: so a width is held
+against `chance`, the mean of the same with the measured numbers of other draws (all cyclic shifts).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
+from hand_models.compliance import Gripper, gripper_table
+from hand_models.experiments import StudyResult, panels, pull, pulled_off_poses, track
+from hand_models.parameters import (
+    Draw,
+    ParameterTable,
+    bundled_draws,
+    experiment_table,
+    own_hand,
+    own_surfaces,
+)
+from hand_models.tile import Surface
+from planner.question import Question
+from planner.robots import robosimian
+from planner.solving import plan
+
+__all__ = ["MeasurementStudy", "measured", "widths"]
+
+ACCURACIES: Final = "measurements"
+"""Section of ``experiments.toml``."""
+
+ENDS: Final = (0.05, 0.95)
+"""Of the load factors."""
+
+ANGLES: Final = (0, 45, 90)
+"""At which the gripper is pulled, from shear to pull-off [°]."""
+
+STEPS: Final = 11
+"""On the way to a pull."""
+
+
+def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
+    """Return what each measurement gives on the hand of a draw, exactly, by its name.
+
+    Parameters
+    ----------
+    draw : Draw
+    hand : ParameterTable
+        All numbers of the hand that the draw changes.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (k,)
+        In the units of ``[measurements]``; a pull is zero where the gripper holds none.
+    """
+    numbers, surfaces = own_hand(draw.hand, hand), own_surfaces(draw.surfaces)
+    tile, rock = (Surface.named(name, surfaces) for name in ("sandpaper-36", "rock"))
+    radii = numbers.vector("finger", "pulley_radii")
+    closing = numbers.scalar("tendon", "closing_tension")
+    single = {
+        "tile_on_sandpaper": tile.shear_limit,
+        "tile_on_rock": rock.shear_limit,
+        "tile_at_45": float(tile.strength(np.pi / 4)),
+        "contact_stiffness": numbers.scalar("tile", "contact_stiffness"),
+        "middle_radius": radii[1],
+        "distal_radius": radii[2],
+        "seated_contact": numbers.scalar("finger", "seated_contact"),
+    }
+    return {
+        **_on_gripper(draw, hand, tile),
+        **{name: np.array([value]) for name, value in single.items()},
+        "engagement": closing * np.array(numbers.vector("tile", "engagement")),
+    }
+
+
+def _on_gripper(draw: Draw, hand: ParameterTable, tile: Surface) -> dict[str, Array]:
+    """Return what the paper's gripper gives with a draw's fingers: its seat is the rig's own."""
+    kept = {
+        section: {name: each for name, each in entries.items() if name != "seated_contact"}
+        for section, entries in draw.hand.sections.items()
+    }
+    table, experiment = gripper_table(own_hand(ParameterTable(kept), hand)), experiment_table()
+    found = {f"pull_{angle}": np.zeros(1) for angle in ANGLES}
+    normals = np.zeros(3)
+    try:
+        gripper = Gripper(
+            experiment.scalar("fig12", "diameter"),
+            experiment.scalar("fig12", "tension"),
+            tile,
+            table,
+        )
+        turns = np.radians(ANGLES)
+        ways = np.column_stack([np.cos(turns), -np.sin(turns), np.zeros(len(turns))])
+        for angle, wrench in zip(ANGLES, pull(gripper, ways).wrenches, strict=True):
+            found[f"pull_{angle}"] = np.array([np.hypot(wrench[0], wrench[1])])
+        pulls = np.linspace(0.0, experiment.scalar("measured_gripper", "pull"), STEPS)
+        poses = pulled_off_poses(gripper, pulls)
+        normals = np.asarray(gripper.finger_loads(poses[-1:])[0].normals[0], dtype=float)
+    except (EmptySetError, InvalidInputError):
+        pass  # no such grasp, or it lets go before any load
+    return {**found, "normal_forces": normals}
+
+
+def widths(values: Array, factors: Array, accuracy: float) -> tuple[float, float]:
+    """Return how wide a measurement leaves the load factor, and how wide it would by chance.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, k)
+        What it gives in each draw.
+    factors : ndarray, shape (n,)
+        The load factors.
+    accuracy : float
+        σ, in the unit of the values.
+
+    Returns
+    -------
+    width, chance : float
+        Over the width without any measurement; see the module.
+    """
+    away = ((values[:, None] - values) ** 2).sum(axis=2)
+    weights, count = np.exp(-away / (2.0 * accuracy**2)), len(factors)
+    whole = _weighted_width(np.ones((1, count)), factors)
+    shifted = [_weighted_width(weights, np.roll(factors, shift)) for shift in range(count)]
+    return shifted[0] / whole, float(np.mean(shifted[1:])) / whole
+
+
+def _weighted_width(weights: Array, factors: Array) -> float:
+    """Return the mean width from 5 to 95 %, one row of weights (m, n) for each truth.
+
+    A quantile is the least load factor up to which there is that share of the weight.
+    """
+    order = factors.argsort(kind="stable")
+    shares = weights[:, order].cumsum(axis=1)
+    shares /= shares[:, -1:]
+    low, high = (factors[order][(shares < end - 1e-12).sum(axis=1)] for end in ENDS)
+    return float(np.mean(high - low))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementStudy:
+    """The study: over which stances load factors count.
+
+    Attributes
+    ----------
+    stances : mapping of str to Question
+        By name; each counts alike.
+    """
+
+    stances: Mapping[str, Question]
+
+    def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
+        """Plan all stances and make all measurements with each draw, and rank the measurements."""
+        draws = bundled_draws(hand)
+        values: list[dict[str, Array]] = []
+        factors: dict[str, Array] = {}
+        robot = robosimian(hand)
+        jobs: list[str | Draw] = [*self.stances, *draws]
+        for job in track(progress, jobs):
+            if isinstance(job, str):
+                asked = self.stances[job]
+                stance = replace(asked.stance, robot=robot)
+                wanted = replace(asked, stance=stance, want=frozenset(["spread"]), draws=None)
+                spread = plan(wanted).spread
+                found = [] if spread is None else spread.load_factors
+                factors[job] = np.array([np.nan if f is None else f for f in found])
+            else:
+                values.append(measured(job, hand))
+        told = [_ranked(quantity, values, factors) for quantity in _accuracies()]
+        told.sort(key=lambda each: each["against_chance"])
+        data: dict[str, Any] = {
+            "draws": len(draws),
+            "stances": list(factors),
+            "load_factors": factors,
+            "measurements": told,
+            "summary": _summary(told),
+        }
+        title = "which measurement would narrow the spread of load factors most"
+        return StudyResult("measure", title, data, ())
+
+    def plot(self, result: StudyResult) -> dict[str, Figure]:
+        """Draw how wide each measurement leaves the load factors."""
+        told = result.data["measurements"][::-1]
+        places = np.arange(len(told))
+        figure, (axes,) = panels(1, 1, (8.5, 0.38 * len(told) + 1.8), grid="x")
+        axes.barh(places, [each["width"] for each in told], color="tab:blue", label="measured")
+        chance = [each["chance"] for each in told]
+        axes.plot(chance, places, "k|", markersize=14, label="with unrelated numbers, by chance")
+        for name in result.data["stances"]:
+            at = [each["widths"].get(name) for each in told]
+            axes.plot(at, places, ".", color="0.6", markersize=5)
+        axes.plot([], [], ".", color="0.6", label="each stance")
+        axes.set_yticks(places, [each["name"].replace("_", " ") for each in told])
+        axes.set(
+            xlabel="5 to 95 % of the load factor, over that without a measurement [1]",
+            ylabel="measurement",
+            title=f"{result.data['draws']} draws, {len(result.data['stances'])} stances; "
+            "the best against chance on top",
+        )
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+        return {"measure": figure}
+
+
+def _accuracies() -> list[tuple[str, float, str]]:
+    """Return what could be measured: name, accuracy and unit."""
+    section = experiment_table().sections[ACCURACIES]
+    return [
+        (name, experiment_table().positive(ACCURACIES, name), quantity.unit)
+        for name, quantity in section.items()
+    ]
+
+
+def _ranked(
+    quantity: tuple[str, float, str],
+    values: list[dict[str, Array]],
+    factors: Mapping[str, Array],
+) -> dict[str, Any]:
+    """Return what a measurement does to each stance's load factor, and to all."""
+    name, accuracy, unit = quantity
+    given = np.array([each[name] for each in values])
+    found: dict[str, tuple[float, float]] = {}
+    for stance, each in factors.items():
+        there = np.isfinite(each)
+        if there.sum() > 1 and np.ptp(each[there]) > 0.0:
+            found[stance] = widths(given[there], each[there], accuracy)
+    width, chance = np.mean(list(found.values()), axis=0).tolist() if found else (1.0, 1.0)
+    return {
+        "name": name,
+        "unit": unit,
+        "accuracy": accuracy,
+        "drawn": np.percentile(given, [5.0, 95.0], axis=0).T,
+        "widths": {stance: each[0] for stance, each in found.items()},
+        "width": width,
+        "chance": chance,
+        "against_chance": width / chance,
+    }
+
+
+def _summary(told: list[dict[str, Any]]) -> list[str]:
+    """Return a line for each measurement, the best first."""
+    return [
+        "of the load factors' width from 5 to 95 % is left, the best first:",
+        *(
+            f"{each['width']:4.0%} (by chance {each['chance']:4.0%})  "
+            f"{each['name'].replace('_', ' ')} ± {each['accuracy']:g} {each['unit']}"
+            for each in told
+        ),
+    ]

@@ -1,0 +1,124 @@
+"""Draws of numbers as hands: what each makes of a stance's hand and of its surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, within
+from hand_models.hand import HandModel
+from hand_models.parameters import (
+    Draw,
+    ParameterTable,
+    bundled_draws,
+    own_hand,
+    own_surfaces,
+    surface_table,
+)
+from hand_models.tile import Surface, surface_names
+
+__all__ = ["DrawnHand", "drawn_hands", "drawn_quantities"]
+
+KEPT: Final = 8
+"""Choices of draws whose hands are kept, those used last."""
+
+
+class DrawnHand(NamedTuple):
+    """A hand, and what a tile holds, with the numbers of one draw.
+
+    Attributes
+    ----------
+    model : HandModel
+    surfaces : ParameterTable
+        All numbers of the surfaces.
+    """
+
+    model: HandModel
+    surfaces: ParameterTable
+
+    def surface(self, usual: Surface) -> Surface:
+        """Return what a tile holds in this draw where it usually holds what a surface says.
+
+        A caller's own numbers stay; of a preset, so does how many half-planes stand for it.
+        """
+        if usual.name is None:
+            return usual
+        planes = usual.half_planes
+        if replace(Surface.named(usual.name), half_planes=planes) != usual:
+            return usual
+        return replace(Surface.named(usual.name, self.surfaces), half_planes=planes)
+
+
+@lru_cache(maxsize=KEPT)
+def drawn_hands(hand: HandModel, draws: tuple[Draw, ...] | None = None) -> tuple[DrawnHand, ...]:
+    """Return what draws make of a hand.
+
+    Parameters
+    ----------
+    hand : HandModel
+        Of the stance: what a draw leaves open is as with this one.
+    draws : tuple of Draw, optional
+        The bundled ones by default.
+
+    Raises
+    ------
+    InvalidInputError
+        If a draw makes no possible hand, or surface; the field begins with its number.
+    """
+    if draws is None:
+        draws = bundled_draws(hand.table)
+    found = []
+    for i, draw in enumerate(draws):
+        with within(f"[{i}]"):
+            with within("hand"):
+                model = HandModel(own_hand(draw.hand, hand.table))
+            with within("surfaces"):
+                surfaces = own_surfaces(draw.surfaces)
+                for name in surface_names():
+                    with within(name):
+                        Surface.named(name, surfaces)
+        found.append(DrawnHand(model, surfaces))
+    return tuple(found)
+
+
+def drawn_quantities(
+    hand: HandModel, draws: tuple[Draw, ...] | None, surfaces: frozenset[str | None]
+) -> dict[str, Array]:
+    """Return the numbers in which draws differ, shape (draws,) each, by their names.
+
+    Parameters
+    ----------
+    hand, draws
+        As of `drawn_hands`.
+    surfaces : frozenset of str or None
+        Names of the surfaces that hands are on; numbers of others are left out.
+
+    Returns
+    -------
+    dict of str to ndarray
+        In SI units, by ``section.entry``, with ``[i]`` for each number of a list.
+    """
+    named = {name for name in surfaces if name is not None}
+    on_presets = named | {"defaults"} if named else named
+    return {
+        f"{section}.{name}": values
+        for (section, name), values in _differing(hand, draws).items()
+        if section in on_presets or section not in surface_table().sections
+    }
+
+
+@lru_cache(maxsize=KEPT)
+def _differing(hand: HandModel, draws: tuple[Draw, ...] | None) -> dict[tuple[str, str], Array]:
+    """Return all numbers in which draws differ, by section and entry."""
+    drawn = drawn_hands(hand, draws)
+    found = {}
+    for tables in ([each.model.table for each in drawn], [each.surfaces for each in drawn]):
+        for section, name, _ in tables[0]:
+            over = np.array([table.quantity(section, name).value for table in tables])
+            for i, values in enumerate(over.reshape(len(tables), -1).T):
+                if np.ptp(values) > 0.0:
+                    found[section, name if over.ndim == 1 else f"{name}[{i}]"] = values
+    return found

@@ -1,0 +1,163 @@
+"""How sure an answer is: plan and load factor over draws of what nobody knows exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from msgspec import Struct
+
+from hand_models.base import Array
+
+__all__ = ["DrawnPlan", "Influence", "Quantiles", "Spread"]
+
+PERCENTS: Final = (5.0, 50.0, 95.0)
+"""That are told of a number over the draws."""
+
+VARIES: Final = 1e-4
+"""How far load factors must differ, relatively, for it to hang on anything."""
+
+FEWEST: Final = 3
+"""Load factors of which a correlation says anything."""
+
+TOLD: Final = 3
+"""Quantities that are told."""
+
+
+class DrawnPlan(Struct, frozen=True):
+    """What a draw's verified plan says; None where there is no such plan, or number.
+
+    Attributes
+    ----------
+    utilisation, load_factor : float or None
+    holds : bool
+        Whether it would be ``optimal``.
+    """
+
+    utilisation: float | None = None
+    load_factor: float | None = None
+    holds: bool = False
+
+
+class Quantiles(Struct, frozen=True):
+    """A number over the draws that have it: its 5, 50 and 95 % quantiles (linear between draws)."""
+
+    low: float
+    median: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Sequence[float | None]) -> Quantiles | None:
+        """Return the quantiles of the numbers that are there; None if none is."""
+        there = [value for value in values if value is not None]
+        return cls(*np.percentile(there, PERCENTS).tolist()) if there else None
+
+
+class Influence(Struct, frozen=True):
+    """How much of the load factor's variation over the draws goes with one drawn quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        As in parameter files: ``rock.shear_limit``, ``finger.pulley_radii[1]``.
+    share : float
+        ρ² in [0, 1]; see `Spread`.
+    """
+
+    quantity: str
+    share: float
+
+
+class Spread(Struct, frozen=True):
+    """A plan and its load factor over draws of the hand's and the rock's numbers.
+
+    Body wrench, poses, joints and all that was asked stay; every draw has a plan of its own, which
+    is verified as any plan is. A draw has no answer where a hand cannot be in its place, nothing
+    balances the body, or no plan passes the checks; it counts as not holding.
+
+    Attributes
+    ----------
+    draws, holds, without : int
+        Draws; those in which the stance holds within the cap on the utilisation; and those that
+        have no answer.
+    refused : dict of str to int
+        In how many draws a hand cannot be, by limb; those that always can are left out.
+    utilisation, load_factor : Quantiles or None
+        Over the draws that have one.
+    hangs_on : list of Influence
+        The drawn quantities with which most of the load factor's variation goes, the first three,
+        the largest share first. A share is the squared rank correlation
+
+            ρ² = (Σ_k a_k b_k)² / (Σ_k a_k² Σ_k b_k²)
+
+        of the quantity's ranks a and the load factor's ranks b among the draws that have one, less
+        their means; equal numbers have their mean rank. Quantities that vary together in the draws
+        share what they explain, so that shares do not add up to 1. Empty where the load factor does
+        not vary by more than 1e-4 of itself, or fewer than three draws have one.
+    utilisations, load_factors : list of float or None
+        Of each draw, in order.
+    """
+
+    draws: int
+    holds: int
+    without: int
+    refused: dict[str, int]
+    utilisation: Quantiles | None
+    load_factor: Quantiles | None
+    hangs_on: list[Influence]
+    utilisations: list[float | None]
+    load_factors: list[float | None]
+
+    @classmethod
+    def of(
+        cls,
+        plans: Sequence[DrawnPlan],
+        refused: Mapping[str, int],
+        drawn: Mapping[str, Array],
+    ) -> Spread:
+        """Return what plans of all draws say.
+
+        Parameters
+        ----------
+        plans : sequence of DrawnPlan, length n
+        refused : mapping of str to int
+        drawn : mapping of str to ndarray, shape (n,)
+            The quantities by name, and what each is in every draw.
+        """
+        used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
+        return cls(
+            draws=len(plans),
+            holds=sum(each.holds for each in plans),
+            without=used.count(None),
+            refused=dict(refused),
+            utilisation=Quantiles.of(used),
+            load_factor=Quantiles.of(factors),
+            hangs_on=_influences(factors, drawn),
+            utilisations=used,
+            load_factors=factors,
+        )
+
+
+def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> list[Influence]:
+    """Return the largest shares of the load factor's variation, the largest first."""
+    there = [k for k, factor in enumerate(factors) if factor is not None]
+    found = np.array([factors[k] for k in there], dtype=float)
+    if len(found) < FEWEST or np.ptp(found) <= VARIES * np.abs(found).max():
+        return []
+    b = _centred_ranks(found)
+    shares: dict[bytes, Influence] = {}
+    for name, values in drawn.items():
+        a = _centred_ranks(values[there])
+        if a.any():
+            # a quantity that is ordered as one before says the same
+            share = float((a @ b) ** 2 / ((a @ a) * (b @ b)))
+            shares.setdefault(a.tobytes(), Influence(name, share))
+    return sorted(shares.values(), key=lambda each: -each.share)[:TOLD]
+
+
+def _centred_ranks(values: Array) -> Array:
+    """Return ranks less their mean, shape (n,); equal values have their mean rank."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(counts) - 0.5 * (counts - 1.0))[places]
+    return np.asarray(ranks - ranks.mean())

@@ -1,0 +1,105 @@
+"""How sure a plan is: its stance planned anew with each draw of the hand's and the rock's numbers.
+
+A draw changes what the hands are and what their tiles hold, and nothing that was asked: body,
+hands' poses, joints and body wrench stay. Hands that are seated close as the draw's hand seats
+them, H where it was; it is the rock that is elsewhere. One whose best seat was searched for stays
+where that was found. A draw's plan has neither certificate nor prices nor words.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+
+from hand_models.base import InvalidInputError
+from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
+from planner import deadline
+from planner.deadline import Budget, DeadlineError, Overlap
+from planner.explanation import LimitUse
+from planner.floating import PROGRAMS
+from planner.prepare import PreparedStance
+from planner.programs import SLACK
+from planner.question import DrawnHand, drawn_hands, drawn_quantities
+from planner.result import DrawnPlan, LoadRecovery, Spread
+from planner.solving.load_factor import find_load_factor
+from planner.solving.prepared_checks import PreparedChecks
+from planner.solving.solution import not_least, solve_question
+from planner.solving.why_not import look_again
+from planner.verification import Check
+
+__all__ = ["find_spread"]
+
+
+def find_spread(prepared: PreparedStance, idle: Sequence[LimitUse]) -> Spread | None:
+    """Return a stance's plans over its question's draws; None if time does not allow all of them.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    idle : sequence of LimitUse
+        How much of their joints' torque limbs without a hand use: the same in every draw.
+    """
+    question, plans = prepared.question, []
+    drawn = question.stance.robot.hand, question.draws
+    refused: Counter[str] = Counter()
+    try:
+        for each in drawn_hands(*drawn):
+            deadline.check("all draws were planned")
+            outcomes = _settled(prepared, each)
+            there = [hand for hand in outcomes if isinstance(hand, SettledHand)]
+            pairs = zip(prepared.limbs, outcomes, strict=True)
+            refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
+            whole = len(there) == len(outcomes)
+            plans.append(_planned(prepared, there, idle) if whole else DrawnPlan())
+        deadline.check("all draws were planned")
+    except DeadlineError:
+        return None
+    surfaces = {hand.surface.name for hand in question.stance.hands}
+    return Spread.of(plans, refused, drawn_quantities(*drawn, frozenset(surfaces)))
+
+
+def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:
+    """Return the hands closed as those of a draw; errors in place of those that cannot be."""
+    placements = {}
+    keys = []
+    for hand, usual in zip(prepared.question.stance.hands, prepared.batch.hands, strict=True):
+        seat, at = hand.placed_hold(), hand.at
+        if hand.seat == "best":
+            seat, at = usual.seating.pose, None
+        placement = Placement(hand.hold, drawn.surface(hand.surface), hand.grasp, seat, at)
+        keys.append(PlacementKey(placement))
+        placements[keys[-1]] = placement
+    # hands that close alike close once
+    outcomes = settle_hands(drawn.model, list(placements.values()))
+    found = dict(zip(placements, outcomes, strict=True))
+    return [found[key] for key in keys]
+
+
+def _planned(
+    prepared: PreparedStance, settled: Sequence[SettledHand], idle: Sequence[LimitUse]
+) -> DrawnPlan:
+    """Return what the verified plan says of the same stance with a draw's hands."""
+    try:
+        there = prepared.with_hands(settled)
+    except InvalidInputError:
+        # a preload that a floating hand does not hold
+        return DrawnPlan()
+    checks, budget = Overlap(partial(_checks, there, idle)), Budget(PROGRAMS)
+    found = solve_question(there, checks, budget)
+    if not found.passes:
+        found, _ = look_again(there, checks, found, budget, prove=False)
+    factor = find_load_factor(there, found, idle, budget).factor
+    reading = found.reading
+    if not found.passes or reading is None or not_least(found):
+        return DrawnPlan(load_factor=factor)
+    cap = there.question.limits.utilisation
+    return DrawnPlan(reading.whole, factor, reading.whole <= cap + SLACK)
+
+
+def _checks(there: PreparedStance, idle: Sequence[LimitUse]) -> PreparedChecks:
+    """Return what reads and checks plans of a draw, of which nothing is kept."""
+    batch, hands, recovery = there.batch, there.hands, None
+    if not hands.floating:
+        recovery = LoadRecovery(batch, hands.spaces, hands.scaled)
+    return PreparedChecks(recovery, Check(there.question, batch, there.where), tuple(idle), ())

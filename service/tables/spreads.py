@@ -1,0 +1,65 @@
+"""How sure a plan is, for a person: with no more digits than that leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from planner.result import Quantiles, RobustLoadFactor, Spread
+
+__all__ = ["robust_sentence", "spread_sentence", "within"]
+
+MOST_DIGITS: Final = 3
+"""After the point, however small the spread."""
+
+
+def within(value: float, spread: Quantiles | None) -> str:
+    """Return a number with its 5 to 95 % interval, if that is known.
+
+    The interval has the first decimal in which its ends differ, the number one more.
+    """
+    if spread is None:
+        return f"{value:.{MOST_DIGITS}f}"
+    more = min(_digits(spread) + 1, MOST_DIGITS)
+    return f"{value:.{more}f} ({_interval(spread)})"
+
+
+def spread_sentence(spread: Spread) -> str:
+    """Say in how many draws a stance holds, on what that hangs most, and what was left out."""
+    said = f"holds in {spread.holds} of {spread.draws} draws"
+    if spread.hangs_on:
+        most = spread.hangs_on[0]
+        said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
+    if spread.without:
+        said += f"; {spread.without} have no answer"
+    return said + _refused(spread.refused)
+
+
+def robust_sentence(robust: RobustLoadFactor) -> str:
+    """Say what is left of the load factor where the hands are a little elsewhere."""
+    said = "there is none in any"
+    if robust.worst is not None and robust.tenth is not None:
+        said = f"nine in ten above {robust.tenth:.3f}, the worst {robust.worst:.3f}"
+        said += f", leaving out {robust.without} draws without any" if robust.without else ""
+    said += _refused(robust.refused)
+    return (
+        f"load factor with each hand up to {1e3 * robust.position:g} mm and "
+        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
+    )
+
+
+def _refused(limbs: Mapping[str, int]) -> str:
+    return "".join(f"; in {n} {limb} cannot be there" for limb, n in limbs.items())
+
+
+def _digits(spread: Quantiles) -> int:
+    """Return the first decimal in which an interval's ends differ, from 1 to `MOST_DIGITS`."""
+    wide = spread.high - spread.low
+    first = MOST_DIGITS if wide <= 0.0 else math.ceil(-math.log10(wide))
+    return min(max(first, 1), MOST_DIGITS)
+
+
+def _interval(spread: Quantiles) -> str:
+    digits = _digits(spread)
+    return f"{spread.low:.{digits}f} to {spread.high:.{digits}f}"

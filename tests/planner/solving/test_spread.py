@@ -1,0 +1,330 @@
+"""The spread of a plan: what stances planned one by one with each draw's numbers have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import spearmanr
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.parameters import Draw, bundled_draws, own_draw, own_hand, own_surfaces
+from hand_models.rock import Plane
+from hand_models.tile import Surface
+from planner.prepare import settle_hand
+from planner.question import Limits, Question, Stance
+from planner.result import DrawnPlan, Spread
+from planner.robots import robosimian
+from planner.solving import KnownStance, plan, spread
+from service.answering.questions import question
+from service.commands.stances import read_request
+from tests.suite.helpers.stances import TILE_60N, ask, moved, on_wall
+
+
+def entry(value, unit: str) -> dict[str, object]:
+    return {"value": value, "unit": unit, "source": "assumed"}
+
+
+def drawn(rock: float | None = None, **hand) -> Draw:
+    """A draw with another strength of rock, and entries of the hand by section."""
+    surfaces = {} if rock is None else {"rock": {"shear_limit": entry(rock, "N")}}
+    return own_draw({"hand": hand, "surfaces": surfaces})
+
+
+def radii(middle: float, distal: float) -> dict[str, object]:
+    return {"pulley_radii": entry([0.0055, middle, distal], "m")}
+
+
+def seat(contact: float) -> dict[str, object]:
+    return {"seated_contact": entry(contact, "m")}
+
+
+FEW = (
+    drawn(50.0, finger=radii(0.0031, 0.0025)),
+    drawn(70.0, finger=radii(0.0028, 0.0022), tile={"contact_stiffness": entry(5e3, "N/m")}),
+    drawn(90.0, finger=seat(0.0239)),
+    drawn(110.0, tile={"engagement": entry([0.14, 0.18, 0.2], "1")}),
+)
+STRENGTHS = tuple(drawn(strength) for strength in (40.0, 65.0, 80.0, 55.0))
+SEATS = tuple(drawn(finger=seat(contact)) for contact in (0.0237, 0.0247, 0.0257))
+
+
+def asked_of(name: str, **kwargs) -> Question:
+    """A bundled stance, and its load factor's spread."""
+    return replace(
+        question(read_request(name)), want=frozenset(["spread", "load_factor"]), **kwargs
+    )
+
+
+def on_draw(asked: Question, draw: Draw) -> Question:
+    """The same question of a robot that has a draw's hands, on rock that has its strength."""
+    stance = asked.stance
+    surfaces = own_surfaces(draw.surfaces)
+    hands = tuple(
+        replace(hand, surface=Surface.named(hand.surface.name, surfaces))
+        if hand.surface.name is not None
+        else hand
+        for hand in stance.hands
+    )
+    there = replace(stance, hands=hands, robot=robosimian(own_hand(draw.hand)))
+    return replace(asked, stance=there, want=frozenset(["load_factor"]), draws=None)
+
+
+def planned_apart(asked: Question) -> list[DrawnPlan]:
+    """What plans of all draws say that are asked for one by one."""
+    found = []
+    for draw in asked.draws or bundled_draws():
+        try:
+            answer = plan(on_draw(asked, draw))
+        except InvalidInputError:
+            found.append(DrawnPlan())
+            continue
+        holds = answer.status == "optimal"
+        found.append(DrawnPlan(answer.utilisation, answer.load_factor, holds))
+    return found
+
+
+def almost(values):
+    return [None if value is None else pytest.approx(value, rel=1e-5) for value in values]
+
+
+MIXED = replace(
+    on_wall(),
+    hands=tuple(
+        replace(hand, surface=surface)
+        for hand, surface in zip(
+            on_wall().hands,
+            (*map(Surface.named, ("rock", "concrete-fine", "concrete-coarse")), TILE_60N),
+            strict=True,
+        )
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ask(MIXED, "spread"),
+        ask(on_wall(), "spread", draws=FEW, limits=Limits(utilisation=0.8, tendon_tension=150.0)),
+        ask(on_wall(), "spread", draws=FEW, objective="min_effort"),
+        asked_of("wall-300-joints", draws=FEW),
+        asked_of("ledge", draws=FEW),
+        asked_of("wall-700", draws=FEW),
+        pytest.param(asked_of("wall-300-floating", draws=FEW), marks=pytest.mark.slow),
+        pytest.param(asked_of("boulders", draws=FEW), marks=pytest.mark.slow),
+        pytest.param(asked_of("slab"), marks=pytest.mark.slow),
+    ],
+    ids=["mixed", "capped", "effort", "joints", "nails", "weak", "floating", "mesh", "slab"],
+)
+def test_it_is_what_each_draw_has_by_itself(asked):
+    found, apart = plan(asked).spread, planned_apart(asked)
+    assert found.draws == len(apart)
+    assert found.holds == sum(each.holds for each in apart)
+    assert found.without == sum(each.utilisation is None for each in apart)
+    for name in ("utilisation", "load_factor"):
+        one_by_one = [getattr(each, name) for each in apart]
+        assert getattr(found, f"{name}s") == almost(one_by_one)
+        told = getattr(found, name)
+        there = [value for value in one_by_one if value is not None]
+        for percent, value in ((5, told.low), (50, told.median), (95, told.high)):
+            assert value == pytest.approx(np.percentile(there, percent), rel=1e-5)
+    assert plan(asked).spread == found
+
+
+def test_the_plan_itself_stays():
+    asked = ask(on_wall(), "load_factor")
+    plain, told = plan(asked), plan(replace(asked, want=frozenset(["load_factor", "spread"])))
+    assert plain.spread is None
+    assert told.load_factor == plain.load_factor
+    assert told.utilisation == plain.utilisation
+    spread = told.spread
+    assert spread.load_factor.low < told.load_factor < spread.load_factor.high
+    assert 0 < spread.holds < spread.draws == len(bundled_draws())
+
+
+def test_it_does_not_hang_on_where_the_world_is():
+    by = Pose(np.array([3.0, -2.0, 5.0]), Rotation.from_rotvec([0.3, -1.0, 2.0]).as_matrix())
+    here, there = (
+        plan(ask(stance, "spread", draws=FEW)).spread
+        for stance in (on_wall(), moved(on_wall(), by))
+    )
+    assert there.load_factors == almost(here.load_factors)
+    assert there.utilisations == almost(here.utilisations)
+
+
+def test_the_order_of_draws_does_not_matter():
+    once, again = (plan(ask(on_wall(), "spread", draws=draws)).spread for draws in (FEW, FEW[::-1]))
+    assert again.load_factors == once.load_factors[::-1]
+    assert again.load_factor == once.load_factor
+    assert again.holds == once.holds
+    by_name = {each.quantity: each.share for each in once.hangs_on}
+    assert {each.quantity: each.share for each in again.hangs_on} == pytest.approx(by_name)
+
+
+def test_on_a_callers_own_numbers_only_the_hand_varies():
+    """Even if they are those of a preset."""
+    usual = Surface.named("rock")
+    mine = Surface.from_values({"shear_limit": usual.shear_limit})
+    assert mine == usual
+    one = plan(ask(on_wall(surface=mine), "spread", "load_factor", draws=STRENGTHS))
+    assert one.spread.load_factors == almost([one.load_factor] * len(STRENGTHS))
+    assert one.spread.hangs_on == []
+    changed = replace(usual, shear_limit=61.0)
+    other = plan(ask(on_wall(surface=changed), "spread", draws=STRENGTHS)).spread
+    assert other.load_factors == almost([other.load_factors[0]] * len(STRENGTHS))
+    bundled = plan(ask(on_wall(surface=mine), "spread")).spread
+    assert {each.quantity.split(".")[0] for each in bundled.hangs_on} <= {"finger", "tile"}
+
+
+def test_half_planes_that_were_asked_for_stay():
+    finer = replace(Surface.named("rock"), half_planes=4)
+    asked = ask(on_wall(surface=finer), "spread", draws=STRENGTHS[:2])
+    factors = plan(asked).spread.load_factors
+    for draw, factor in zip(STRENGTHS, factors, strict=False):
+        rock = draw.surfaces.scalar("rock", "shear_limit")
+        own = Surface.from_values({"shear_limit": rock, "half_planes": 4})
+        assert factor == pytest.approx(plan(ask(on_wall(surface=own), "load_factor")).load_factor)
+
+
+def seated(stance: Stance, **kwargs) -> Stance:
+    hands = tuple(
+        replace(hand, hold_in_hand=settle_hand(hand, stance).seating.pose, **kwargs)
+        for hand in stance.hands
+    )
+    return replace(stance, hands=hands)
+
+
+def test_a_seat_that_is_given_stays_and_one_that_is_not_moves():
+    moves = plan(ask(on_wall(), "spread", draws=SEATS)).spread
+    assert np.ptp(moves.load_factors) > 0.01
+    assert moves.hangs_on[0].quantity == "finger.seated_contact"
+    stays = plan(ask(seated(on_wall()), "spread", draws=SEATS)).spread
+    assert stays.load_factors == almost([moves.load_factors[1]] * 3)
+
+
+def test_a_best_seat_is_kept_where_it_was_found():
+    limbs = ("front_left", "front_right")
+    stance = on_wall(limbs=limbs)
+    best = replace(stance, hands=tuple(replace(hand, seat="best") for hand in stance.hands))
+    there = plan(ask(best, "spread", draws=FEW[:2])).spread
+    given = plan(ask(seated(best, seat="rest"), "spread", draws=FEW[:2])).spread
+    assert there.load_factors == almost(given.load_factors)
+
+
+def test_a_hand_of_the_callers_own_stays_in_what_it_changes():
+    mine = own_hand(own_draw({"hand": {"finger": radii(0.003, 0.0024) | seat(0.0241)}}).hand)
+    stance = replace(on_wall(surface=TILE_60N), robot=robosimian(mine))
+    found = plan(ask(stance, "spread")).spread
+    assert found.hangs_on
+    assert {each.quantity.split(".")[0] for each in found.hangs_on} == {"tile"}
+
+
+def test_shares_are_squared_rank_correlations():
+    found = plan(asked_of("wall-300")).spread
+    draws = bundled_draws()
+    values = {
+        "rock.shear_limit": [draw.surfaces.scalar("rock", "shear_limit") for draw in draws],
+        "tile.contact_stiffness": [draw.hand.scalar("tile", "contact_stiffness") for draw in draws],
+    }
+    for i in (1, 2):
+        of_radius = [draw.hand.vector("finger", "pulley_radii")[i] for draw in draws]
+        values[f"finger.pulley_radii[{i}]"] = of_radius
+    shares = {
+        name: spearmanr(each, found.load_factors).statistic ** 2 for name, each in values.items()
+    }
+    assert found.hangs_on[0].quantity == max(shares, key=shares.get) == "rock.shear_limit"
+    told = {each.quantity: each.share for each in found.hangs_on}
+    assert len(told) == 3
+    for name in told.keys() & shares.keys():
+        assert told[name] == pytest.approx(shares[name])
+
+
+def test_ties_and_missing_load_factors_are_minded():
+    factors = [1.0, 2.0, 2.0, None, 3.0, 4.0]
+    drawn_values = {"a": np.array([1.0, 3.0, 3.0, 9.0, 2.0, 5.0]), "same": np.ones(6)}
+    found = Spread.of([DrawnPlan(load_factor=factor) for factor in factors], {}, drawn_values)
+    there = [0, 1, 2, 4, 5]
+    told = spearmanr(drawn_values["a"][there], [factors[k] for k in there]).statistic ** 2
+    assert [each.quantity for each in found.hangs_on] == ["a"]
+    assert found.hangs_on[0].share == pytest.approx(told)
+    assert found.utilisation is None
+    few = Spread.of([DrawnPlan(load_factor=factor) for factor in (1.0, 2.0)], {}, {})
+    assert few.hangs_on == []
+
+
+def test_draws_without_an_answer_do_not_hold_and_are_told():
+    slack = drawn(tendon={"closing_tension": entry(1.0, "N")})
+    found = plan(ask(on_wall(), "spread", draws=(STRENGTHS[2], slack))).spread
+    assert (found.draws, found.holds, found.without) == (2, 1, 1)
+    assert found.refused == dict.fromkeys((hand.limb for hand in on_wall().hands), 1)
+    assert found.load_factors[1] is found.utilisations[1] is None
+    assert found.load_factor.low == found.load_factor.high == found.load_factors[0]
+
+
+def test_where_no_draw_balances_none_holds():
+    answer = plan(ask(on_wall(Plane(), outer_rotation=0.0), "spread", draws=STRENGTHS))
+    assert answer.status == "infeasible"
+    found = answer.spread
+    assert (found.draws, found.holds, found.without, found.refused) == (4, 0, 4, {})
+    assert found.utilisation is found.load_factor is None
+
+
+def test_a_plan_that_fails_its_check_is_no_answer(monkeypatch):
+    asked = ask(on_wall(), "spread", draws=STRENGTHS[:3])
+    whole = plan(asked)
+    checked, count = spread.Check.problems, 0
+
+    def problems(self, *args):
+        nonlocal count
+        hands = self.known.hands
+        bad = hands[0].surface.shear_limit == 65.0
+        count += bad
+        return ["off"] if bad else checked(self, *args)
+
+    monkeypatch.setattr(spread.Check, "problems", problems)
+    found = plan(asked)
+    assert found.verified
+    assert count
+    assert found.spread.utilisations == [
+        whole.spread.utilisations[0],
+        None,
+        whole.spread.utilisations[2],
+    ]
+    assert found.spread.without == 1
+
+
+def test_of_no_body_wrench_there_is_a_utilisation_and_no_load_factor():
+    found = plan(ask(on_wall(), "spread", body_wrench=np.zeros(6), draws=FEW)).spread
+    assert found.load_factor is None
+    assert found.holds == len(FEW)
+    assert found.hangs_on == []
+
+
+def test_a_known_stance_tells_it_for_each_wrench():
+    asked = ask(on_wall(), "spread", draws=FEW)
+    once = plan(asked).spread
+    again = KnownStance(asked).plan(0.5 * asked.needed_wrench()).spread
+    assert again.load_factors == almost([2.0 * factor for factor in once.load_factors])
+
+
+def test_draws_that_cannot_be_are_refused_by_their_entry():
+    # possible one by one, but not together
+    bad = drawn(tendon={"closing_tension": entry(900.0, "N")})
+    with pytest.raises(InvalidInputError, match=r"must be at most the tendon's 700 N") as caught:
+        ask(on_wall(), "spread", draws=(*FEW, bad))
+    assert caught.value.field == "draws[4].hand.tendon.closing_tension"
+    ratio = {"surfaces": {"defaults": {"pull_off_ratio": entry(1.5, "1")}}}
+    with pytest.raises(InvalidInputError, match="must not exceed") as caught:
+        ask(on_wall(), "spread", draws=(own_draw(ratio),))
+    assert caught.value.field == "draws[0].surfaces.sandpaper-36.pull_off_limit"
+    with pytest.raises(InvalidInputError, match="want it") as caught:
+        ask(on_wall(), "load_factor", draws=FEW)
+    assert caught.value.field == "draws"
+    for count in (0, 101):
+        with pytest.raises(
+            InvalidInputError, match=f"from 1 to 100 draws .* got {count}"
+        ) as caught:
+            ask(on_wall(), "spread", draws=FEW[:1] * count)
+        assert caught.value.field == "draws"
