@@ -17,8 +17,11 @@ closely: what each of these costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -26,10 +29,11 @@ from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments import Claim, GripperFit, StudyResult, panels
+from hand_models.experiments import SANDPAPER, Claim, GripperFit, StudyResult, panels
 from hand_models.parameters import ParameterTable
+from hand_models.tile import Surface
 
-__all__ = ["Met", "global_search", "plot", "run"]
+__all__ = ["Met", "as_draws", "global_search", "plot", "run"]
 
 STARTS: Final = 3
 """Of the search, the recorded set among them."""
@@ -63,6 +67,15 @@ MEETS: Final = 1.0
 
 CLOSER: Final = 0.3
 """Share of its tolerance within which a datum is asked for more closely."""
+
+OF_HAND: Final = {
+    "finger": {"pulley_radii[1]": "m", "pulley_radii[2]": "m"},
+    "tile": {
+        **{f"engagement[{i}]": "1" for i in range(3)},
+        **{f"contact_stiffness[{i}]": "N/m" for i in range(3)},
+    },
+}
+"""What of the gripper's set the hand has, too: by section, the numbers and their units."""
 
 VARIANTS: Final = (
     ("no friction of pressed tiles, T ≥ 0", "friction", 0.0),
@@ -301,6 +314,47 @@ def _numbers(fit: GripperFit, x: Array, kept: Array) -> list[dict[str, Any]]:
     ]
 
 
+def as_draws(data: Mapping[str, Any]) -> str:
+    """Return the sets of a study's data as what ``draws.toml`` has of them.
+
+    ``python -m hand_models.studies.calibrate DIR/result.json`` prints it.
+    """
+    sets = data["sets"]
+    columns = dict(zip((n["name"] for n in data["numbers"]), _columns(sets), strict=True))
+    angle = Surface.named(SANDPAPER).pull_off_angle
+    slopes = np.array(columns["pull_off_slope"])
+    ratios = 1.0 / (np.cos(angle) + slopes * np.sin(angle))
+    lines = ["# How the sets came about.", "[fit]"]
+
+    def entry(name: str, values: Iterable[float], unit: str, note: str) -> None:
+        listed = ", ".join(f"{value:.4g}" for value in values)
+        lines.append(
+            f'{name} = {{ value = [{listed}], unit = "{unit}", source = "calibrated", '
+            f'note = "{note}" }}'
+        )
+
+    misfit = "the largest of how far the data are off, over their tolerances (study calibrate)"
+    entry("misfit", [each["misfit"] for each in sets], "1", misfit)
+    entry("valley", [each["valley"] for each in sets], "1", "which start of the search led there")
+    for section, names in OF_HAND.items():
+        lines += ["", f"[{section}]"]
+        for name, unit in names.items():
+            quoted = f'"{name}"' if "[" in name else name
+            entry(quoted, columns[name], unit, "of the gripper's set")
+    lines += ["", "# The law of a tile, and its strength on sandpaper.", "[defaults]"]
+    entry("pull_off_ratio", ratios, "1", "of T + k P = T_max, at pull_off_angle")
+    entry("friction", columns["friction"], "1", "of the gripper's set")
+    lines += ["", f"[{SANDPAPER}]"]
+    entry("shear_limit", columns["shear_limit"], "N", "T_max of the gripper's set")
+    return "\n".join(lines) + "\n"
+
+
+def _columns(sets: Sequence[Mapping[str, Any]]) -> list[list[float]]:
+    """Return the sets' values, number by number."""
+    columns: list[list[float]] = np.array([each["values"] for each in sets]).T.tolist()
+    return columns
+
+
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw residuals, what the data leave of each number, and what else was asked for."""
     figure, (left, middle, right) = panels(
@@ -337,3 +391,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     right.axvline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
     right.set(xlabel="largest residual [tolerances]", title="what else was asked for")
     return {"calibrate": figure}
+
+
+if __name__ == "__main__":
+    sys.stdout.write(as_draws(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))["data"]))
