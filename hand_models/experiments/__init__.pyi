@@ -29,6 +29,7 @@ from .pulling import (
 )
 from .study_result import (
     Claim as Claim,
+    Role as Role,
     StudyResult as StudyResult,
     part as part,
     track as track,

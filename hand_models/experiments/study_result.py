@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from hand_models.base import Progress
 
-__all__ = ["Claim", "StudyResult", "part", "track"]
+__all__ = ["Claim", "Role", "StudyResult", "part", "track"]
 
 Item = TypeVar("Item")
+
+Role: TypeAlias = Literal["test", "calibration"]
+"""Whether a claim tests the model, or a parameter was fitted to it."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Claim:
     claimed: str | float
     got: str | float
     holds: bool
-    role: Literal["test", "calibration"] = "test"
+    role: Role = "test"
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "side": {
             "force_x": table.scalar("fig13", "side_force_x"),
             "force_z": _side(held, table.scalar("fig13", "side_force_x")),
+            "printed": table.scalar("fig13", "side_force_z"),
         },
         "extents_of_pulls": extents(pulled.wrenches)._asdict(),
         "pulls": {
@@ -272,7 +273,8 @@ def _claims(data: dict[str, Any], table: ParameterTable) -> Iterator[Claim]:
         bool(off.max() <= NEAR_EDGE and off.mean() <= NEAR_EDGE_ON_AVERAGE),
         role="calibration",
     )
-    side, printed = data["side"], table.scalar("fig13", "side_force_z")
+    side = data["side"]
+    printed = side["printed"]
     yield Claim(
         f"largest pull-off at F_x = {side['force_x']:g} N, within a quarter (Fig. 13, from aside)",
         f"{printed:g} N",
@@ -316,6 +318,13 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         axes.plot(pulled[:, first], pulled[:, second], ".", color="0.4", markersize=3)
         axes.set(xlabel=labels[0], ylabel=labels[1], title=f"{title}; dots: straight pulls")
         axes.grid(alpha=0.3)
+    printed, side_view = data["edge"], data["side"]
+    corners = np.column_stack([printed["force_x"], printed["printed"]])
+    read = {"color": "tab:red", "label": "read off Fig. 13"}
+    top.plot(*np.vstack([corners, -corners]).T, "x", **read)
+    side.plot(side_view["force_x"] * np.array([1.0, -1.0]), [side_view["printed"]] * 2, "x", **read)
+    for axes in (top, side):
+        axes.legend(loc="lower right")
     _draw_strength(strength, data)
     return {"fig13": figure}
 

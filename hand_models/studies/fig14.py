@@ -23,6 +23,7 @@ from hand_models.experiments import (
     DRAGGED,
     UNBALANCED,
     Claim,
+    Role,
     StudyResult,
     clipped_vertices,
     even_pulls,
@@ -212,8 +213,11 @@ def _claims_of_failures(near: dict[str, Any], far: dict[str, Any]) -> Iterator[C
 
 
 def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> Iterator[Claim]:
+    fitted = table.scalar("fig13", "diameter")
     for surface in surfaces:
         where = f"on {1e3 * surface['diameter']:g} mm"
+        # the gripper's numbers were fitted to those planes on the surface of Fig. 13
+        role: Role = "calibration" if surface["diameter"] == fitted else "test"
         planes = surface["planes"]
         for name, words in (("force", "point force"), ("moment", "moment")):
             best, printed = planes[f"best_for_{name}"], table.scalar("fig14", f"{name}_ratio")
@@ -225,6 +229,7 @@ def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> 
                 f"{printed:g} : 1 {100 * there:.1f} % of the best; best of straight pulls "
                 f"{surface['best_pulls'][name]['ratio']:.3g} : 1",
                 bool(abs(best["ratio"] - printed) <= ABOUT * printed),
+                role=role,
             )
         force, moment = (planes[f"best_for_{name}"]["ratio"] for name in ("force", "moment"))
         yield Claim(
@@ -242,6 +247,7 @@ def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> 
         f"{100 * anchor:.1f} cm within {100 * ABOUT:g} %",
         f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}",
         bool(abs(best["arm"] - anchor) <= ABOUT * anchor),
+        role="calibration",
     )
 
 
