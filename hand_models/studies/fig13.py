@@ -320,7 +320,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         axes.grid(alpha=0.3)
     printed, side_view = data["edge"], data["side"]
     corners = np.column_stack([printed["force_x"], printed["printed"]])
-    read = {"color": "tab:red", "label": "read off Fig. 13"}
+    read: dict[str, Any] = {"color": "tab:red", "label": "read off Fig. 13"}
     top.plot(*np.vstack([corners, -corners]).T, "x", **read)
     side.plot(side_view["force_x"] * np.array([1.0, -1.0]), [side_view["printed"]] * 2, "x", **read)
     for axes in (top, side):
