@@ -40,6 +40,9 @@ ABOUT: Final = 0.4
 RAYS: Final = 350
 """Of the boundary of the wrenches held; more are sent in the directions `TOWARD`."""
 
+SHORT: Final = 1.008
+"""By what factor the fine hull's wrenches are larger than those of the rays, about."""
+
 PER_AXIS: Final = 60
 """Poses of the wrist along each axis of the fine search, as of the studies."""
 
@@ -179,7 +182,7 @@ class GripperFit:
         ----------
         gripper : Gripper
         fine : bool, optional
-            Whether by the grid of the studies; else by rays, some per cent short and sooner.
+            Whether by the grid of the studies; else by rays, sooner and some per cent off.
         """
         if fine:
             found = search(gripper, PER_AXIS)
@@ -188,7 +191,7 @@ class GripperFit:
             size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
             toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
             found = boundary(gripper, linear_box(gripper), RAYS, toward)
-        return with_mirrored(in_paper_signs(found.wrenches))
+        return with_mirrored(in_paper_signs(found.wrenches) * (1.0 if fine else SHORT))
 
     def model(self, x: Array, *, fine: bool = False) -> Array:
         """Return what the model has for the data.

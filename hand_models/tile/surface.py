@@ -22,7 +22,7 @@ drag in proportion: both are
     T ≥ −μ N
 
 (Section 6.1 has Coulomb friction for pressed tiles; that the same μ ends the pull-off at the angle
-atan(1 / μ) is ``assumed``, and what the extents of Fig. 13 ask for). A base tile, which bears no
+atan(1 / μ) is ``assumed``, and the published data leave μ open). A base tile, which bears no
 normal of its own, is pressed as its finger's proximal phalanx is, by as much of it as it has spines
 on the rock (``assumed``). Half-planes inside and outside the surface are in
 `hand_models.tile.half_planes`.

@@ -33,12 +33,12 @@ def test_the_recorded_set_meets_all_data_that_come_first_on_the_fine_hull():
     assert FIT.misfit(found) <= 1.0, LABELS[worst]
 
 
-def test_rays_are_some_per_cent_short_of_the_fine_hull():
+def test_rays_are_a_few_per_cent_off_the_fine_hull():
     fine, coarse = (
         np.abs(FIT.wrenches(FIT.gripper(FIT.start()), fine=fine)).max(axis=0)
         for fine in (True, False)
     )
-    np.testing.assert_allclose(coarse, fine, rtol=0.05)
+    np.testing.assert_allclose(coarse, fine, rtol=0.03)
 
 
 def test_residuals_are_off_over_tolerances():
