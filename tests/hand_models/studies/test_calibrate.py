@@ -110,7 +110,7 @@ def test_the_unloaded_normals_follow_from_joint_balance_by_hand():
 
 def test_no_wrench_that_counts_as_held_presses_more_than_the_surface_shows():
     gripper = FIT.gripper(FIT.start())
-    held = FIT.wrenches(gripper)
+    held = FIT.wrenches(gripper, fine=True)
     assert held[:, 1].max() <= experiment_table().scalar("fig13", "top") + 1e-9
     free = Gripper(0.3, 37.0, table=gripper.table)
     assert free.most_pressing == np.inf
