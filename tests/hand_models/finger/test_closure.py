@@ -66,7 +66,7 @@ def test_a_crimp_holds_with_its_distal_contact_alone():
     alone = []
     for tilt in rng:
         try:
-            settled = placed(hold, 0.14341582, -0.05887669, float(tilt), grasp=Grasp(palm=False))
+            settled = placed(hold, 0.1434, -0.0634, float(tilt), grasp=Grasp(palm=False))
         except InvalidInputError:
             continue
         if [kind for kind, _ in kinds(settled)] == ["none", "none", "face"]:
@@ -87,7 +87,7 @@ def test_a_crimp_holds_with_its_distal_contact_alone():
 
 
 def test_a_rung_is_hooked_by_the_middle_and_distal_phalanges():
-    settled = placed(Cylinder(0.03), 0.13, 0.02)
+    settled = placed(Cylinder(0.05), 0.125, 0.03)
     assert [kind for kind, _ in kinds(settled)] == ["none", "face", "face"]
     assert kinds(settled)[0][1] == "balance"
     loads = settled.tile_loads(np.full(4, 37.0))
@@ -108,9 +108,10 @@ def test_a_tile_that_only_slips_keeps_its_contact():
 
 
 def test_an_open_hand_in_the_air_touches_nothing_and_stays():
-    settled = placed(Plane(), 0.0, 0.3)
+    # 1.75 rad on 0.05 N·m/rad and 1.945 mm: 45 N
+    settled = placed(Plane(), 0.0, 0.3, grasp=Grasp(closing_tension=46.0))
     assert not settled.touching.any()
     for i in range(4):
         assert kinds(settled, i) == [("none", "upper")] * 3
-    (closed,) = close_all(MODEL, [OpenFinger(None, ROCK, 37.0)])
-    assert (closed.torques @ [1.0, 37.0] > 0.0).all()
+    (closed,) = close_all(MODEL, [OpenFinger(None, ROCK, 46.0)])
+    assert (closed.torques @ [1.0, 46.0] > 0.0).all()

@@ -167,7 +167,7 @@ def test_a_tension_too_low_to_turn_the_nail_does_not_hook_it():
     """
     angle, c = math.atan2(0.0066, 0.005), math.hypot(0.0066, 0.005)
     spring, needed = STIFFNESS * angle, 0.0
-    for D, radius in ((0.1293, 0.0055), (0.0862, 0.00308), (0.0431, 0.00269)):
+    for D, radius in ((0.1293, 0.0055), (0.0862, 0.003195), (0.0431, 0.001945)):
         opening = (c + D * math.cos(angle) + FRICTION * D * math.sin(angle)) / c
         # (7.5 mm f − spring) opening = radius f
         needed = max(needed, spring * opening / (RADIUS * opening - radius))

@@ -82,11 +82,15 @@ def test_the_planners_line_is_inside_the_array_up_to_45_degrees_and_not_beyond(s
         )
     )
     published = (angles >= 0.0) & (angles < math.pi / 4 - 1e-9)
-    assert (law[published] <= mean[published] * 1.01).all()
+    # of the strength in drag, which four thousand tiles tell to their scatter
+    drag = mean[np.isclose(angles, 0.0)][0]
+    scatter = np.array(result.data["array"]["deviation"])[np.isclose(angles, 0.0)][0]
+    assert abs(drag - 19.45) <= 3.0 * scatter / math.sqrt(4000)
+    assert (law[published] / 19.45 <= mean[published] / drag * 1.01).all()
     assert (line <= law * (1.0 + 1e-9)).all()
     beyond = claim(result, "beyond 45°")
     assert not beyond.holds
-    assert mean[np.isclose(angles, math.pi / 3)][0] / 21.0 == pytest.approx(beyond.got, rel=0.03)
+    assert mean[np.isclose(angles, math.pi / 3)][0] / 19.45 == pytest.approx(beyond.got, rel=0.03)
 
 
 def test_claims_follow_from_the_data(study):
@@ -117,7 +121,7 @@ def test_the_gap_of_each_number_of_half_planes_is_told(study):
     assert outer == sorted(outer, reverse=True)
     surface = Surface.named("sandpaper-36")
     sideways = directional_strength(inner_half_planes(surface), np.array([[0.0, 0.0, 1.0]]))[0]
-    assert rows[0]["lateral_reach"] == pytest.approx(sideways / 21.0)
+    assert rows[0]["lateral_reach"] == pytest.approx(sideways / 19.45)
 
 
 def test_the_hull_of_a_ball_has_no_more_volume():

@@ -21,7 +21,7 @@ def winch_angle(settled, i, tension):
 
 
 def drawn_by_joints(settled, i):
-    return np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ settled.fingers[i].joint_angles
+    return np.array([5.5e-3, 3.195e-3, 1.945e-3]) @ settled.fingers[i].joint_angles
 
 
 def test_torque_and_current_at_a_hundred_newtons_are_those_worked_by_hand():
@@ -43,22 +43,31 @@ def test_the_weaker_of_motor_and_driver_limits_the_current():
 
 
 def test_the_winch_angle_of_a_finger_is_that_worked_by_hand():
-    """A pinch at 37 N: tiles drag 4.85, 6.95, 8.05 N, so two strands draw in 2 × 202.15/11500 m."""
+    """A pinch at 37 N: tiles drag 18.96 N, so two strands draw in 2 × 203.04/11500 m."""
     settled = pinch()
     i = FINGERS.index("inner_left")
-    expected = (drawn_by_joints(settled, i) + 2.0 * (3 * 74.0 - 19.85) / 11500.0) / 0.0067
+    expected = (
+        drawn_by_joints(settled, i) + 2.0 * (3 * 74.0 - 37.0 * (0.1317 + 0.1801 + 0.2006)) / 11500.0
+    ) / 0.0067
     assert winch_angle(settled, i, 37.0) == pytest.approx(expected, rel=1e-6)
 
 
 def test_tightening_turns_the_winch_as_far_as_the_rock_gives():
-    """Each newton drags an engaged tile by g/k_c, g = 2·10/21.5, and two strands follow.
+    """Each newton drags an engaged tile by g/k_c = 2/(k_c + K_p), and two strands follow.
 
     Of a tile with φ of its spines on the rock the spring takes what φ g leaves of two newtons.
     """
     settled = pinch()
-    give = 2.0 * 10.0 / 21.5 / 10000.0
+    gives = {
+        "base": 2.0 / 15750.0,
+        "proximal": 2.0 / 15750.0,
+        "middle": 2.0 / 18043.0,
+        "distal": 2.0 / 19715.0,
+    }
     for i, finger in enumerate(FINGERS):
-        share = settled.engagement[settled.finger_of == i]
+        own = np.flatnonzero(settled.finger_of == i)
+        share = settled.engagement[own]
+        give = np.array([gives[settled.tiles[t].phalanx] for t in own])
         rate = 2.0 * (share * give + (1.0 - share) * 2.0 / 11500.0).sum() / 0.0067
         turned = winch_angle(settled, i, 87.0) - winch_angle(settled, i, 37.0)
         assert turned == pytest.approx(50.0 * rate, rel=1e-9), finger

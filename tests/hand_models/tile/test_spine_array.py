@@ -253,8 +253,14 @@ def test_the_friction_of_the_file_meets_the_pull_off_ratio(surface):
 
 
 def test_the_lateral_law_of_the_surfaces_is_the_arrays():
-    """The fit gives the numbers of the file, and its error is that of the planner's surface."""
-    fit, defaults = fit_lateral(FINE, PULL_OFF_ANGLE), surface_table().sections["defaults"]
+    """The fit gives the numbers of the file, and its error is that of the planner's surface.
+
+    They are of tips that fall to √2 / 5 at 45° (T + 4 P = T_max); those that fall to the file's
+    pull-off hold as much sideways without pull, and a little more under it.
+    """
+    array = replace(FINE, asperity_friction=1.0960)
+    assert float(array.share(PULL_OFF_ANGLE)) == pytest.approx(math.sqrt(2.0) / 5.0, rel=1e-3)
+    fit, defaults = fit_lateral(array, PULL_OFF_ANGLE), surface_table().sections["defaults"]
     assert fit.lateral_ratio == pytest.approx(defaults["lateral_ratio"].value, abs=1e-4)
     assert fit.lateral_pull_off_ratio == pytest.approx(
         defaults["lateral_pull_off_ratio"].value, abs=1e-4
@@ -264,9 +270,12 @@ def test_the_lateral_law_of_the_surfaces_is_the_arrays():
     angles = np.linspace(0.0, PULL_OFF_ANGLE, 46)[:, None]
     azimuths = np.linspace(0.0, math.pi / 2, 46)
     of_surface = rock.strength(angles, azimuths) / rock.strength(angles)
-    error = of_surface - FINE.share(angles, azimuths) / FINE.share(angles)
+    error = of_surface - array.share(angles, azimuths) / array.share(angles)
     assert float(np.sqrt(np.mean(error**2))) == pytest.approx(fit.rms, abs=1e-4)
     assert float(np.abs(error).max()) == pytest.approx(fit.worst, abs=1e-3)
+    ours = fit_lateral(FINE, PULL_OFF_ANGLE)
+    assert ours.lateral_ratio == pytest.approx(fit.lateral_ratio, rel=1e-9)
+    assert 0.0 < ours.lateral_pull_off_ratio - fit.lateral_pull_off_ratio < 0.02
 
 
 @pytest.mark.parametrize(("shaft", "ratio"), [(0.0, 0.663), (0.5, 0.866), (1.0, 1.0)])
