@@ -74,7 +74,6 @@ def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
         "tile_on_sandpaper": tile.shear_limit,
         "tile_on_rock": rock.shear_limit,
         "tile_at_45": float(tile.strength(np.pi / 4)),
-        "contact_stiffness": numbers.scalar("tile", "contact_stiffness"),
         "middle_radius": radii[1],
         "distal_radius": radii[2],
         "seated_contact": numbers.scalar("finger", "seated_contact"),
@@ -82,6 +81,7 @@ def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
     return {
         **_on_gripper(draw, hand, tile),
         **{name: np.array([value]) for name, value in single.items()},
+        "contact_stiffness": np.array(numbers.vector("tile", "contact_stiffness")),
         "engagement": closing * np.array(numbers.vector("tile", "engagement")),
     }
 

@@ -219,7 +219,8 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
     """Return a point with less missing and broken, hardly moving: a second-order correction.
 
     The smallest step that balances, and puts hard rows that are broken on their limits; those that
-    just hold stay as they are.
+    just hold stay as they are. The same point where that step would go far from rest: rows that all
+    but contradict each other ask for kilometres, where the model has no answer.
     """
     data, loads = goal.constraints(state.sets.data), state.point.loads
     if not state.sets.finite:
@@ -240,7 +241,10 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
     moved = tuple(
         y + hand.unit * part for hand, y, part in zip(data.hands, loads, parts, strict=True)
     )
-    return _searching(hands, goal, replace(state.point, loads=moved), within, state.sets)
+    point = replace(state.point, loads=moved)
+    if not hands.near_rest(point):
+        return state
+    return _searching(hands, goal, point, within, state.sets)
 
 
 def _made_exact(

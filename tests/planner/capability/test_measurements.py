@@ -69,6 +69,9 @@ def test_what_is_measured_is_what_the_draw_says():
     np.testing.assert_allclose(
         found["engagement"], 37.0 * np.array(draw.hand.vector("tile", "engagement"))
     )
+    np.testing.assert_array_equal(
+        found["contact_stiffness"], draw.hand.vector("tile", "contact_stiffness")
+    )
     assert found["distal_radius"] == draw.hand.vector("finger", "pulley_radii")[2]
     # along the rock three tiles of a finger drag, and it holds more than straight off
     assert tile < found["pull_0"] < 6.0 * tile

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from hand_models.base import wrench_transport
 from planner.prepare import posture
 from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
-from planner.question import ForceCap, Limits, Question
+from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
 from tests.suite.helpers.efforts import promised, told_effort
@@ -20,10 +20,10 @@ from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, fl
 from tests.suite.helpers.stances import on_wall
 
 chance = np.random.default_rng(3)
-TWISTS = [NEAR * part for part in chance.uniform(0.2, 1.0, (8, 6))[6:]] * np.array(
+TWISTS = [2.4 * NEAR * part for part in chance.uniform(0.2, 1.0, (4, 6))[2:]] * np.array(
     [[1.0] * 6, [1.0, -1.0] * 3]
 )
-"""Of the wrists of `PAIR`: poses that they bear."""
+"""Of the wrists of `PAIR`: poses that they bear, and that others reach with less effort."""
 
 
 def least(question: Question) -> Plan:
@@ -38,7 +38,11 @@ def with_joints() -> Question:
     """
     stance = replace(floating(on_wall(), *REAR, preload=np.full(4, 50.0)), joints="solve")
     found = posture(Question(stance))
-    return Question(replace(stance, joints=found.angles), limits=Limits(joint_torque=60.0))
+    return Question(
+        replace(stance, joints=found.angles),
+        load=Load(mass=95.0),
+        limits=Limits(joint_torque=60.0),
+    )
 
 
 @cache

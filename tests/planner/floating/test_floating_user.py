@@ -65,7 +65,7 @@ def counted() -> Iterator[list[int]]:
 def all_float() -> tuple[Question, Plan]:
     """All four hands float."""
     limbs = tuple(hand.limb for hand in read_request("wall-300-floating").stance.hands)
-    asked = question(request(limbs, want=["load_factor"]))
+    asked = question(request(limbs, preload=60.0, want=["load_factor"]))
     with counted() as solved:
         answer = plan(asked)
     SOLVED.append(len(solved))

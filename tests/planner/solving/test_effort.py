@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from planner.prepare import assemble, hand_space, posture
 from planner.programs import HandData, StanceData, solvers, stance_data
-from planner.question import ForceCap, Limits, Question
+from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Price
 from planner.robots import RobotFile, robot_of
 from planner.solving import dual_bounds, plan
@@ -339,10 +339,12 @@ def between(price: float, ahead: float, behind: float) -> bool:
 
 @pytest.mark.parametrize("limb", ["front_left", "rear_right"])
 def test_the_price_of_a_capped_force_is_what_a_newton_more_takes_off_the_effort(limb):
-    def capped(most: float) -> Question:
-        return ask(on_wall(), limits=Limits(per_hand={limb: ForceCap(most)}))
+    light = ask(on_wall(), load=Load(mass=95.0, com=(0.0, 0.0, 0.0)))
 
-    free = plan(least(ask(on_wall())))
+    def capped(most: float) -> Question:
+        return replace(light, limits=Limits(per_hand={limb: ForceCap(most)}))
+
+    free = plan(least(light))
     used = next(np.linalg.norm(h.wrench[:3]) for h in free.hands if h.limb == limb)
     most, step = 0.9 * float(used), 0.2
     answer = plan(least(capped(most)))

@@ -12,11 +12,14 @@ from hand_models.tile import inner_half_planes
 from planner.deadline import DeadlineError
 from planner.prepare import settle_hand
 from planner.programs import SLACK
-from planner.question import Limits, Question
+from planner.question import Limits, Load, Question
 from planner.result import Plan
 from planner.solving import KnownStance, plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import SANDPAPER, ask, on_wall, random_answer
+
+LIGHTER = Load(mass=95.0, com=(0.0, 0.0, 0.0))
+"""That four pinches of rock hold with something to spare."""
 
 FEW = range(13)
 
@@ -199,9 +202,10 @@ def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
 
 
 def test_status_follows_the_utilisation_cap_and_the_plan_does_not():
-    free = plan(ask(on_wall()))
-    loose = plan(ask(on_wall(), limits=Limits(utilisation=0.95)))
-    tight = plan(ask(on_wall(), limits=Limits(utilisation=0.8)))
+    light = ask(on_wall(), load=LIGHTER)
+    free = plan(light)
+    loose = plan(replace(light, limits=Limits(utilisation=0.95)))
+    tight = plan(replace(light, limits=Limits(utilisation=0.8)))
     assert 0.8 < free.utilisation < 0.95
     assert (loose.status, tight.status) == ("optimal", "overloaded")
     assert loose.utilisation == tight.utilisation == free.utilisation
@@ -216,18 +220,18 @@ def test_a_utilisation_just_at_the_cap_is_optimal():
 
 
 def test_tension_cap_takes_the_place_of_the_hands_own_maximum():
-    question = ask(on_wall(), limits=Limits(tendon_tension=85.0))
-    answer = plan(question)
+    light = ask(on_wall(), load=LIGHTER)
+    answer = plan(replace(light, limits=Limits(tendon_tension=85.0)))
     tensions = [finger.tendon_tension for hand in answer.hands for finger in hand.fingers]
     assert answer.status == "optimal"
     assert max(tensions) <= 85.0
     assert answer.utilisation >= max(tensions) / 85.0 - 1e-9
-    assert answer.utilisation > plan(ask(on_wall())).utilisation + 0.01
-    below = plan(ask(on_wall(), limits=Limits(tendon_tension=40.0)))
+    assert answer.utilisation > plan(light).utilisation + 0.01
+    below = plan(replace(light, limits=Limits(tendon_tension=40.0)))
     assert below.status == "overloaded"
     assert below.limiting.limit == "tendon_tension"
-    above = plan(ask(on_wall(), limits=Limits(tendon_tension=1e4)))
-    assert above.utilisation == plan(ask(on_wall())).utilisation
+    above = plan(replace(light, limits=Limits(tendon_tension=1e4)))
+    assert above.utilisation == plan(light).utilisation
 
 
 def test_load_factor_times_the_wrench_is_just_held():
@@ -255,7 +259,7 @@ def test_load_factor_of_no_wrench_at_all_has_no_end():
 
 def test_load_factor_is_null_where_closing_alone_is_too_much():
     for wrench in (np.zeros(6), None):
-        stance = on_wall(closing_tension=300.0)
+        stance = on_wall(surface=SANDPAPER, closing_tension=300.0)
         answer = plan(ask(stance, "load_factor", body_wrench=wrench))
         assert answer.status == "overloaded"
         assert answer.load_factor is None
