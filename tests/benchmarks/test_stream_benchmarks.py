@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from planner.question import Load
 from planner.solving import KnownStance
 from planner.streaming import WrenchStream
 from planner.streaming.interpolation import Interpolation
@@ -20,7 +21,9 @@ from service.wire import SET_POINTS, STREAM
 from tests.suite.helpers.requests import stream_request
 from tests.suite.helpers.stances import ask, on_wall
 
-QUESTION = ask(on_wall())
+QUESTION = ask(on_wall(), load=Load(mass=80.0, com=(0.0, 0.0, 0.0)))
+"""Held with room, so that no cap on the utilisation makes the radius less."""
+
 CENTRE = QUESTION.needed_wrench()
 
 STEP = np.array([0.6, -0.3, 0.2, 0.02, 0.01, -0.03])

@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import linprog
 
 from hand_models.base import InvalidInputError, SolverError, UnsupportedError, wrench_transport
+from hand_models.tile import Surface
 from planner import solving
 from service import answering
 from service.answering import dispatch, hand_spaces
@@ -288,7 +289,7 @@ def test_numbers_that_do_not_exist_are_null(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_hand_that_can_carry_nothing_still_tells_its_seating_and_rows() -> None:
     request = wrench_space_request()
     for hand in request["stance"]["hands"]:
-        hand["surface"] = {"shear_limit": 2.0}
+        hand["surface"] = {"shear_limit": 0.5}
     answer = dispatch.handle(WRENCH_SPACE, json.dumps(request).encode())
     assert answer.good
     reply = msgspec.json.decode(answer.payload, type=WrenchSpaceReply)
@@ -346,7 +347,8 @@ def test_a_plan_tells_its_spread_over_draws():
 
 
 def test_a_plans_spread_over_draws_of_the_callers_own_travels():
-    draws = [own_draw(strength) for strength in (45.0, 63.0, 85.0)]
+    rock = Surface.named("rock").shear_limit
+    draws = [own_draw(strength) for strength in (0.7 * rock, rock, 1.35 * rock)]
     asked = flat_request() | {"want": ["load_factor", "spread"], "draws": draws}
     assert departures("PlanRequest", asked) == []
     for encoding, coder in (("application/json", msgspec.json), (MSGPACK, msgspec.msgpack)):

@@ -128,16 +128,21 @@ surfaces.rock.shear_limit = { value = 90, unit = "N", source = "measured" }
 """
 
 
-def test_a_plan_says_how_sure_it_is(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
-    path = stance_file(flat_request())
+@pytest.mark.parametrize(("pull", "digits"), [(5.0, 1), (10.0, 2)])
+def test_a_plan_says_how_sure_it_is(
+    pull: float, digits: int, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance_file(flat_request() | {"body_wrench": [0.0, 0.0, pull, 0.0, 0.0, 0.0]})
     run(["plan", path, "--spread", "--json"])
     reply = result(capfd)
     spread, ends = reply["spread"], reply["spread"]["load_factor"]
     run(["plan", path, "--spread"])
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    interval = f"({ends['low']:.1f} to {ends['high']:.1f})"
-    assert f"load factor {reply['load_factor']:.2f} {interval}" in out
+    # to the first decimal in which its ends differ; the number one decimal more
+    assert 0.1**digits < ends["high"] - ends["low"] < 0.1 ** (digits - 1)
+    interval = f"({ends['low']:.{digits}f} to {ends['high']:.{digits}f})"
+    assert f"load factor {reply['load_factor']:.{digits + 1}f} {interval}" in out
     most = spread["hangs_on"][0]
     assert f"holds in {spread['holds']} of {spread['draws']} draws; hangs most on " in out
     assert f"{most['quantity']} ({100 * most['share']:.0f} %)" in out
