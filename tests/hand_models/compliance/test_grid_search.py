@@ -34,6 +34,10 @@ from tests.suite.helpers.hands import HAND
 
 PINCH = Grasp(outer_rotation=math.pi)
 GRIPPER = Gripper(0.3, 37.0)
+CAPPED = Gripper(0.3, 37.0, most_pressing=0.9)
+"""Of the paper's surface: Coulomb friction alone holds what presses, in corners too thin for rays
+from the middle."""
+
 TWISTS = np.random.default_rng(7).normal(size=(200, 3)) * [3e-4, 3e-4, 4e-3]
 MIRROR = np.array([-1.0, 1.0, -1.0])
 
@@ -178,7 +182,7 @@ def test_the_search_finds_what_a_plain_grid_finds_and_more():
 
 
 def test_a_finer_search_and_rays_agree():
-    coarse, rays = search(GRIPPER, 40), boundary(GRIPPER, search_box(GRIPPER), 3000)
+    coarse, rays = search(CAPPED, 40), boundary(CAPPED, search_box(CAPPED), 3000)
     for way in np.random.default_rng(0).normal(size=(50, 3)):
         direction = planar(way / np.linalg.norm(way) * SCALE[list(PLANAR)])
         # in shares of the set's size: both miss the very corners
@@ -187,7 +191,7 @@ def test_a_finer_search_and_rays_agree():
 
 
 def test_the_set_is_skew_symmetric():
-    found = boundary(GRIPPER, search_box(GRIPPER), 4000)
+    found = boundary(CAPPED, search_box(CAPPED), 16000)
     for way in np.random.default_rng(1).normal(size=(50, 3)):
         direction = planar(way * SCALE[list(PLANAR)])
         mirrored = planar(way * MIRROR * SCALE[list(PLANAR)])
@@ -248,21 +252,24 @@ def test_a_pull_lets_go_where_bisection_says():
 # A list of linear sets --------------------------------------------------------------------------
 
 
-def spread(n, seed):
+def pulls(n, seed):
+    """Directions of the wrench that do not press."""
     ways = np.random.default_rng(seed).normal(size=(n, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways *= np.where(ways[:, 1:2] > 0.0, -1.0, 1.0)
     return np.array([planar(way * SCALE[list(PLANAR)]) for way in ways])
 
 
 @pytest.mark.parametrize("others", [12, pytest.param(40, marks=pytest.mark.slow)])
 def test_a_few_linear_sets_stand_for_the_whole_within_five_percent(others):
-    found = pieces(GRIPPER, spread(40, 0))
+    found = pieces(GRIPPER, pulls(50, 0))
     assert found.error <= 0.05
     assert 2 <= len(found.pieces) <= 12
     # also in directions that were not looked at, against the search
-    rays = boundary(GRIPPER, search_box(GRIPPER), 4000)
+    elsewhere = pulls(others, 1)
+    rays = boundary(GRIPPER, search_box(GRIPPER), 4000, toward=elsewhere)
     rest = GRIPPER.evaluate(np.zeros((1, 3))).wrenches[0]
-    for direction in spread(others, 1):
+    for direction in elsewhere:
         union = max(linear_extreme(piece.space, direction)[1] for piece in found.pieces)
         exact = max(rays.support(direction), farthest(GRIPPER, direction).reach)
         offset = float(direction @ rest)
@@ -274,7 +281,7 @@ def test_one_linear_set_at_rest_does_not(others):
     space = GRIPPER.linearised()
     rest = GRIPPER.evaluate(np.zeros((1, 3))).wrenches[0]
     off = []
-    for direction in spread(others, 2):
+    for direction in pulls(others, 2):
         offset = float(direction @ rest)
         exact = farthest(GRIPPER, direction).reach - offset
         off.append(abs((linear_extreme(space, direction)[1] - offset) / exact - 1.0))

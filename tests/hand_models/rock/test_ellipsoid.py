@@ -65,7 +65,7 @@ def test_a_plane_past_it_meets_nothing():
     assert hold.section((0.0, 0.11, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)) is None
 
 
-@pytest.mark.parametrize("rotation", [0.0, 1.0, math.pi])
+@pytest.mark.parametrize("rotation", [0.0, 0.5, math.pi])
 def test_with_equal_axes_it_is_a_sphere(rotation: float):
     ball = HAND.settle(Sphere(0.3), ROCK, Grasp(rotation))
     same = HAND.settle(Ellipsoid((0.15, 0.15, 0.15)), ROCK, Grasp(rotation))

@@ -36,7 +36,7 @@ def test_it_writes_its_data_and_a_picture(study):
 
 def test_the_extents_are_calibration_and_the_rest_is_not(study):
     claims = study[0].claims
-    assert [c.role for c in claims] == ["calibration"] * 3 + ["test"] * 2
+    assert [c.role for c in claims] == ["calibration"] * 5 + ["test"] * 2
     assert any("10 %" in words for words in study[0].data["not_tested"])
 
 
