@@ -99,7 +99,7 @@ def _close(
         elif min(gaps[BASES:]) < -hand.spine_travel:
             errors[i] = _in_palm(hand, min(gaps[BASES:]))
     closed = close_fingers(placed, laid, tensions, errors)
-    for i, error in _too_slack(placed, closed, tensions):
+    for i, error in _too_slack(placed, laid, closed, tensions):
         errors.setdefault(i, error)
     tiles = tiles_on_rock(placed, closed, tensions)
     nails: dict[int, Nails] = {}
@@ -149,29 +149,25 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
 
 def _too_slack(
     placed: PlacedHands,
+    laid: Sequence[Sequence[list[ClosedPhalanx]]],
     closed: ClosedFingers,
     tensions: Sequence[float],
 ) -> Iterator[tuple[int, InvalidInputError]]:
     """Yield hands whose tendons do not close their fingers, and why."""
     hand, placements = placed.hand, placed.placements
-    angles, stops, kinds = closed.postures.angles, closed.postures.stops, closed.postures.kinds
-    idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
-    for i in idle.nonzero()[0].tolist():
-        if not placements[i].grasp.fingernail:
-            yield (
-                i,
-                InvalidInputError(
-                    f"must be larger: at {tensions[i]:g} N no finger comes to the rock",
-                    field="grasp.closing_tension",
-                ),
-            )
-    # fingers that are laid on the rock without asking for the path to it
-    closes = (kinds != NONE).all(axis=2)
-    closes.reshape(-1)[list(closed.alone)] = False
+    stops, kinds = closed.postures.stops, closed.postures.kinds
+    # fingers that are laid on the rock, or would be, without asking for the path to it
+    angles, closes = closed.postures.angles.copy(), (kinds != NONE).all(axis=2)
+    for k in closed.alone:
+        i, finger = divmod(k, len(FINGERS))
+        phalanges = laid[i][finger]
+        closes[i, finger] = len(phalanges) == len(PHALANGES) and not placements[i].grasp.fingernail
+        if closes[i, finger]:
+            angles[i, finger] = [each.angle for each in phalanges]
     turns = np.diff(angles, axis=2, prepend=0.0)
     needed = np.where(closes[..., None], resting_tensions(hand.finger, turns, hand.losses), 0.0)
-    short = needed.reshape(len(needed), -1).max(axis=1) > tensions
-    for i in short.nonzero()[0].tolist():
+    short = (needed.reshape(len(needed), -1).max(axis=1) > tensions).nonzero()[0].tolist()
+    for i in short:
         finger, joint = divmod(int(needed[i].argmax()), len(PHALANGES))
         # no less than is needed, in hundredths
         least = math.ceil(100.0 * needed[i, finger, joint]) / 100.0
@@ -184,6 +180,49 @@ def _too_slack(
                 field="grasp.closing_tension",
             ),
         )
+    idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
+    slack = [
+        i
+        for i in idle.nonzero()[0].tolist()
+        if i not in short and not placements[i].grasp.fingernail
+    ]
+    for i in _closed_by_more(placed, laid, slack, tensions):
+        yield (
+            i,
+            InvalidInputError(
+                f"must be larger: at {tensions[i]:g} N no finger comes to the rock",
+                field="grasp.closing_tension",
+            ),
+        )
+
+
+def _closed_by_more(
+    placed: PlacedHands,
+    laid: Sequence[Sequence[list[ClosedPhalanx]]],
+    slack: Sequence[int],
+    tensions: Sequence[float],
+) -> list[int]:
+    """Return which of some hands in the air have a finger that more tension brings to the rock.
+
+    Told by their paths to the tension that closes all joints up to their limits in the air, on
+    which fingers may come to the rock and pass it: those that have passed it come to no other.
+    """
+    hand = placed.hand
+    limits = resting_tensions(hand.finger, np.array(hand.finger.joint_upper), hand.losses)
+    most = min(float(limits.max()), hand.maximum_tension)
+    slack = [i for i in slack if tensions[i] < most]
+    if not slack:
+        return []
+    which = [placed.placements[i] for i in slack]
+    again = PlacedHands(hand, which, [placed.seatings[i] for i in slack])
+    refused: dict[int, InvalidInputError] = {}
+    closed = close_fingers(again, [laid[i] for i in slack], [most] * len(slack), refused)
+    near = (closed.postures.kinds != NONE).any(axis=(1, 2))
+    near[[*refused]] = True
+    for finger, each in closed.alone.items():
+        k = finger // len(FINGERS)
+        near[k] |= np.greater(each.touches, tensions[slack[k]]).any()
+    return [i for i, comes in zip(slack, near.tolist(), strict=True) if comes]
 
 
 def _seated(

@@ -11,6 +11,7 @@ from hand_models import (
     Cylinder,
     Edge,
     Ellipsoid,
+    EmptySetError,
     Grasp,
     InvalidInputError,
     Plane,
@@ -175,7 +176,7 @@ def contacts(settled):
 @some_and_all("seeds", range(40), 3)
 def test_in_another_unit_of_length_hands_hold_the_same_forces(seeds):
     """But for one in forty that may be about to slip off, by rounding."""
-    slipped = 0
+    slipped = held = 0
     for seed in seeds:
         one, two, rng = in_both_units(seed)
         if isinstance(one, InvalidInputError):
@@ -190,6 +191,13 @@ def test_in_another_unit_of_length_hands_hold_the_same_forces(seeds):
         np.testing.assert_allclose(one.engagement, two.engagement, atol=1e-6)
         direction = rng.normal(size=6) * [1.0, 1.0, 1.0, 10.0, 10.0, 10.0]
         other = direction / np.repeat([1.0, LONGER], 3)
-        reach = wrench_space(one).support(direction), wrench_space(two).support(other)
-        assert reach[0] == pytest.approx(reach[1], rel=1e-6, abs=1e-6)
+        try:
+            reach = wrench_space(one).support(direction)
+        except EmptySetError:
+            with pytest.raises(EmptySetError):
+                wrench_space(two).support(other)
+            continue
+        assert wrench_space(two).support(other) == pytest.approx(reach, rel=1e-6, abs=1e-6)
+        held += 1
     assert slipped <= 1
+    assert held >= len(seeds) / 2

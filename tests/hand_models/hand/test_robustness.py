@@ -30,6 +30,9 @@ from tests.suite.helpers.hands import HAND
 from tests.suite.helpers.shares import some_and_all
 
 ROCK = Surface.named("rock")
+CURLED = 50.0
+"""Tension at which all joints stand at their limits in the air, the last at 45 N = K q / r [N]."""
+
 SIZES = [1e-3, 1e-2, 1.0, 30.0, 1e3]
 
 
@@ -131,16 +134,32 @@ def test_holds_tilted_as_far_as_they_go(hold, poses):
         stress(hold, ROCK, Grasp(1.0), Pose(np.array(place), turned))
 
 
-@pytest.mark.parametrize("distance", [0.05, 1.0, 1e4])
-def test_a_hand_far_from_its_hold_carries_nothing(distance):
+@pytest.mark.parametrize(
+    ("distance", "closing"), [(0.05, CURLED), (1.0, 1e-3), (1.0, 37.0), (1.0, CURLED), (1e4, 37.0)]
+)
+def test_a_hand_far_from_its_hold_carries_nothing(distance, closing):
     pose = Pose(np.array([0.0, 0.0, distance]), np.eye(3))
     for hold in (Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)):
-        settled = HAND.settle(hold, ROCK, Grasp(), pose)
+        settled = HAND.settle(hold, ROCK, Grasp(closing_tension=closing), pose)
         assert settled.palm.engaged == ()
         if distance >= 1.0:
             assert not settled.touching.any()
             space = wrench_space(settled)
             np.testing.assert_array_equal(space.vertices(), np.zeros((1, 6)))
+
+
+def test_fingers_that_more_tension_brings_to_the_rock_are_told_so_and_no_others():
+    """Their joints' springs hold them open; 0.2 m off the rock they curl past nothing."""
+    for distance, tension, comes in ((0.03, 1.0, True), (0.03, 5.0, None), (0.2, 1.0, False)):
+        pose = Pose(np.array([0.0, 0.0, distance]), np.eye(3))
+        grasp = Grasp(closing_tension=tension)
+        if comes:
+            with pytest.raises(InvalidInputError, match="larger: at 1 N no finger") as caught:
+                HAND.settle(Plane(), ROCK, grasp, pose)
+            assert caught.value.field == "grasp.closing_tension"
+        else:
+            settled = HAND.settle(Plane(), ROCK, grasp, pose)
+            assert settled.touching.any() == (comes is None)
 
 
 @pytest.mark.parametrize("hold", [Plane(), Cylinder(0.3), Sphere(0.3), Edge(0.05, 1.0)])
@@ -157,7 +176,7 @@ def test_a_joint_in_the_middle_of_a_ball_is_no_division_by_zero():
 
 
 @pytest.mark.parametrize("strength", [1e-3, 1.0, 1e5])
-@pytest.mark.parametrize("closing", [6.5, 37.0, 700.0])
+@pytest.mark.parametrize("closing", [9.0, 37.0, 700.0])
 def test_strengths_and_closing_tensions_of_any_size(strength, closing):
     for half_planes, lateral in ((1, True), (3, False)):
         surface = Surface.from_values({"shear_limit": strength, "half_planes": half_planes})

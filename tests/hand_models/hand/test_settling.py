@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import math
 import pickle
 import subprocess
@@ -497,6 +498,8 @@ def test_hands_of_the_same_numbers_are_equal_in_every_process():
 
 
 def test_one_function_tells_of_all_stores():
+    # or hands of other tests might go on the way, and their stores with them
+    gc.collect()
     before = stores()["settled hands"]
     hand = SpinyHand(HAND.table)
     for diameter in (0.3, 0.31, 0.3):

@@ -146,14 +146,16 @@ def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
     np.testing.assert_allclose(palm.centre[:2], [x, 0.0], atol=1e-12)
     assert palm.centre[2] == pytest.approx(share @ palm.gaps[4:] / share.sum())
     assert palm.pressing_limit == pytest.approx(250.0 * share.sum())
-    assert palm.shear_limit == pytest.approx(63.0 * share.sum())  # alike tiles share alike
+    assert palm.shear_limit == pytest.approx(
+        ROCK.shear_limit * share.sum()
+    )  # alike tiles share alike
 
 
 @pytest.mark.parametrize("steps", [100, pytest.param(501, marks=pytest.mark.slow)])
 def test_what_a_palm_carries_fades_with_its_distance_from_the_rock(steps):
     palms = [settled.palm for settled in off_a_wall(np.linspace(0.0, 5.01e-3, steps + 1))]
     found = np.array([(palm.shear_limit, palm.pressing_limit) for palm in palms])
-    np.testing.assert_allclose(found[0], [8 * 63.0, 8 * 250.0], rtol=0.03)
+    np.testing.assert_allclose(found[0], [8 * ROCK.shear_limit, 8 * 250.0], rtol=0.03)
     np.testing.assert_array_equal(found[-1], 0.0)
     # by a hundredth of a millimetre at a time, no more than a five-hundredth of it all
     assert (np.abs(np.diff(found, axis=0)) <= 1.05 / steps * found[0]).all()
@@ -262,9 +264,10 @@ def test_a_base_tile_fades_with_its_distance_from_the_rock():
         )
     share, at_zero, gain, lateral, others = np.array(found).T
     np.testing.assert_allclose(share, np.clip(1.0 - np.abs(offs) / 5e-3, 0.0, 1.0), atol=1e-9)
-    # of a whole tile 0.131 of 37 N, and 0.93 per newton
-    np.testing.assert_allclose(gain, share * 20.0 / 21.5, rtol=1e-12)
-    np.testing.assert_allclose(at_zero, share * (4.85 - 37.0 * 20.0 / 21.5), rtol=1e-9)
+    # of a whole tile 0.1317 of 37 N, and c_p k_c / (k_c + K_p) per newton
+    each = 2.0 * 4.25 / (4.25 + 11.5)
+    np.testing.assert_allclose(gain, share * each, rtol=1e-12)
+    np.testing.assert_allclose(at_zero, share * 37.0 * (0.1317 - each), rtol=1e-9)
     np.testing.assert_allclose(lateral, share / (share + others), rtol=1e-12)
 
 

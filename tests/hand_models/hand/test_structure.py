@@ -12,7 +12,7 @@ from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import HELD
 from planner.result import LimitName
 from planner.solving import plan
-from tests.suite.helpers.hands import changed_hand, settled_at
+from tests.suite.helpers.hands import HAND, changed_hand, settled_at
 from tests.suite.helpers.robots import with_hand
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 
@@ -120,9 +120,13 @@ OVERLOADS = {
 @pytest.mark.parametrize("limit", OVERLOADS)
 def test_a_plan_that_a_limit_overloads_names_it_and_prices_it(limit):
     section, name, value, *words, unit = OVERLOADS[limit]
-    # with the outer fingers not turned their tips press before spines are pulled off
-    stance = on_wall(outer_rotation=0.0) if limit == "fingertip_force" else on_wall()
-    weak = with_hand(stance.robot, changed_hand(section, name, value))
+    stance, hand = on_wall(), HAND
+    if limit == "fingertip_force":
+        # outer fingers that are not turned press with their tips before spines are pulled off, as
+        # far as the distal pulleys are large
+        stance = on_wall(outer_rotation=0.0)
+        hand = changed_hand("finger", "pulley_radii", [0.0055, 0.00308, 0.00269])
+    weak = with_hand(stance.robot, changed_hand(section, name, value, hand))
     answer = plan(ask(replace(stance, robot=weak), "prices"))
     assert answer.status == "overloaded"
     assert answer.verified

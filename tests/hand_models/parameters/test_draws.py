@@ -126,8 +126,8 @@ def test_where_engagement_is_known_so_is_that_of_base_tiles():
         (changed("tile", "engagement[0]", value=[0.1] * 31), "tile.engagement[0]"),
         (changed("tile", "engagement[3]", value=[0.1] * 30), "tile.engagement[3]"),
         (changed("tile", "engagement", value=[0.1] * 30), "tile.engagement"),
-        (changed("tile", "contact_stiffness[0]", value=[1e4] * 30), "tile.contact_stiffness[0]"),
-        (changed("tile", "contact_stiffness", unit="N/mm"), "tile.contact_stiffness"),
+        (changed("tile", "spine_travel[0]", value=[5e-3] * 30), "tile.spine_travel[0]"),
+        (changed("tile", "contact_stiffness[1]", unit="N/mm"), "tile.contact_stiffness[1]"),
         (changed("tile", "softness", value=[1e4] * 30), "tile.softness"),
         (changed("concrete-fine", "shear_limit", value=[30.0] * 30), "concrete-fine.shear_limit"),
         (changed("finger", "pulley_radii[1]", value=[3.0] * 30), "[0].hand.finger.pulley_radii"),
@@ -182,6 +182,6 @@ def test_a_callers_draw_is_refused_by_its_entry(raw, field, message):
 def test_a_presets_ratio_may_be_the_callers_own():
     draw = own_draw({"surfaces": {"rock": {"lateral_ratio": own(0.5, "1")}}})
     surfaces = own_surfaces(draw.surfaces)
-    assert Surface.named("rock", surfaces).lateral_limit == pytest.approx(31.5)
+    assert Surface.named("rock", surfaces).lateral_limit == pytest.approx(0.5 * 68.1)
     fine = Surface.named("concrete-fine", surfaces)
     assert fine == Surface.named("concrete-fine")

@@ -54,7 +54,8 @@ def untimed(reply: PlanReply) -> dict:
     return {k: v for k, v in msgspec.to_builtins(reply).items() if k not in ("time", "solver")}
 
 
-THICK = own("finger", "pulley_radii", [0.011, 0.00616, 0.00538])
+RADII = hand_table().vector("finger", "pulley_radii")
+THICK = own("finger", "pulley_radii", [2.0 * radius for radius in RADII])
 """Joint pulleys of twice the radius."""
 WEAK = own("tendon", "maximum_tension", 60.0)
 

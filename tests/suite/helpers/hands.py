@@ -44,11 +44,13 @@ def seating_on(hold: Hold, grasp: Grasp, at: Pose | None = None) -> Seating:
     return found
 
 
-def changed_hand(section: str, name: str, value: float | list[float]) -> SpinyHand:
-    """The SpinyHand with one number of its own."""
+def changed_hand(
+    section: str, name: str, value: float | list[float], hand: SpinyHand = HAND
+) -> SpinyHand:
+    """A hand, the SpinyHand by default, with one entry of its own."""
     unit = hand_table().quantity(section, name).unit
     own = {section: {name: Quantity(value, unit, "assumed", "of a test")}}
-    return SpinyHand(hand_table().replaced(ParameterTable(own)))
+    return SpinyHand(hand.table.replaced(ParameterTable(own)))
 
 
 def entry_toml(section: str, name: str, value: Any, unit: str | None = None) -> str:
