@@ -1,6 +1,7 @@
 """Fingers that close on rock of every kind end whole, clear of it and in balance (Section 5.1)."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,19 @@ def test_on_rough_rock_fingers_close():
 @pytest.mark.slow
 def test_on_rough_rock_fingers_close_slow():
     on_rough_rock(10_000, 2000)
+
+
+def test_spines_are_pulled_off_where_their_drag_is_too_little_for_the_pull():
+    on_hold = rough_opening(MODEL, ROCK, 206, GRASPS[206 % len(GRASPS)])
+    bare = on_hold.opened._replace(surface=replace(ROCK, friction=0.0))
+    held, pulled = close_all(MODEL, [bare, on_hold.opened])
+    powers = np.array([1.0, bare.tension])
+    # strong enough for the pull, but a newton of it needs more drag than there is
+    drag, pull = held.shears[0] @ powers, -(held.normals[0] @ powers)
+    assert 0.0 < drag < 0.95 * ROCK.friction * pull
+    assert (pulled.normals @ powers >= 0.0).all()
+    assert pulled.shears[0] @ powers == 0.0
+    assert faults(on_hold, pulled) == []
 
 
 def knob(height, slope):

@@ -256,6 +256,8 @@ def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
             most = share * float(pull_strength(most, least, surface.pull_off_angle, angle))
             if math.hypot(shear[i], normal[i]) > most * (1.0 + 1e-6) + FEW:
                 wrong.append(f"phalanx {i} is held with {normal[i]:.3g} N of {most:.3g} N")
+            if shear[i] < -surface.friction * normal[i] - FEW:
+                wrong.append(f"phalanx {i} is held with {normal[i]:.3g} N by {shear[i]:.3g} N")
     # none is left open under tension
     if not finger.bearing and any(contact.stop == "lower" for contact in finger.contacts):
         wrong.append("open, in the air")

@@ -326,12 +326,15 @@ class PlainFinger:
         """Return the phalanx whose spines are pulled off, the worst first; None if all hold."""
         s, worst, which = self.surface, 1e-9, None
         shears = self.shears(here, tension, late)
+        # what the pull needs of drag may come last of all
+        drags = self.shears(here, tension, 1.0)
         for j, mode in enumerate(modes):
             pull = -normals[j]
             if mode != HELD or pull < 1e-8 or not within[j]:
                 continue
             limits = s.shear_limit, s.pull_off_limit, s.pull_off_angle
             strength = here.share[j] * float(pull_strength(*limits, math.atan2(pull, shears[j])))
-            if math.hypot(pull, shears[j]) - strength > worst:
-                worst, which = math.hypot(pull, shears[j]) - strength, j
+            beyond = max(math.hypot(pull, shears[j]) - strength, s.friction * pull - drags[j])
+            if beyond > worst:
+                worst, which = beyond, j
         return which
