@@ -43,7 +43,7 @@ CURLED = replace(PINCH, closing_tension=46.0)
 
 HOLDS: dict[str, tuple[Hold, Grasp, Pose | None]] = {
     "no fingers sideways": (Plane(), OPEN, None),
-    "a pebble": (Sphere(0.01), PINCH, None),
+    "a pebble": (Sphere(0.01), CURLED, None),
     "a ball in the fingers": (Sphere(0.1), PINCH, None),
     "a sharp edge": (Edge(fillet_radius=1e-6, angle=1.57), Grasp(), None),
     "far off": (Cylinder(0.3), CURLED, Pose(np.array([0.0, 0.0, 0.5]), np.eye(3))),
