@@ -190,7 +190,7 @@ def test_a_cap_on_a_force_is_named():
 
 def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way():
     stance = on_wall()
-    limb, load = stance.hands[0].limb, replace(CALIBRATION_LOAD, mass=110.0)
+    limb, load = stance.hands[0].limb, replace(CALIBRATION_LOAD, mass=105.0)
     assert plan(ask(stance, load=load)).status == "optimal"
     answer = plan(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})))
     own = LimitName(limb, None, None, "force_cap")

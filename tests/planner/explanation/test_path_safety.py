@@ -11,7 +11,7 @@ from rich.console import Console
 from planner.explanation import limit_name, unsafe_sentence
 from planner.explanation.path_safety import GIVE
 from planner.prepare import assemble, posture
-from planner.question import Limits, Question
+from planner.question import Limits, Load, Question
 from planner.result import LimitName, Plan, TensionPath
 from planner.solving import plan
 from service.answering.answers import plan_reply
@@ -259,7 +259,8 @@ def test_hands_with_floating_wrists_stay_as_planned():
     stance = on_wall(off=0.2)
     hands = list(stance.hands)
     hands[0] = replace(hands[0], wrist="floating")
-    question = ask(replace(stance, hands=tuple(hands)))
+    light = Load(mass=80.0, com=(0.0, 0.0, 0.0))
+    question = ask(replace(stance, hands=tuple(hands)), load=light)
     planned = plan(question)
     assert planned.status == "optimal"
     rng = np.random.default_rng(2)

@@ -73,7 +73,8 @@ def gently(tension: float, hold, closing_tension: float) -> tuple[Question, tupl
 @pytest.mark.parametrize(
     ("tension", "hold", "closing_tension", "words"),
     [
-        (28.0, Cylinder(0.3), 37.0, "dragged backwards"),
+        (24.0, Cylinder(0.3), 37.0, "dragged backwards"),
+        (28.0, Cylinder(0.3), 37.0, "is pulled off with"),
         (33.0, Cylinder(0.08), 37.0, "leave its stop"),
     ],
 )

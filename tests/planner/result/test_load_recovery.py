@@ -89,7 +89,7 @@ def test_every_number_is_that_of_its_definition(stance):
             assert finger.motor_current == pytest.approx(torque / 0.0234 + 0.0263, rel=1e-12)
             spines = float(hand.engagement[hand.finger_of == i].sum())
             drawn = hand.hand.nail.pulley_radius * hand.nail_angles[i]
-            drawn += np.array([5.5e-3, 3.08e-3, 2.69e-3]) @ hand.fingers[i].joint_angles
+            drawn += np.array([5.5e-3, 3.195e-3, 1.945e-3]) @ hand.fingers[i].joint_angles
             for tile in finger.tiles:
                 t = next(tiles)
                 shear, normal = hand.loads[t] @ [1.0, tension]
