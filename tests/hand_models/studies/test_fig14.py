@@ -33,8 +33,11 @@ def test_it_writes_its_data_and_two_pictures(study):
     assert steps[-1] == (1000, 1000)
 
 
-def test_nothing_in_it_was_fitted(study):
-    assert {c.role for c in study[0].claims} == {"test"}
+def test_planes_of_the_fitted_surface_are_calibration_and_all_else_is_a_test(study):
+    fitted = [c.claim for c in study[0].claims if c.role == "calibration"]
+    assert len(fitted) == 3
+    assert all("on 300 mm" in claim for claim in fitted)
+    assert sum("best F_x : M_y" in claim for claim in fitted) == 2
     cases = [(s["diameter"], s["tension"]) for s in study[0].data["surfaces"]]
     assert cases == [(0.3, 37.0), (0.7, 37.0), (0.7, 30.0), (0.7, 40.0)]
 

@@ -65,7 +65,7 @@ def counted() -> Iterator[list[int]]:
 def all_float() -> tuple[Question, Plan]:
     """All four hands float."""
     limbs = tuple(hand.limb for hand in read_request("wall-300-floating").stance.hands)
-    asked = question(request(limbs, preload=60.0, want=["load_factor"]))
+    asked = question(request(limbs, preload=70.0, want=["load_factor"]))
     with counted() as solved:
         answer = plan(asked)
     SOLVED.append(len(solved))
@@ -75,10 +75,10 @@ def all_float() -> tuple[Question, Plan]:
 @pytest.mark.slow
 def test_load_factor_is_no_less_than_a_smaller_load_proves():
     asked, whole = all_float()
-    wrench = 0.75 * whole.body_wrench
+    wrench = 0.6 * whole.body_wrench
     part = plan(replace(asked, body_wrench=wrench, load=None))
     assert part.load_factor > 1.0
-    assert whole.load_factor >= 0.75 * part.load_factor * (1.0 - 3e-3)
+    assert whole.load_factor >= 0.6 * part.load_factor * (1.0 - 3e-3)
 
 
 @pytest.mark.parametrize("preload", [None, pytest.param(80.0, marks=pytest.mark.slow), 37.0])

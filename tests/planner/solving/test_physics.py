@@ -89,8 +89,8 @@ def test_load_factor_on_60_newton_tiles(lateral):
 
     On the 0.3 m of these holds four of a palm's tiles are 2.6 and 3.5 mm off the rock, with half
     and a third of their spines on it; without that, the robot held 1.15 times its load and more.
-    The surface that would make up for it has not been calibrated anew. The tile law was T + 4 P =
-    T_max and T ≥ 0 then, a case of today's.
+    The surface that would make up for it has not been calibrated anew. The law of a tile was then
+    T + 4 P ≤ T_max and T ≥ 0, a case of today's.
     """
     near, far = (
         plan(ask(earlier(on_wall(Cylinder(diameter), lateral=lateral)), "load_factor"))
