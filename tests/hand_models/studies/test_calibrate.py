@@ -138,12 +138,12 @@ def test_at_least_thirty_sets_from_several_valleys_are_bundled():
 
 def test_a_search_goes_down_and_keeps_what_meets_the_data():
     told = []
-    met = global_search(FIT, FIT.start(), 0.02, 48, 1, lambda: told.append(1))
-    assert len(told) >= 48
+    met = global_search(FIT, FIT.start(), 0.02, 16, 1, lambda: told.append(1))
+    assert len(told) >= 16
     assert FIT.misfit(FIT.residuals(met.best)) <= FIT.misfit(FIT.residuals(FIT.start())) + 0.05
     assert all(FIT.misfit(FIT.residuals(x)) <= 1.0 for x in met.sets[:3])
     # the same seed is the same search
-    again = global_search(FIT, FIT.start(), 0.02, 48, 1, lambda: None)
+    again = global_search(FIT, FIT.start(), 0.02, 16, 1, lambda: None)
     np.testing.assert_array_equal(again.best, met.best)
     i = FIT.names.index("friction")
     held = global_search(FIT, FIT.start(), 0.02, 16, 1, lambda: None, held={i: 0.3})
