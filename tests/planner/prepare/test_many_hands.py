@@ -65,7 +65,7 @@ def test_some_hands_float(crawler, count, floating, joints):
     asked = crawler_question(crawler, count, floating, joints=joints)
     margin = plan(asked)
     assert [hand.wrist is not None for hand in margin.hands] == [i < floating for i in range(count)]
-    check(asked, margin, plan(replace(asked, objective="min_effort")), 1e-5)
+    check(asked, margin, plan(replace(asked, objective="min_effort")), 2e-5)
 
 
 @pytest.mark.slow
@@ -76,4 +76,4 @@ def test_every_number_of_hands(crawler, count, joints):
     for floating in (0, min(count, 4)) if joints == (count % 2 == 1) else (0,):
         asked = crawler_question(crawler, count, floating, joints=joints, seed=floating)
         margin = plan(asked)
-        check(asked, margin, plan(replace(asked, objective="min_effort")), 1e-5)
+        check(asked, margin, plan(replace(asked, objective="min_effort")), 2e-5)
