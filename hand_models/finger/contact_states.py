@@ -178,7 +178,7 @@ def _tried(
     part = np.minimum(1.0, state.stride / np.maximum(size, RESTS))[:, None]
     # contacts that would pull more than they hold, or push across a gap
     caught = (spines == CAUGHT) & (around.share > 0.0)
-    over = _over(drive, state, around, active, caught, forces.shears, normals[..., 0])
+    over = _over(drive, around, active, caught, forces.shears, normals[..., 0])
     over = np.where(caught & (part < 1.0), 0.0, over)
     pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
     # gaps that would close, or grow beyond what spines let them
@@ -294,7 +294,6 @@ def _solve(
 
 def _over(
     drive: Drive,
-    state: State,
     around: Around,
     active: Flags,
     caught: Flags,
@@ -307,8 +306,8 @@ def _over(
     most, least, angle, friction = (drive.limits[:, i, None] for i in range(4))
     shear, pulls = shears / share, pull / share
     strength = pull_strength(most, least, angle, np.arctan2(pulls, shear))
-    # the drag that the pull needs is there, or comes last of all where spines reach across a gap
-    drag = drive.drag * np.minimum(state.s, drive.closing)[:, None]
+    # the drag that a pull needs at last: without a tension nothing would stay that springs pull
+    drag = drive.drag * drive.closing[:, None]
     beyond = np.maximum(np.hypot(shear, pulls) - strength, friction * pulls - drag)
     over = np.where(caught, share * beyond, pull)
     return np.where(active & (pull > ROUNDING), over - ROUNDING, 0.0)

@@ -326,8 +326,8 @@ class PlainFinger:
         """Return the phalanx whose spines are pulled off, the worst first; None if all hold."""
         s, worst, which = self.surface, 1e-9, None
         shears = self.shears(here, tension, late)
-        # what the pull needs of drag may come last of all
-        drags = self.shears(here, tension, 1.0)
+        # what the pull needs of drag may come later, and last of all
+        drags = self.shears(here, self.closing, 1.0)
         for j, mode in enumerate(modes):
             pull = -normals[j]
             if mode != HELD or pull < 1e-8 or not within[j]:
