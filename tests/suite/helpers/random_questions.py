@@ -26,12 +26,12 @@ KINDS = {"plain": random_question, "with joints": random_question_with_joints, "
 
 SEEDS = {
     "infeasible": {
-        "plain": (3, 5, 12, 58, 77),
-        "with joints": (24, 33),
-        "request": (3, 5, 17, 54, 82, 90, 93),
+        "plain": (3, 5, 12, 58, 98),
+        "with joints": (24, 36),
+        "request": (3, 5, 54, 60, 82, 90, 93),
     },
     "overloaded": {
-        "plain": (14, 15, 46),
+        "plain": (7, 32, 46),
         "with joints": (0, 3, 7, 37),
         "request": (6, 9, 28, 55, 75, 97),
     },
@@ -39,8 +39,8 @@ SEEDS = {
 """Random questions that were answered so: with joints, caps, given wrenches, single hands."""
 
 FEW = {
-    "infeasible": {"plain": (5, 58), "with joints": (24, 33), "request": (3, 82, 90, 93)},
-    "overloaded": {"plain": (14, 46), "with joints": (0, 7, 37), "request": (6, 55)},
+    "infeasible": {"plain": (5, 58), "with joints": (24, 36), "request": (3, 82, 90, 93)},
+    "overloaded": {"plain": (7, 46), "with joints": (0, 7, 37), "request": (6, 55)},
 }
 """Of them some that stand for all, where all would take long."""
 
