@@ -399,10 +399,12 @@ def test_whenever_the_time_is_over_what_leaves_is_verified_and_says_what_is_miss
 @pytest.mark.slow
 def test_a_search_for_floating_wrists_gives_the_best_plan_it_has_come_to(monkeypatch):
     question = questions.question(read_request("wall-300-floating"))
-    question = replace(question, objective="min_effort", want=frozenset(["load_factor"]))
+    # light enough to be held
+    load, wanted = replace(question.load, mass=100.0), frozenset(["load_factor"])
+    question = replace(question, load=load, objective="min_effort", want=wanted)
     whole, last = held(question, 10**6, monkeypatch)
     seen, used, efforts = set(), [], []
-    for ticks in range(1, last + 2, max(1, last // 14)):
+    for ticks in range(1, last + 2, max(1, last // 20)):
         answer, _ = held(question, ticks, monkeypatch)
         if answer is None:
             # a search may come by a point that a longer one passes by; not once it has settled
