@@ -17,11 +17,11 @@ closely: what each of these costs.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -395,4 +395,6 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(as_draws(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))["data"]))
+    given = argparse.ArgumentParser()
+    given.add_argument("calibrated", type=argparse.FileType(), help="the study's result.json")
+    sys.stdout.write(as_draws(json.load(given.parse_args().calibrated)["data"]))

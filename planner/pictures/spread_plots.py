@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from planner.result import Spread
+from planner.result import MANY, Spread
 
 __all__ = ["draw_spread"]
 
@@ -36,12 +36,14 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
         return
     low, high = spread.load_factor.low, spread.load_factor.high
     ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
-    axes.axvspan(low, high, color=BAND, label="5 to 95 %")
+    axes.axvspan(low, high, color=BAND, label="5 to 95 %" if len(factors) >= MANY else "all")
     axes.hist(factors, np.linspace(ends.min(), ends.max(), BINS + 1), color=BAR)
     axes.axvline(1.0, color=NEEDED, linestyle="--", label="needed")
     if nominal is not None:
         axes.axvline(nominal, color=NOMINAL, label="nominal")
     said = f"holds in {spread.holds} of {spread.draws} draws"
+    if spread.cap < 1.0:
+        said += f" within {spread.cap:g}"
     if spread.hangs_on:
         said += f"; hangs most on {spread.hangs_on[0].quantity}"
     axes.set_title(said, fontsize=9)

@@ -19,6 +19,7 @@ from .plan import (
     Status as Status,
 )
 from .spread import (
+    MANY as MANY,
     DrawnPlan as DrawnPlan,
     Influence as Influence,
     Quantiles as Quantiles,

@@ -10,10 +10,13 @@ from msgspec import Struct
 
 from hand_models.base import Array
 
-__all__ = ["DrawnPlan", "Influence", "Quantiles", "Spread"]
+__all__ = ["MANY", "DrawnPlan", "Influence", "Quantiles", "Spread"]
 
 PERCENTS: Final = (5.0, 50.0, 95.0)
 """That are told of a number over the draws."""
+
+MANY: Final = 20
+"""Draws of which 5 % are one at least; of fewer the least, the median and the largest are told."""
 
 VARIES: Final = 1e-4
 """How far load factors must differ, relatively, for it to hang on anything."""
@@ -41,7 +44,10 @@ class DrawnPlan(Struct, frozen=True):
 
 
 class Quantiles(Struct, frozen=True):
-    """A number over the draws that have it: its 5, 50 and 95 % quantiles (linear between draws)."""
+    """A number over the draws that have it: its 5, 50 and 95 % quantiles (linear between draws).
+
+    Of fewer than 20 draws: the least, the median and the largest.
+    """
 
     low: float
     median: float
@@ -51,7 +57,8 @@ class Quantiles(Struct, frozen=True):
     def of(cls, values: Sequence[float | None]) -> Quantiles | None:
         """Return the quantiles of the numbers that are there; None if none is."""
         there = [value for value in values if value is not None]
-        return cls(*np.percentile(there, PERCENTS).tolist()) if there else None
+        percents = PERCENTS if len(there) >= MANY else (0.0, 50.0, 100.0)
+        return cls(*np.percentile(there, percents).tolist()) if there else None
 
 
 class Influence(Struct, frozen=True):
@@ -73,14 +80,16 @@ class Spread(Struct, frozen=True):
     """A plan and its load factor over draws of the hand's and the rock's numbers.
 
     Body wrench, poses, joints and all that was asked stay; every draw has a plan of its own, which
-    is verified as any plan is. A draw has no answer where a hand cannot be in its place, nothing
-    balances the body, or no plan passes the checks; it counts as not holding.
+    is verified as any plan is. A draw has no plan where a hand cannot be in its place, nothing
+    balances the body, or none passes the checks; it counts as not holding.
 
     Attributes
     ----------
     draws, holds, without : int
         Draws; those in which the stance holds within the cap on the utilisation; and those that
-        have no answer.
+        have no plan, of which some may have a load factor.
+    cap : float
+        That cap.
     refused : dict of str to int
         In how many draws a hand cannot be, by limb; those that always can are left out.
     utilisation, load_factor : Quantiles or None
@@ -102,6 +111,7 @@ class Spread(Struct, frozen=True):
     draws: int
     holds: int
     without: int
+    cap: float
     refused: dict[str, int]
     utilisation: Quantiles | None
     load_factor: Quantiles | None
@@ -113,6 +123,7 @@ class Spread(Struct, frozen=True):
     def of(
         cls,
         plans: Sequence[DrawnPlan],
+        cap: float,
         refused: Mapping[str, int],
         drawn: Mapping[str, Array],
     ) -> Spread:
@@ -121,6 +132,8 @@ class Spread(Struct, frozen=True):
         Parameters
         ----------
         plans : sequence of DrawnPlan, length n
+        cap : float
+            On the utilisation.
         refused : mapping of str to int
         drawn : mapping of str to ndarray, shape (n,)
             The quantities by name, and what each is in every draw.
@@ -130,6 +143,7 @@ class Spread(Struct, frozen=True):
             draws=len(plans),
             holds=sum(each.holds for each in plans),
             without=used.count(None),
+            cap=cap,
             refused=dict(refused),
             utilisation=Quantiles.of(used),
             load_factor=Quantiles.of(factors),

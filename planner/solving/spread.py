@@ -55,8 +55,9 @@ def find_spread(prepared: PreparedStance, idle: Sequence[LimitUse]) -> Spread | 
         deadline.check("all draws were planned")
     except DeadlineError:
         return None
-    surfaces = {hand.surface.name for hand in question.stance.hands}
-    return Spread.of(plans, refused, drawn_quantities(*drawn, frozenset(surfaces)))
+    surfaces = frozenset(hand.surface.name for hand in question.stance.hands)
+    cap = question.limits.utilisation
+    return Spread.of(plans, cap, refused, drawn_quantities(*drawn, surfaces))
 
 
 def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:

@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from msgspec.structs import replace
+
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner import deadline, solving
@@ -81,6 +83,11 @@ class Planned(NamedTuple):
 
 def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     """Answer a plan request, and keep what the reply leaves out; as `plan`."""
+    if request.detail != "full":
+        # what is not told is not found
+        told = ["load_factor"] if request.detail == "hands" else []
+        wanted = [want for want in request.want if want in told]
+        request = replace(request, want=wanted, draws=[])
     asked = question(request, robots)
     answer = solving.plan(asked)
     reply: PlanReply | BriefPlanReply

@@ -166,6 +166,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     draws: Annotated[
         list[Draw],
         Meta(
+            min_length=1,
             max_length=100,
             description="over which the spread is told; by default those of draws.toml",
         ),

@@ -13,6 +13,9 @@ __all__ = ["robust_sentence", "spread_sentence", "within"]
 MOST_DIGITS: Final = 3
 """After the point, however small the spread."""
 
+CORRELATED: Final = 10
+"""Draws of which it is said on what they hang most: of a few, chance makes a correlation."""
+
 
 def within(value: float, spread: Quantiles | None) -> str:
     """Return a number with its 5 to 95 % interval, if that is known.
@@ -28,11 +31,13 @@ def within(value: float, spread: Quantiles | None) -> str:
 def spread_sentence(spread: Spread) -> str:
     """Say in how many draws a stance holds, on what that hangs most, and what was left out."""
     said = f"holds in {spread.holds} of {spread.draws} draws"
-    if spread.hangs_on:
+    if spread.cap < 1.0:
+        said += f" within a utilisation of {spread.cap:g}"
+    if spread.hangs_on and spread.draws >= CORRELATED:
         most = spread.hangs_on[0]
         said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
     if spread.without:
-        said += f"; {spread.without} have no answer"
+        said += f"; {spread.without} {'have' if spread.without > 1 else 'has'} no plan"
     return said + _refused(spread.refused)
 
 
@@ -50,7 +55,8 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
 
 
 def _refused(limbs: Mapping[str, int]) -> str:
-    return "".join(f"; in {n} {limb} cannot be there" for limb, n in limbs.items())
+    each = ", ".join(f"{limb} in {n}" for limb, n in limbs.items())
+    return f"; hands that cannot be there: {each}" if each else ""
 
 
 def _digits(spread: Quantiles) -> int:

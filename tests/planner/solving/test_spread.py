@@ -15,7 +15,7 @@ from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.prepare import settle_hand
 from planner.question import Limits, Question, Stance
-from planner.result import DrawnPlan, Spread
+from planner.result import DrawnPlan, Quantiles, Spread
 from planner.robots import robosimian
 from planner.solving import KnownStance, plan, spread
 from service.answering.questions import question
@@ -128,8 +128,9 @@ def test_it_is_what_each_draw_has_by_itself(asked):
         assert getattr(found, f"{name}s") == almost(one_by_one)
         told = getattr(found, name)
         there = [value for value in one_by_one if value is not None]
-        for percent, value in ((5, told.low), (50, told.median), (95, told.high)):
-            assert value == pytest.approx(np.percentile(there, percent), rel=1e-5)
+        percents = (0, 50, 100) if len(there) < 20 else (5, 50, 95)
+        expected = np.percentile(there, percents).tolist()
+        assert [told.low, told.median, told.high] == pytest.approx(expected, rel=1e-5)
     assert plan(asked).spread == found
 
 
@@ -242,16 +243,23 @@ def test_shares_are_squared_rank_correlations():
         assert told[name] == pytest.approx(shares[name])
 
 
+def test_of_few_numbers_all_are_told_and_of_many_their_quantiles():
+    values = np.random.default_rng(0).permutation(21).tolist()
+    assert Quantiles.of(values) == Quantiles(1.0, 10.0, 19.0)
+    assert Quantiles.of([None, *range(19)]) == Quantiles(0.0, 9.0, 18.0)
+    assert Quantiles.of([None]) is None
+
+
 def test_ties_and_missing_load_factors_are_minded():
     factors = [1.0, 2.0, 2.0, None, 3.0, 4.0]
     drawn_values = {"a": np.array([1.0, 3.0, 3.0, 9.0, 2.0, 5.0]), "same": np.ones(6)}
-    found = Spread.of([DrawnPlan(load_factor=factor) for factor in factors], {}, drawn_values)
+    found = Spread.of([DrawnPlan(load_factor=factor) for factor in factors], 1.0, {}, drawn_values)
     there = [0, 1, 2, 4, 5]
     told = spearmanr(drawn_values["a"][there], [factors[k] for k in there]).statistic ** 2
     assert [each.quantity for each in found.hangs_on] == ["a"]
     assert found.hangs_on[0].share == pytest.approx(told)
     assert found.utilisation is None
-    few = Spread.of([DrawnPlan(load_factor=factor) for factor in (1.0, 2.0)], {}, {})
+    few = Spread.of([DrawnPlan(load_factor=factor) for factor in (1.0, 2.0)], 1.0, {}, {})
     assert few.hangs_on == []
 
 
