@@ -14,7 +14,7 @@ from hand_models.base import InvalidInputError, SolverError, UnsupportedError, w
 from hand_models.tile import Surface
 from planner import solving
 from service import answering
-from service.answering import dispatch, hand_spaces
+from service.answering import dispatch, hand_spaces, questions
 from service.replies import WrenchSpaceReply
 from service.requests import WrenchSpaceRequest
 from tests.suite.helpers.replies import PLAN, departures, refusal, reply_to
@@ -359,6 +359,19 @@ def test_a_plans_spread_over_draws_of_the_callers_own_travels():
         assert low < usual < high
         assert usual == pytest.approx(reply["load_factor"], rel=1e-6)
         assert reply["spread"]["hangs_on"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+
+
+@pytest.mark.parametrize("detail", ["set_points", "hands"])
+def test_what_brief_replies_do_not_tell_is_not_found(monkeypatch, detail):
+    asked, planned = [], solving.plan(questions.question(plan_request(flat_request())))
+    monkeypatch.setattr(
+        dispatch.solving, "plan", lambda question: asked.append(question) or planned
+    )
+    want = ["load_factor", "spread", "prices"]
+    draws = [own_draw(Surface.named("rock").shear_limit)]
+    request = flat_request() | {"want": want, "draws": draws, "detail": detail}
+    answering.plan(plan_request(request))
+    assert asked[0].want == ({"load_factor"} if detail == "hands" else set())
 
 
 @pytest.mark.parametrize(
