@@ -260,7 +260,8 @@ def pulls(n, seed):
     return np.array([planar(way * SCALE[list(PLANAR)]) for way in ways])
 
 
-@pytest.mark.parametrize("others", [12, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("others", [12, 40])
 def test_a_few_linear_sets_stand_for_the_whole_within_five_percent(others):
     found = pieces(GRIPPER, pulls(60, 0))
     assert found.error <= 0.05
