@@ -103,6 +103,10 @@ class FloatingWrist(CompliantGrasp):
         for i in layout.engaged:
             P[k, np.flatnonzero(settled.finger_of == i)], s[k] = 1.0, structure.finger_shear
             k += 1
+        for i in layout.reacting:
+            own = slice(k, k + 2)
+            P[own, 2 * n + np.flatnonzero(settled.finger_of == i)] = [[1.0], [-1.0]]
+            s[own], k = settled.lateral_limits[i], own.stop
         for t in layout.tips:
             P[k, n + t], s[k] = 1.0, structure.fingertip_force
             k += 1

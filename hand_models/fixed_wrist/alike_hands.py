@@ -30,6 +30,9 @@ EACH_TENDON: Final = np.eye(TENDONS)
 
 EACH_PALM_LOAD: Final = np.eye(2)
 
+SIDES: Final = (1.0, -1.0)
+"""Of a lateral reaction."""
+
 WRENCH_PARTS: Final = 6 + len(HELD)
 """A wrench, and what of its force is held along each of `HELD`."""
 
@@ -121,9 +124,15 @@ def limit_rows(
         L[:, own, :TENDONS], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
         k += TENDONS
     engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
+    sideways, reacting = (
+        np.repeat(np.array(each, dtype=np.intp), len(SIDES))
+        for each in (layout.lateral_columns, layout.reacting)
+    )
     shears = _of_fingers(layout, loads[:, :, 0])[:, engaged].transpose(2, 0, 1)
+    either_way = np.array([np.zeros(len(sideways)), np.resize(SIDES, len(sideways))])
     for of, (start, slope), end in (
         (engaged, shears, structure.finger_shear),
+        (sideways, either_way, np.array([hand.lateral_limits[reacting] for hand in hands])),
         (finger_of[tips], loads[:, tips, 1].transpose(2, 0, 1), structure.fingertip_force),
     ):
         row = k + np.arange(len(of))

@@ -190,6 +190,7 @@ def row_layout(
     planes = [(i, k, sign) for i in touching for k in range(len(pieces)) for _, sign in signs]
     limits += [(finger, None, name, "") for name in TENDON_LIMITS for finger in FINGERS]
     limits += [(FINGERS[i], None, "finger_shear", "") for i in engaged]
+    limits += [(FINGERS[i], None, "finger_lateral", sign) for i in reacting for sign in "+-"]
     limits += [(tiles[i].finger, "distal", FINGERTIP_FORCE, "") for i in tips]
     limits += [
         (each, NAIL, name, "") for each in clinging for name in (NAIL_SHEAR, FINGERTIP_FORCE)

@@ -235,9 +235,19 @@ class SettledHand:
     @cached_property
     def lateral_shares(self) -> Array:
         """Share of its finger's lateral reaction that each tile carries, as its φ, shape (n,)."""
-        sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
-        sums[sums == 0.0] = 1.0
+        sums = np.where(self._whole_tiles > 0.0, self._whole_tiles, 1.0)
         return np.asarray(self.engagement / sums[self.finger_of])
+
+    @cached_property
+    def lateral_limits(self) -> Array:
+        """What the tiles of each finger hold sideways together, shape (4,) [N]."""
+        return self.surface.lateral_limit * self._whole_tiles
+
+    @cached_property
+    def _whole_tiles(self) -> Array:
+        """How many whole tiles the spines of each finger on rock make, Σ φ, shape (4,)."""
+        sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
+        return np.asarray(sums, dtype=float)
 
     @cached_property
     def nails(self) -> Array:

@@ -85,7 +85,7 @@ def own_draw(raw: Mapping[str, Any]) -> Draw:
         raise InvalidInputError(f"unknown; a draw has {valid}", field=unknown[0])
     tables = {}
     for name in Draw._fields:
-        entries = raw.get(name) or {}
+        entries = {} if raw.get(name) is None else raw[name]
         if not isinstance(entries, Mapping):
             raise InvalidInputError("sections of entries are needed", field=name)
         with within(name):

@@ -94,8 +94,10 @@ class ParameterTable:
         """
         try:
             return cls.of(tomllib.loads(text))
-        except (tomllib.TOMLDecodeError, InvalidInputError) as error:
+        except (ValueError, InvalidInputError) as error:
             raise InvalidInputError(str(error), field=origin) from None
+        except RecursionError:
+            raise InvalidInputError("is nested too deep", field=origin) from None
 
     @classmethod
     def of(cls, raw: Mapping[str, Any]) -> ParameterTable:

@@ -34,6 +34,7 @@ from hand_models.parameters import (
 )
 from hand_models.tile import Surface
 from planner.question import Question
+from planner.result import VARIES
 from planner.robots import robosimian
 from planner.solving import plan
 
@@ -234,7 +235,9 @@ def _ranked(
     found: dict[str, tuple[float, float]] = {}
     for stance, each in factors.items():
         there = np.isfinite(each)
-        if there.sum() > 1 and np.ptp(each[there]) > 0.0:
+        # what all draws agree on no measurement narrows
+        varies = there.sum() > 1 and np.ptp(np.percentile(each[there], [5.0, 95.0]))
+        if varies > VARIES * np.abs(each[there]).max():
             found[stance] = widths(given[there], each[there], accuracy)
     width, chance = np.mean(list(found.values()), axis=0).tolist() if found else (1.0, 1.0)
     return {

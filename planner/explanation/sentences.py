@@ -42,6 +42,7 @@ MANNERS: Final = {
     "palm_shear": " in shear",
     "palm_pressing": " in pressing",
     "finger_shear": " in shear together",
+    "finger_lateral": " sideways together",
     "nail_shear": " along its finger",
     "fingertip_force": " in pressing",
     FORCE_CAP: " allowed",
@@ -52,6 +53,7 @@ BEARERS: Final = {
     "motor_torque": "motor",
     "motor_current": "motor",
     "finger_shear": "tiles",
+    "finger_lateral": "tiles",
 }
 """What of a finger a limit is about; its tendon by default."""
 
@@ -71,6 +73,7 @@ VERBS: Final = {
     "motor_torque": ("gives", "give"),
     "motor_current": ("draws", "draw"),
     "finger_shear": ("carry", "carry"),
+    "finger_lateral": ("carry", "carry"),
     HAND_LOAD: ("holds", "hold"),
     FORCE_CAP: ("exerts", "exert"),
     JOINT_TORQUE: ("bears", "bear"),

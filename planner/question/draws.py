@@ -116,9 +116,16 @@ def _differing(hand: HandModel, draws: tuple[Draw, ...] | None) -> dict[tuple[st
     drawn = drawn_hands(hand, draws)
     found = {}
     for tables in ([each.model.table for each in drawn], [each.surfaces for each in drawn]):
-        for section, name, _ in tables[0]:
-            over = np.array([table.quantity(section, name).value for table in tables])
+        entries = dict.fromkeys((section, name) for table in tables for section, name, _ in table)
+        for section, name in entries:
+            over = np.array([_value(table, section, name) for table in tables])
             for i, values in enumerate(over.reshape(len(tables), -1).T):
                 if np.ptp(values) > 0.0:
                     found[section, name if over.ndim == 1 else f"{name}[{i}]"] = values
     return found
+
+
+def _value(table: ParameterTable, section: str, name: str) -> float | list[float]:
+    """Return an entry; of a preset that has none of its own, that of all surfaces."""
+    own = name in table.sections.get(section, {})
+    return table.quantity(section if own else "defaults", name).value

@@ -20,6 +20,7 @@ from .plan import (
 )
 from .spread import (
     MANY as MANY,
+    VARIES as VARIES,
     DrawnPlan as DrawnPlan,
     Influence as Influence,
     Quantiles as Quantiles,

@@ -32,9 +32,10 @@ class LimitName(Struct, frozen=True):
         None where the limit is not a finger's, or not a tile's.
     limit : str
         What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
-        ``motor_torque``, ``motor_current``, ``finger_shear`` and, with its distal phalanx,
-        ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``, ``hand_load`` and, where
-        it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard row's name.
+        ``motor_torque``, ``motor_current``, ``finger_shear``, ``finger_lateral`` and, with its
+        distal phalanx, ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``,
+        ``hand_load`` and, where it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard
+        row's name.
     joint : str or None
         The joint whose torque it is.
     """

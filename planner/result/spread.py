@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from hand_models.base import Array
 
-__all__ = ["MANY", "DrawnPlan", "Influence", "Quantiles", "Spread"]
+__all__ = ["MANY", "VARIES", "DrawnPlan", "Influence", "Quantiles", "Spread"]
 
 PERCENTS: Final = (5.0, 50.0, 95.0)
 """That are told of a number over the draws."""
@@ -19,7 +19,7 @@ MANY: Final = 20
 """Draws of which 5 % are one at least; of fewer the least, the median and the largest are told."""
 
 VARIES: Final = 1e-4
-"""How far load factors must differ, relatively, for it to hang on anything."""
+"""How far numbers must differ, over the largest, to differ at all: less is the solver's."""
 
 FEWEST: Final = 3
 """Load factors of which a correlation says anything."""
@@ -159,7 +159,7 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
     found = np.array([factors[k] for k in there], dtype=float)
     if len(found) < FEWEST or np.ptp(found) <= VARIES * np.abs(found).max():
         return []
-    b = _centred_ranks(found)
+    b = _centred_ranks(found, VARIES * np.abs(found).max())
     shares: dict[bytes, Influence] = {}
     for name, values in drawn.items():
         a = _centred_ranks(values[there])
@@ -170,8 +170,15 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
     return sorted(shares.values(), key=lambda each: -each.share)[:TOLD]
 
 
-def _centred_ranks(values: Array) -> Array:
-    """Return ranks less their mean, shape (n,); equal values have their mean rank."""
-    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+def _centred_ranks(values: Array, least: float = 0.0) -> Array:
+    """Return ranks less their mean, shape (n,).
+
+    Values that differ by no more than ``least`` from the next have their mean rank.
+    """
+    order = values.argsort()
+    steps = np.diff(values[order]) > least
+    places = np.empty(len(values), dtype=np.intp)
+    places[order] = np.append(0, np.cumsum(steps))
+    counts = np.bincount(places)
     ranks = (np.cumsum(counts) - 0.5 * (counts - 1.0))[places]
     return np.asarray(ranks - ranks.mean())

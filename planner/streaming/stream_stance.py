@@ -90,7 +90,7 @@ class StreamStance:
 
     def __init__(self, question: Question) -> None:
         _refuse(question)
-        question = replace(question, want=frozenset(), present={}, deadline=None)
+        question = replace(question, want=frozenset(), draws=None, present={}, deadline=None)
         known = KnownStance(question)
         if question.body_wrench is None:
             # whatever accelerates now does not do so in the wrenches to come

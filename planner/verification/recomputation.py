@@ -31,8 +31,12 @@ __all__ = ["Recomputing", "held_by"]
 PULLING: Final = np.array([np.inf, np.inf, 0.0])
 """Of a hand's force, what does not press."""
 
-WINCH, DRIVEN, SHEAR, TIP = 2, 3, 6, 7
-"""Rows of `_uses_of`: winches, the first that is a utilisation, shears and tips of fingers."""
+WINCH, DRIVEN, SHEAR, LATERAL, TIP = 2, 3, 6, slice(7, 9), 9
+"""Rows of `_uses_of`: winches, the first that is a utilisation, shears of fingers, their lateral
+reactions to either side, their tips."""
+
+SIDES: Final = np.array([[1.0], [-1.0]])
+"""Of a lateral reaction."""
 
 most = np.maximum.reduce
 
@@ -42,7 +46,7 @@ def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> tuple[Array
     """Return what tensions do to tendons, motors and fingers, in rows over all fingers.
 
     Torque and current of the motors, angle of the winches; then utilisations of tendons, by the
-    motors' torque and current, of the shears of fingers, and of their tips.
+    motors' torque and current, of the shears and lateral reactions of fingers, and of their tips.
 
     Parameters
     ----------
@@ -54,9 +58,9 @@ def _uses_of(places: TileIndex, hand: HandModel, strength: float) -> tuple[Array
 
     Returns
     -------
-    per_newton, at_zero : ndarray, shape (8, F)
+    per_newton, at_zero : ndarray, shape (10, F)
         Of tension; of straight fingers without any.
-    per_shear : ndarray, shape (8, 1)
+    per_shear : ndarray, shape (10, 1)
         Per newton of the shears of a finger's tiles together, which pull them away from the winch.
     """
     drive, (_, left, _, _) = hand.drive, tendons_of(places, hand)
@@ -106,6 +110,11 @@ class Recomputing:
         shares = np.where(known.touch.away, 1.0, known.engagement)
         self._whole = known.touch.touches / shares
         self._curves = LimitCurves([hand.surface for hand in hands], index.hand, shares)
+        self._lateral = np.array([hand.surface.lateral_limit for hand in hands])[index.hand]
+        aside = self._lateral * known.engagement * known.touch.touches
+        aside = np.add.reduceat(aside, index.first_of_finger)
+        # fingers without rock have no reaction
+        self._aside = SIDES / np.where(aside > 0.0, aside, np.inf)
         self._palm_shares = PALM_SIGNS / known.palm_limits
         self._per_newton, straight, self._per_shear = _uses_of(index, body, strength)
         self._at_zero = straight.copy()
@@ -154,6 +163,7 @@ class Recomputing:
         uses = self._per_newton * f
         uses += self._at_zero
         uses += self._per_shear * np.add.reduceat(drawn, places.first_of_finger)
+        uses[LATERAL] = self._aside * np.add.reduceat(again[:, 2], places.first_of_finger)
         uses[TIP] = normal.take(places.tips) / self._body.structure.fingertip_force
         if floats:
             uses[WINCH] += self._per_newton[WINCH] * (wound - f)
@@ -163,10 +173,13 @@ class Recomputing:
         planes = (planes_of(arrays.half_planes, places) @ again[:, :, None])[:, :, 0]
         used = most(planes, axis=1)
         used *= self._whole
+        # what a tile takes sideways is limited for a finger: it has a part of its reaction
+        sides = again[:, 2:] / self._lateral[:, None] * SIDES.T
+        planes = np.hstack([planes, sides])
         curve = self._curves.excess(again[:, 0], again[:, 1], again[:, 2], UTILISATION)
         if not most(curve) <= LOAD:
             # beyond its half-planes a tile may be outside the surface, too
-            curve[(used > 1.0) | known.touch.away] = 0.0
+            curve[(most(planes, axis=1) * self._whole > 1.0) | known.touch.away] = 0.0
         hooked = NO_NAILS
         if self._nails is not None:
             hooked = self._nails.loads(arrays)

@@ -99,8 +99,10 @@ def read_draws(path: Path) -> list[Draw]:
         raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
     except UnicodeDecodeError:
         raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
-    except (tomllib.TOMLDecodeError, InvalidInputError) as error:
+    except (ValueError, InvalidInputError) as error:
         raise InvalidInputError(str(error), field=str(path)) from None
+    except RecursionError:
+        raise InvalidInputError("is nested too deep", field=str(path)) from None
     return found
 
 

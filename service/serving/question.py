@@ -163,7 +163,8 @@ def _read(question: Question) -> None:
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
     many = isinstance(want, list) and any(each in want for each in DEAR)
-    question.dear = question.dear or many
+    unread = want is None and bool(bytes(head.want))
+    question.dear = question.dear or many or unread
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 
 

@@ -38,6 +38,9 @@ def spread_sentence(spread: Spread) -> str:
         said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
     if spread.without:
         said += f"; {spread.without} {'have' if spread.without > 1 else 'has'} no plan"
+    lost = spread.load_factors.count(None)
+    if lost > spread.without:
+        said += f"; {lost} have no load factor"
     return said + _refused(spread.refused)
 
 

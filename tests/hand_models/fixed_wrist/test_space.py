@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
-from hand_models import FINGERS, Cylinder, EmptySetError, Grasp, Plane, Pose, SpinyHand
+from hand_models import FINGERS, Cylinder, Edge, EmptySetError, Grasp, Plane, Pose, SpinyHand
 from hand_models.fixed_wrist import wrench_space
 from hand_models.parameters import ParameterTable, Quantity, hand_table
-from hand_models.tile import inner_half_planes
+from hand_models.tile import Surface, inner_half_planes
 from tests.suite.helpers.hands import (
     HAND,
     PINCH,
@@ -142,7 +143,12 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
     for (finger, phalanx, limit), u in worst.items():
         if limit in ("finger_shear", "fingertip_force", "hand_load"):
             continue  # in test_structure.py
-        if limit == "tendon_tension":
+        if limit == "finger_lateral":
+            # every tile of it at what it holds sideways without any shear
+            shares = sum(share for (name, _), share in holds.items() if name == finger)
+            reaction = abs(value[f"{finger}/lateral"])
+            expected = reaction / (settled.surface.lateral_limit * shares)
+        elif limit == "tendon_tension":
             expected = value[f"{finger}/tension"] / 700.0
         elif limit == "motor_torque":
             expected = value[f"{finger}/tension"] * 0.0067 / (236.0 * 0.7) / 0.0286
@@ -318,3 +324,23 @@ def test_friction_at_the_palms_own_pulleys_lets_stiff_tiles_carry_more():
         for one in (table, table.replaced(own))
     ]
     assert limits[1] > 1.02 * limits[0]
+
+
+def test_what_drags_a_tile_backwards_gives_it_no_more_sideways():
+    """However far pressed tiles are dragged backwards, each holds what it does without shear."""
+    hold, surface = Edge(0.036, 2.08), Surface.named("sandpaper-36")
+    settled = HAND.settle(hold, surface, Grasp(outer_rotation=math.pi))
+    space = wrench_space(settled)
+    backwards = 0
+    for i, finger in enumerate(FINGERS):
+        column = space.columns.index(f"{finger}/lateral")
+        cost = -np.eye(len(space.columns))[column]
+        bounds = np.concatenate([space.s - space.l0, space.h])
+        found = linprog(cost, np.vstack([space.L, space.H]), bounds, bounds=(None, None))
+        assert found.status == 0
+        laterals = np.array([found.x[space.columns.index(f"{f}/lateral")] for f in FINGERS])
+        for t in own_tiles(settled, i):
+            shear, _, side = settled.tile_loads(found.x[:4], laterals)[t]
+            backwards += shear < -0.1
+            assert abs(side) <= settled.engagement[t] * surface.lateral_limit * (1.0 + 1e-7)
+    assert backwards

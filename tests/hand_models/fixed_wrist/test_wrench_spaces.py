@@ -133,6 +133,13 @@ class ByHand:
                     sum(settled.loads[t, 0, 0] for t in mine),
                     structure.finger_shear,
                 )
+                if settled.grasp.lateral:
+                    for sign, factor in (("+", 1.0), ("-", -1.0)):
+                        self.limits[f"{finger}/finger_lateral{sign}"] = (
+                            {f"{finger}/lateral": factor},
+                            0.0,
+                            settled.surface.lateral_limit * self.shares[finger],
+                        )
             for t in mine:
                 if settled.tiles[t].phalanx == "distal" and settled.tiles[t].contact != "none":
                     at_zero, slope = settled.loads[t, 1].tolist()

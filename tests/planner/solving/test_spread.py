@@ -13,11 +13,13 @@ from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import Draw, bundled_draws, own_draw, own_hand, own_surfaces
 from hand_models.rock import Plane
 from hand_models.tile import Surface
+from planner.capability import BodySpace
 from planner.prepare import settle_hand
 from planner.question import Limits, Question, Stance
 from planner.result import DrawnPlan, Quantiles, Spread
 from planner.robots import robosimian
 from planner.solving import KnownStance, plan, spread
+from planner.streaming import WrenchStream
 from service.answering.questions import question
 from service.commands.stances import read_request
 from tests.suite.helpers.stances import TILE_60N, ask, moved, on_wall
@@ -317,6 +319,34 @@ def test_a_known_stance_tells_it_for_each_wrench():
     once = plan(asked).spread
     again = KnownStance(asked).plan(0.5 * asked.needed_wrench()).spread
     assert again.load_factors == almost([2.0 * factor for factor in once.load_factors])
+
+
+def test_what_solvers_leave_of_equal_load_factors_is_no_variation():
+    rng = np.random.default_rng(0)
+    factors = 1.9 + 1e-7 * rng.random(30)
+    factors[3] = 1.5
+    values = {"a": rng.permutation(np.arange(30.0)), "b": rng.permutation(np.arange(30.0))}
+    told = [
+        Spread.of([DrawnPlan(load_factor=each) for each in noisy], 1.0, {}, values)
+        for noisy in factors + 1e-8 * rng.random((2, 30))
+    ]
+    assert told[0].hangs_on == told[1].hangs_on
+    assert told[0].hangs_on[0].share < 0.2
+
+
+def test_draws_may_set_different_numbers_of_a_preset():
+    ratios = [{"surfaces": {"rock": {"pull_off_ratio": entry(r, "1")}}} for r in (0.2, 0.25, 0.35)]
+    draws = (drawn(60.0), *(own_draw(ratio) for ratio in ratios))
+    found = plan(ask(on_wall(), "spread", draws=draws)).spread
+    assert found.load_factors[1] < found.load_factors[2] < found.load_factors[3]
+    assert found.hangs_on[0].quantity in ("rock.pull_off_ratio", "rock.shear_limit")
+    assert {each.quantity for each in found.hangs_on} >= {"rock.pull_off_ratio"}
+
+
+def test_streams_and_body_spaces_of_a_question_with_draws_leave_them_out():
+    asked = ask(on_wall(), "spread", draws=FEW)
+    first = WrenchStream(asked).first
+    np.testing.assert_allclose(first, BodySpace(asked).plan.body_wrench)
 
 
 def test_draws_that_cannot_be_are_refused_by_their_entry():
