@@ -29,14 +29,15 @@ Mask = npt.NDArray[np.bool_]
 EXACT: Final = 1e-10
 """Tolerance of the linear programs."""
 
-OPTIONS: Final[dict[str, bool | float | str]] = {
+OPTIONS: Final[dict[str, float | str]] = {
     "presolve": "off",
     "parallel": "off",
     "solver": "simplex",
+    "simplex_scale_strategy": 0,
     "primal_feasibility_tolerance": EXACT,
     "dual_feasibility_tolerance": EXACT,
 }
-"""Of HiGHS. To presolve would be to forget where the last question ended."""
+"""Of HiGHS. To presolve would be to forget where it was; the rows have their physical scaling."""
 
 
 class Multipliers(NamedTuple):

@@ -148,6 +148,14 @@ class HardRowSystem:
         """
         return self.program.least_violation(*self.rows_of(constraints, balance=balance))
 
+    def least_violation_without(self, constraints: Iterable[LimitName]) -> Multipliers | None:
+        """Return by how much all constraints but some, and the balance, must be broken at least.
+
+        Parameters and what is returned as for `least_violation`.
+        """
+        tied, rows = self.rows_of(constraints, balance=False)
+        return self.program.least_violation(~tied, ~rows)
+
 
 def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitName, float]:
     """Return the sum of the weights of each name."""

@@ -10,7 +10,7 @@ all the others have loads is in every one of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -66,7 +66,7 @@ def irreducible_set(
 def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...] | None:
     """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
-    needed = _needed(system, proof, kept, kept)
+    needed = _needed(system, proof, kept)
     for name in reversed(ranked(kept)):
         if name not in kept or name in needed:
             continue
@@ -77,7 +77,6 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
         if trial.gain > BROKEN:
             proof = trial
             kept = system.weights(proof.direction, proof.multipliers)
-            needed |= _needed(system, proof, kept, kept.keys() - needed)
         elif trial.gain > KEPT:
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
@@ -104,12 +103,13 @@ def sufficient_alone(
     """
     if not irreducible:
         return irreducible
-    found, left, groups = set(), set(irreducible), [irreducible]
+    found: set[LimitName] = set()
+    left, groups = set(irreducible), [irreducible]
     while groups:
         group = [name for name in groups.pop() if name in left]
         if not group:
             continue
-        trial = system.least_violation(name for name in system.constraints if name not in group)
+        trial = system.least_violation_without(group)
         if trial is None:
             return None
         if trial.gain > BROKEN:
@@ -137,86 +137,72 @@ def _prove_alone(system: HardRowSystem, proof: Multipliers, kept: Collection[Lim
 
 
 def _needed(
-    system: HardRowSystem,
-    proof: Multipliers,
-    kept: Collection[LimitName],
-    tried: Iterable[LimitName],
+    system: HardRowSystem, proof: Multipliers, kept: Collection[LimitName]
 ) -> set[LimitName]:
-    """Return those tried without which the others kept have loads, as far as guesses show that.
+    """Return constraints without which the others kept have loads, as far as guesses show that.
 
     Guessed are loads that keep to what the proof weighs of the others, then to all their rows.
     """
-    tied, mine = system.rows_of(kept)
-    whole = _Rows.of(system, tied, mine)
-    left = {system.constraints.index(name): name for name in tried}
+    places = {system.constraints.index(name): name for name in kept}
+    _, mine = system.rows_of(kept)
+    whole = _Rows.of(system, kept, mine)
     found: set[LimitName] = set()
     for rows in (mine & (proof.multipliers > WEIGHS), mine):
-        part = _Rows.of(system, tied, rows).split()
-        shown = [place for place in left if whole.hold(part.loads(place), place)]
-        found.update(map(left.pop, shown))
+        left = [place for place, name in places.items() if name not in found]
+        guesses = _Rows.of(system, kept, rows).loads_without(left)
+        found.update(places[place] for place, loads in guesses if whole.hold(loads, place))
     return found
 
 
 class _Rows(NamedTuple):
-    """Rows M z ≤ r of which the first are equations, and whose each is."""
+    """Rows M z ≤ r, the first `BODY` of them equations, and which constraint each is.
+
+    A given wrench's rows are there twice, with either sign.
+    """
 
     M: Array
     right: Array
-    equations: int
     whose: Indices
 
     @classmethod
-    def of(cls, system: HardRowSystem, tied: Chosen, rows: Chosen) -> _Rows:
-        """Return some of a system's."""
+    def of(cls, system: HardRowSystem, kept: Collection[LimitName], rows: Chosen) -> _Rows:
+        """Return the balance, given wrenches that are kept, and some hard rows."""
+        tied, _ = system.rows_of(kept)
+        G, goal = system.G[tied], system.goal[tied]
         limits, given = np.split(system.owners, [len(system.h)])
+        held = given[tied[BODY:]]
         return cls(
-            np.vstack([system.G[tied], system.H[rows]]),
-            np.concatenate([system.goal[tied], system.h[rows]]),
-            int(tied.sum()),
-            np.concatenate([np.full(BODY, -1), given[tied[BODY:]], limits[rows]]),
+            np.vstack([G, -G[BODY:], system.H[rows]]),
+            np.concatenate([goal, -goal[BODY:], system.h[rows]]),
+            np.concatenate([np.full(BODY, -1), held, held, limits[rows]]),
         )
 
-    def hold(self, loads: Array | None, but: int) -> bool:
+    def hold(self, loads: Array, but: int) -> bool:
         """Whether loads are in the box, and keep to all rows but those of one constraint."""
-        if loads is None or np.abs(loads).max(initial=0.0) > UNLIMITED:
-            return False
         over = self.M @ loads - self.right
-        over[: self.equations] = np.abs(over[: self.equations])
-        return bool(over[self.whose != but].max(initial=0.0) <= KEPT)
+        over[:BODY] = np.abs(over[:BODY])
+        over[self.whose == but] = 0.0
+        small = np.abs(loads).max(initial=0.0) <= UNLIMITED
+        return bool(small and over.max() <= KEPT)
 
-    def split(self) -> _Split:
-        """Tell what rows say of each other from what they say of loads."""
+    def loads_without(self, places: Iterable[int]) -> Iterator[tuple[int, Array]]:
+        """Yield loads of all rows but those of one constraint after the other, if there are any.
+
+        With N all that the rows say of each other, N M = 0, there are loads with slack s,
+        M z = r − s, if N (r − s) is zero: a least-squares problem in nonnegative unknowns (Lawson
+        and Hanson), of few equations. Slack of what is left out may have either sign. The loads are
+        the smallest.
+        """
         left, sizes, across = np.linalg.svd(self.M)
         rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
-        inverse = (across[:rank].T / sizes[:rank]) @ left[:, :rank].T
-        return _Split(self, left[:, rank:].T, inverse)
-
-
-class _Split(NamedTuple):
-    """Rows, all N that they say of each other, N M = 0, and the inverse of the rest.
-
-    Loads with slack s, M z = r − s, are there if N (r − s) is zero: few nonnegative unknowns, of
-    which a least-squares problem (Lawson and Hanson) finds as many as there are rows of N.
-    """
-
-    rows: _Rows
-    N: Array
-    inverse: Array
-
-    def loads(self, without: int) -> Array | None:
-        """Return the smallest loads of rows but those of one constraint; None if there are none.
-
-        Slack of its rows may have any sign.
-        """
-        freed = self.rows.whose == without
-        bound = ~freed
-        bound[: self.rows.equations] = False
-        columns = self.N[:, bound], self.N[:, freed], -self.N[:, freed]
-        try:
-            shares, missing = nnls(np.hstack(columns), self.N @ self.rows.right)
-        except RuntimeError:  # it has come to no end
-            return None
-        slack, ends = np.zeros(len(freed)), np.cumsum([bound.sum(), freed.sum()])
-        above, more, less = np.split(shares, ends)
-        slack[bound], slack[freed] = above, more - less
-        return np.asarray(self.inverse @ (self.rows.right - slack)) if missing <= KEPT else None
+        N, inverse = left[:, rank:].T, (across[:rank].T / sizes[:rank]) @ left[:, :rank].T
+        missing, above = N @ self.right, N[:, BODY:]
+        for place in places:
+            (freed,) = (self.whose == place).nonzero()
+            try:
+                shares, _ = nnls(np.hstack([above, -N[:, freed]]), missing)
+            except RuntimeError:  # it has come to no end
+                continue
+            slack = np.append(np.zeros(BODY), shares[: above.shape[1]])
+            slack[freed] -= shares[above.shape[1] :]
+            yield place, inverse @ (self.right - slack)
