@@ -55,6 +55,7 @@ def certify(
     *,
     nearest: Outcome | None = None,
     known: Outcome | None = None,
+    explain: bool = True,
 ) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
@@ -78,6 +79,8 @@ def certify(
         given; found here by default.
     known : Outcome, optional
         Of the program without a plan. Where the time is over, its multipliers are the proof.
+    explain : bool, optional
+        Whether the irreducible set is sought, too, and what of it would do alone.
 
     Returns
     -------
@@ -104,7 +107,7 @@ def certify(
         return None
     direction, multipliers = found
     weights = system.weights(direction, multipliers)
-    irreducible = irreducible_set(system, weights)
+    irreducible = irreducible_set(system, weights) if explain else None
     if irreducible is not None:
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
