@@ -137,11 +137,13 @@ class FarkasProgram:
         solver, (nb, size) = self._solver, self.G.shape
         self._change(costs, most, -self.G.T @ start)
         solver.changeRowBounds(size, -math.inf, total)
-        if left is not None:
-            solver.setOptionValue("time_limit", solver.getRunTime() + left)
-        solver.run()
-        if solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
-            return None
+        until = math.inf if left is None else solver.getRunTime() + left
+        solver.setOptionValue("time_limit", until)
+        if not solver.optimal():
+            # where it was may have been a bad place to begin
+            solver.clearSolver()
+            if deadline.expired() or not solver.optimal():
+                return None
         x = np.array(solver.getSolution().col_value)
         direction = start + x[:nb] - x[nb : 2 * nb]
         gain = float(start @ self.goal) - solver.getObjectiveValue()
@@ -169,6 +171,11 @@ class _Silent(highspy.Highs):
         self.callbacks = []  # none is called, and they would hold it in a circle
         for name, value in OPTIONS.items():
             self.setOptionValue(name, value)
+
+    def optimal(self) -> bool:
+        """Solve the program, and return whether it says that it has."""
+        self.run()
+        return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
 
     def enableCallbacks(self) -> None:
         """Be silent instead: it is here that it would tell its name."""

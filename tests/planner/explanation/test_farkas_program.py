@@ -104,3 +104,17 @@ def test_the_solver_is_silent_and_goes_with_its_program(capfd):
         gc.enable()
     told = capfd.readouterr()
     assert told.out == told.err == ""
+
+
+def test_a_bad_place_to_begin_is_left(monkeypatch):
+    """Once the solver comes to no end, and is asked again from the beginning."""
+    every = np.ones(7, dtype=bool), np.ones(ROWS, dtype=bool)
+    program = FarkasProgram(*rows_of(2))
+    expected, ends = program.least_violation(*every), [False]
+    solve = type(program._solver).optimal
+    monkeypatch.setattr(
+        type(program._solver), "optimal", lambda solver: ends.pop() if ends else solve(solver)
+    )
+    assert program.least_violation(*every).gain == pytest.approx(expected.gain, rel=1e-9)
+    ends.extend([False, False])
+    assert program.least_violation(*every) is None
