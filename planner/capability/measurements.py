@@ -174,7 +174,9 @@ class MeasurementStudy:
             if isinstance(job, str):
                 asked = self.stances[job]
                 stance = replace(asked.stance, robot=robot)
-                wanted = replace(asked, stance=stance, want=frozenset(["spread"]), draws=None)
+                wanted = replace(
+                    asked, stance=stance, want=frozenset(["spread"]), draws=None, explain=False
+                )
                 spread = plan(wanted).spread
                 found = [] if spread is None else spread.load_factors
                 factors[job] = np.array([np.nan if f is None else f for f in found])

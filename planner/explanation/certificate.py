@@ -23,11 +23,10 @@ from planner.explanation.infeasibility import (
     HELD_WRENCH,
     HardRowSystem,
     ranked,
-    vertex,
 )
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.prepare import FORCE_CAP, TENSION_CHANGE
-from planner.programs import JOINT_TORQUE, UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import JOINT_TORQUE, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Limits
 from planner.result import Certificate, LimitName
 
@@ -56,6 +55,7 @@ def certify(
     *,
     nearest: Outcome | None = None,
     known: Outcome | None = None,
+    explain: bool = True,
 ) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
@@ -79,6 +79,8 @@ def certify(
         given; found here by default.
     known : Outcome, optional
         Of the program without a plan. Where the time is over, its multipliers are the proof.
+    explain : bool, optional
+        Whether the irreducible set is sought, too, and what of it would do alone.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def certify(
         return None
     direction, multipliers = found
     weights = system.weights(direction, multipliers)
-    irreducible = irreducible_set(system, weights)
+    irreducible = irreducible_set(system, weights) if explain else None
     if irreducible is not None:
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
@@ -217,7 +219,7 @@ def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, 
     for limb in limbs:
         mine = [name for name in system.constraints if name.limb == limb]
         found = system.least_violation(mine, balance=False)
-        if found is not None and found.size > CONTRADICTS:
+        if found is not None and found.gain > CONTRADICTS:
             return found.direction, found.multipliers
     return None
 
@@ -251,36 +253,11 @@ def _polished(system: HardRowSystem, missing: Array) -> tuple[Array, Array]:
     of an interior-point solution would be magnified by a box as large as X. The parts of d for
     given wrenches are free.
     """
-    rows, size = system.H.shape
     length = float(np.linalg.norm(missing))
-    nothing = np.zeros(len(missing)), np.zeros(rows)
-    if not length > DISTANT:
-        return nothing
-    near = missing[:6] / length
-    count, given = 6, len(missing) - 6
-    # variables: d (nb), t ≥ |d − near| (6), λ (rows), the parts of Gᵀd − Hᵀλ (size each)
-    one, leak = np.eye(count), np.eye(size)
-    none = np.zeros((count, rows + 2 * size))
-    free = np.zeros((count, given))
-    turn = np.full(count, CLOSE * length)
-    costs = [-system.goal, turn, system.h, np.full(2 * size, UNLIMITED)]
-    others = count + rows + 2 * size
-    low = np.concatenate([np.full(count, -1.0), np.full(given, -np.inf), np.zeros(others)])
-    high = np.concatenate([np.full(count, 1.0), np.full(given + others, np.inf)])
-    result = vertex(
-        np.concatenate(costs) / length,
-        (low, high),
-        np.vstack([np.hstack([one, free, -one, none]), np.hstack([-one, free, -one, none])]),
-        np.concatenate([near, -near]),
-        np.hstack([system.G.T, np.zeros((size, count)), -system.H.T, -leak, leak]),
-        np.zeros(size),
-    )
-    if result is None:
-        return nothing
-    direction = result.x[: count + given]
-    length = float(np.linalg.norm(direction[:count]))
-    if length < BLOCKING:
-        return nothing
-    start = 2 * count + given
-    multipliers = np.maximum(result.x[start : start + rows], 0.0)
-    return direction / length, multipliers / length
+    if length > DISTANT:
+        found = system.program.near(missing[:BODY] / length, CLOSE * length, length)
+        if found is not None:
+            size = float(np.linalg.norm(found.direction[:BODY]))
+            if size >= BLOCKING:
+                return found.direction / size, found.multipliers / size
+    return np.zeros(len(missing)), np.zeros(len(system.h))

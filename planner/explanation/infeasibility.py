@@ -11,18 +11,17 @@ beyond any strength, always counts.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, linprog
 
-from hand_models.base import Array
-from planner import deadline
+from hand_models.base import Array, Indices
 from planner.explanation.active_limits import ALIKE
+from planner.explanation.farkas_program import FarkasProgram, Multipliers
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -30,11 +29,10 @@ __all__ = [
     "BODY",
     "HELD_WRENCH",
     "WEIGHS",
+    "Chosen",
     "HardRowSystem",
-    "Violation",
     "ranked",
     "summed",
-    "vertex",
 ]
 
 Chosen = NDArray[np.bool_]
@@ -47,25 +45,6 @@ BODY: Final = 6
 
 WEIGHS: Final = 1e-6
 """Multipliers below this, of which all add up to about one, do not count."""
-
-EXACT: Final = 1e-10
-"""Tolerance of the linear programs."""
-
-
-class Violation(NamedTuple):
-    """By how much constraints and balance must be broken at least, and why.
-
-    Attributes
-    ----------
-    size : float
-        t, in the program's units.
-    direction, multipliers : ndarray, shapes (nb,), (n,)
-        d of the balance and λ ≥ 0 of the rows, Σ|d| + Σλ = 1 where t is above zero.
-    """
-
-    size: float
-    direction: Array
-    multipliers: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,20 +77,37 @@ class HardRowSystem:
         """What G z is to be, shape (nb,)."""
         return np.asarray(self.wrench - self.g)
 
-    @property
+    @cached_property
     def constraints(self) -> tuple[LimitName, ...]:
         """Every name once."""
-        return tuple(dict.fromkeys((*self.names, *self.given)))
+        return tuple(self._places)
+
+    @cached_property
+    def owners(self) -> Indices:
+        """Which constraint each hard row is, and then each further row of the balance."""
+        places = self._places
+        return np.array([places[name] for name in (*self.names, *self.given)], dtype=np.intp)
+
+    @cached_property
+    def _places(self) -> dict[LimitName, int]:
+        return {name: i for i, name in enumerate(dict.fromkeys((*self.names, *self.given)))}
+
+    @cached_property
+    def program(self) -> FarkasProgram:
+        """What finds multipliers that prove."""
+        return FarkasProgram(self.G, self.goal, self.H, self.h)
 
     def rows_of(
-        self, constraints: Collection[LimitName], *, balance: bool = True
+        self, constraints: Iterable[LimitName], *, balance: bool = True
     ) -> tuple[Chosen, Chosen]:
         """Return which rows of the balance (nb,) and which hard rows (n,) constraints are.
 
         The body's own six are among them if its balance counts.
         """
-        tied = [balance] * BODY + [name in constraints for name in self.given]
-        return np.array(tied), np.array([name in constraints for name in self.names], dtype=bool)
+        chosen = np.zeros(len(self._places), dtype=bool)
+        chosen[[self._places[name] for name in constraints if name in self._places]] = True
+        rows = chosen[self.owners]
+        return np.append(np.full(BODY, balance), rows[len(self.h) :]), rows[: len(self.h)]
 
     def bound(self, direction: Array, multipliers: Array) -> float:
         """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
@@ -129,43 +125,36 @@ class HardRowSystem:
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
         """Return what multipliers weigh each constraint with, those that count alone."""
-        shares = (*multipliers.tolist(), *np.abs(direction[BODY:]).tolist())
-        found = summed((*self.names, *self.given), shares)
-        return {name: weight for name, weight in found.items() if weight > WEIGHS}
+        shares = np.append(multipliers, np.abs(direction[BODY:]))
+        weights = np.bincount(self.owners, shares, len(self.constraints)).tolist()
+        pairs = zip(self.constraints, weights, strict=True)
+        return {name: weight for name, weight in pairs if weight > WEIGHS}
 
     def least_violation(
-        self, constraints: Collection[LimitName], *, balance: bool = True
-    ) -> Violation | None:
+        self, constraints: Iterable[LimitName], *, balance: bool = True
+    ) -> Multipliers | None:
         """Return by how much constraints must be broken at least, by loads in the box.
 
         Parameters
         ----------
-        constraints : collection of LimitName
+        constraints : iterable of LimitName
         balance : bool
             Whether the body's balance counts, too.
 
         Returns
         -------
-        Violation or None
-            None if the solver does not say, or the time is over.
+        Multipliers or None
+            Their gain is that; None if the solver does not say, or the time is over.
         """
-        tied, rows = self.rows_of(frozenset(constraints), balance=balance)
-        G, goal, H, h = self.G[tied], self.goal[tied], self.H[rows], self.h[rows]
-        size, count = G.shape[1], len(G)
-        ends = np.append(np.full(size, UNLIMITED), np.inf)
-        result = vertex(
-            np.append(np.zeros(size), 1.0),
-            (np.append(-ends[:-1], 0.0), ends),
-            np.column_stack([np.vstack([G, -G, H]), -np.ones(2 * count + len(h))]),
-            np.concatenate([goal, -goal, h]),
-        )
-        if result is None:
-            return None
-        shares = np.maximum(-result.ineqlin.marginals, 0.0)
-        direction, multipliers = np.zeros(len(self.wrench)), np.zeros(len(self.h))
-        direction[tied] = shares[count : 2 * count] - shares[:count]
-        multipliers[rows] = shares[2 * count :]
-        return Violation(float(result.x[-1]), direction, multipliers)
+        return self.program.least_violation(*self.rows_of(constraints, balance=balance))
+
+    def least_violation_without(self, constraints: Iterable[LimitName]) -> Multipliers | None:
+        """Return by how much all constraints but some, and the balance, must be broken at least.
+
+        Parameters and what is returned as for `least_violation`.
+        """
+        tied, rows = self.rows_of(constraints, balance=False)
+        return self.program.least_violation(~tied, ~rows)
 
 
 def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitName, float]:
@@ -179,35 +168,3 @@ def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitNa
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
     """Return constraints, the weightiest first."""
     return sorted(weights, key=lambda name: -round(weights[name], ALIKE))
-
-
-def vertex(
-    cost: Array,
-    bounds: tuple[Array, Array],
-    A: Array,
-    b: Array,
-    E: Array | None = None,
-    e: Array | None = None,
-) -> OptimizeResult | None:
-    """Return a vertex of least cost · x with A x ≤ b, E x = e within bounds.
-
-    None if it is not found, or not in time.
-    """
-    left = deadline.left()
-    if left == 0.0:
-        return None
-    result = linprog(
-        cost,
-        A_ub=A,
-        b_ub=b,
-        A_eq=E,
-        b_eq=e,
-        bounds=list(zip(*(ends.tolist() for ends in bounds), strict=True)),
-        method="highs-ds",
-        options={
-            "primal_feasibility_tolerance": EXACT,
-            "dual_feasibility_tolerance": EXACT,
-            "time_limit": math.inf if left is None else left,
-        },
-    )
-    return result if result.status == 0 and result.x is not None else None

@@ -10,13 +10,15 @@ all the others have loads is in every one of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from itertools import compress
-from typing import Final
+from collections.abc import Collection, Iterable, Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.optimize import nnls
 
-from planner.explanation.infeasibility import BODY, WEIGHS, HardRowSystem, Violation, ranked
+from hand_models.base import Array, Indices
+from planner.explanation.farkas_program import Multipliers
+from planner.explanation.infeasibility import BODY, WEIGHS, Chosen, HardRowSystem, ranked
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -31,8 +33,8 @@ KEPT: Final = 2e-9
 MOST: Final = 24
 """Constraints of a set that are left out one by one; larger sets are not tried."""
 
-RANK: Final = 1e-9
-"""Relative size below which singular values of rows are none."""
+RANK: Final = 1e-4
+"""Relative size below which singular values of rows are none: loads would be beyond the box."""
 
 
 def irreducible_set(
@@ -56,12 +58,12 @@ def irreducible_set(
         first = system.least_violation(start)
         if first is None:
             return None
-        if first.size > BROKEN:
+        if first.gain > BROKEN:
             return _filtered(system, first)
     return None
 
 
-def _filtered(system: HardRowSystem, proof: Violation) -> tuple[LimitName, ...] | None:
+def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...] | None:
     """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
     needed = _needed(system, proof, kept)
@@ -72,11 +74,10 @@ def _filtered(system: HardRowSystem, proof: Violation) -> tuple[LimitName, ...] 
         trial = system.least_violation(others)
         if trial is None:
             return None
-        if trial.size > BROKEN:
+        if trial.gain > BROKEN:
             proof = trial
             kept = system.weights(proof.direction, proof.multipliers)
-            needed |= _needed(system, proof, kept)
-        elif trial.size > KEPT:
+        elif trial.gain > KEPT:
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
 
@@ -92,7 +93,7 @@ def sufficient_alone(
         All constraints together have none.
     irreducible : tuple of LimitName or None
         Some irreducible set: only its members can do. So it is with those of every other set that
-        a trial shows, which soon leaves few to try.
+        a trial shows, which soon leaves few to try. They are tried together, and by halves.
 
     Returns
     -------
@@ -102,66 +103,106 @@ def sufficient_alone(
     """
     if not irreducible:
         return irreducible
-    others = system.least_violation([n for n in system.constraints if n not in irreducible])
-    if others is not None and others.size > BROKEN:
-        # what is left is in the way even without all of them
-        return ()
-    if len(irreducible) > MOST:
-        return None
-    found, left = [], list(irreducible)
-    while left:
-        name = left.pop(0)
-        trial = system.least_violation([other for other in system.constraints if other != name])
-        if trial is None or KEPT < trial.size <= BROKEN:
-            return None
-        if trial.size <= KEPT:
-            found.append(name)
+    found: set[LimitName] = set()
+    left, groups = set(irreducible), [irreducible]
+    while groups:
+        group = [name for name in groups.pop() if name in left]
+        if not group:
             continue
-        weighed = system.weights(trial.direction, trial.multipliers)
-        if _prove_alone(system, trial, weighed):
-            left = [other for other in left if other in weighed]
-    return tuple(found)
+        trial = system.least_violation_without(group)
+        if trial is None:
+            return None
+        if trial.gain > BROKEN:
+            # what is left is in the way even without all of them
+            left.difference_update(group)
+            weighed = system.weights(trial.direction, trial.multipliers)
+            if _prove_alone(system, trial, weighed):
+                left.intersection_update(weighed)
+        elif len(group) > MOST:
+            return None
+        elif len(group) > 1:
+            half = len(group) // 2
+            groups += [tuple(group[half:]), tuple(group[:half])]
+        elif trial.gain > KEPT:
+            return None
+        else:
+            found.update(group)
+    return tuple(name for name in irreducible if name in found)
 
 
-def _prove_alone(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> bool:
+def _prove_alone(system: HardRowSystem, proof: Multipliers, kept: Collection[LimitName]) -> bool:
     """Whether a proof stands on these constraints alone."""
     tied, rows = system.rows_of(kept)
     return system.proves(proof.direction * tied, proof.multipliers * rows)
 
 
-def _needed(system: HardRowSystem, proof: Violation, kept: Collection[LimitName]) -> set[LimitName]:
-    """Return constraints without which the others have loads, as far as a guess shows that.
+def _needed(
+    system: HardRowSystem, proof: Multipliers, kept: Collection[LimitName]
+) -> set[LimitName]:
+    """Return constraints without which the others kept have loads, as far as guesses show that.
 
-    The rows that a proof weighs, n = (−d, λ) on M z against r, contradict each other by n · r < 0
-    alone. With the row of one constraint moved by −n · r / n_k they agree; those loads z are solved
-    for, and count if they also keep to what the others' other rows say.
+    Guessed are loads that keep to what the proof weighs of the others, then to all their rows.
     """
-    tied, mine = system.rows_of(kept)
-    rows = mine & (proof.multipliers > WEIGHS)
-    M = np.vstack([system.G[tied], system.H[rows]])
-    right = np.concatenate([system.goal[tied], system.h[rows]])
-    pull = np.concatenate([-proof.direction[tied], proof.multipliers[rows]])
-    given = [*[None] * BODY, *compress(system.given, tied[BODY:])]
-    owners = [*given, *compress(system.names, rows)]
-    tried = [name for name in kept if name in owners]
-    moved = [
-        max((k for k, owner in enumerate(owners) if owner == name), key=lambda k: abs(pull[k]))
-        for name in tried
-    ]
-    rights = np.repeat(right[:, None], len(tried), axis=1)
-    rights[moved, np.arange(len(tried))] -= (pull @ right) / pull[moved]
-    loads = np.linalg.pinv(M, rcond=RANK) @ rights
-    over = np.vstack(
-        [
-            np.abs(system.G[tied] @ loads - system.goal[tied, None]),
-            system.H[mine] @ loads - system.h[mine, None],
-        ]
-    )
-    whose = [*given, *compress(system.names, mine)]
-    found = set()
-    for i, name in enumerate(tried):
-        others = np.array([owner != name for owner in whose], dtype=bool)
-        small = np.abs(loads[:, i]).max(initial=0.0) <= UNLIMITED
-        if small and over[others, i].max(initial=0.0) <= KEPT:
-            found.add(name)
+    places = {system.constraints.index(name): name for name in kept}
+    _, mine = system.rows_of(kept)
+    whole = _Rows.of(system, kept, mine)
+    found: set[LimitName] = set()
+    for rows in (mine & (proof.multipliers > WEIGHS), mine):
+        left = [place for place, name in places.items() if name not in found]
+        guesses = _Rows.of(system, kept, rows).loads_without(left)
+        found.update(places[place] for place, loads in guesses if whole.hold(loads, place))
     return found
+
+
+class _Rows(NamedTuple):
+    """Rows M z ≤ r, the first `BODY` of them equations, and which constraint each is.
+
+    A given wrench's rows are there twice, with either sign.
+    """
+
+    M: Array
+    right: Array
+    whose: Indices
+
+    @classmethod
+    def of(cls, system: HardRowSystem, kept: Collection[LimitName], rows: Chosen) -> _Rows:
+        """Return the balance, given wrenches that are kept, and some hard rows."""
+        tied, _ = system.rows_of(kept)
+        G, goal = system.G[tied], system.goal[tied]
+        limits, given = np.split(system.owners, [len(system.h)])
+        held = given[tied[BODY:]]
+        return cls(
+            np.vstack([G, -G[BODY:], system.H[rows]]),
+            np.concatenate([goal, -goal[BODY:], system.h[rows]]),
+            np.concatenate([np.full(BODY, -1), held, held, limits[rows]]),
+        )
+
+    def hold(self, loads: Array, but: int) -> bool:
+        """Whether loads are in the box, and keep to all rows but those of one constraint."""
+        over = self.M @ loads - self.right
+        over[:BODY] = np.abs(over[:BODY])
+        over[self.whose == but] = 0.0
+        small = np.abs(loads).max(initial=0.0) <= UNLIMITED
+        return bool(small and over.max() <= KEPT)
+
+    def loads_without(self, places: Iterable[int]) -> Iterator[tuple[int, Array]]:
+        """Yield loads of all rows but those of one constraint after the other, if there are any.
+
+        With N all that the rows say of each other, N M = 0, there are loads with slack s,
+        M z = r − s, if N (r − s) is zero: a least-squares problem in nonnegative unknowns (Lawson
+        and Hanson), of few equations. Slack of what is left out may have either sign. The loads are
+        the smallest.
+        """
+        left, sizes, across = np.linalg.svd(self.M)
+        rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+        N, inverse = left[:, rank:].T, (across[:rank].T / sizes[:rank]) @ left[:, :rank].T
+        missing, above = N @ self.right, N[:, BODY:]
+        for place in places:
+            (freed,) = (self.whose == place).nonzero()
+            try:
+                shares, _ = nnls(np.hstack([above, -N[:, freed]]), missing)
+            except RuntimeError:  # it has come to no end
+                continue
+            slack = np.append(np.zeros(BODY), shares[: above.shape[1]])
+            slack[freed] -= shares[above.shape[1] :]
+            yield place, inverse @ (self.right - slack)

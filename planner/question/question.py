@@ -204,6 +204,9 @@ class Question:
         How long the answer may take [s]; as long as it takes by default.
     draws : tuple of Draw, optional
         Over which the ``spread`` is told; those of ``draws.toml`` by default.
+    explain : bool
+        Whether it is proven and told what keeps an overloaded or infeasible stance from a plan.
+        That a plan is the least, and that there is none, is always checked.
     """
 
     stance: Stance
@@ -215,6 +218,7 @@ class Question:
     present: Mapping[str, Array] = field(default_factory=dict)
     deadline: float | None = None
     draws: tuple[Draw, ...] | None = None
+    explain: bool = True
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:

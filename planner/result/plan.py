@@ -117,6 +117,7 @@ class Plan:
         What it would take off the effort, where that is what is least; tensions and torques stay
         measured by the limits as they are.
     certificate : Certificate or None
+        Why there is no plan, or none within the cap; None where that was not to be explained.
     residual : ndarray, shape (6,), or None
         Body wrench of the returned loads minus the one asked for.
     joints, joint_torque : mapping of str to ndarray, shape (n,), or None

@@ -61,6 +61,8 @@ class Route:
         Those of a hand count while it is on the rock.
     objective : {'max_margin', 'min_effort'}
         Of every stage.
+    explain : bool
+        As of every stage's question.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Route:
     load: Load = field(default_factory=Load)
     limits: Limits = field(default_factory=Limits)
     objective: Objective = "max_margin"
+    explain: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +180,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
             limits=replace(route.limits, per_hand=caps),
             want=frozenset(["load_factor"]),
             objective=route.objective,
+            explain=route.explain,
         )
         return RouteStage(index, move, phase, limb, question)
 

@@ -117,7 +117,7 @@ def explained_plan(
         hands=hands,
         prices=told.prices,
         effort_prices=None if read is None else _effort_prices(prepared, found),
-        certificate=told.proof,
+        certificate=told.proof if question.explain else None,
         residual=None if read is None else _residual(prepared, read),
         joints=None if where is None else where.angles,
         joint_torque=_joint_torque(prepared, hands),
@@ -158,10 +158,12 @@ def _of_plan(
         told = told._replace(path=path, unfinished=late("path") if path is None else ())
     if read.whole <= cap + SLACK:
         return told
+    told = told._replace(status="overloaded")
+    if not question.explain:
+        return told
     proof = overload(prepared, found, idle)
-    missing = late("certificate") if proof is None else unexplained(proof)
+    missing = late("certificate") if proof is None else unexplained(prepared, proof)
     return told._replace(
-        status="overloaded",
         reason=reason + overload_sentence(proof, floating=prepared.floating),
         proof=proof,
         unfinished=told.unfinished + missing,

@@ -43,7 +43,7 @@ def look_again(
         proof = _certify(prepared, found, None, None if given else nearest)
         if proof is not None:
             found = found._replace(outcome=replace(found.outcome, solved=False))
-            found = found.late(*unexplained(proof))
+            found = found.late(*unexplained(prepared, proof))
         return found, proof
     if found.outcome.solved or prepared.hands.floating:
         return found, None
@@ -63,8 +63,10 @@ def given_wrench(prepared: PreparedStance) -> bool:
     )
 
 
-def unexplained(proof: Certificate) -> tuple[Unfinished, ...]:
-    """Return that a proof is not explained, if it is not, and that is for the time."""
+def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinished, ...]:
+    """Return that a proof is not explained, if it was to be, and that is for the time."""
+    if not prepared.question.explain:
+        return ()
     whole = proof.irreducible is not None and proof.sufficient is not None
     return () if whole else late("explanation")
 
@@ -74,8 +76,10 @@ def _certify(
 ) -> Certificate | None:
     """Return the proof that there is no plan: at any utilisation, or within a cap."""
     spaces, data = found.sets
-    stance = data, prepared.limbs, spaces, prepared.hands.held, prepared.question.limits
-    return certify(*stance, cap, nearest=nearest, known=found.outcome)
+    question = prepared.question
+    stance = data, prepared.limbs, spaces, prepared.hands.held, question.limits
+    known = found.outcome
+    return certify(*stance, cap, nearest=nearest, known=known, explain=question.explain)
 
 
 def overload(

@@ -67,6 +67,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
         draws=_draws(request.draws),
+        explain=request.explain,
     )
 
 
@@ -89,6 +90,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         load=_load(request.load),
         limits=_limits(request.limits),
         objective=cast(Objective, request.objective),
+        explain=request.explain,
     )
 
 

@@ -19,7 +19,7 @@ from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner.result import Time
 from service.commands.interruption import Interrupted
-from service.commands.options import hand_option, json_option, robot_option
+from service.commands.options import explain_option, hand_option, json_option, robot_option
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -33,8 +33,9 @@ from service.commands.terminal import (
 )
 from service.processes import Planners, worth
 from service.replies import ErrorDetail
+from service.requests import PlanRequest
 from service.tables import console, table_of
-from service.wire import REQUEST_KINDS, Answer, Format, identifier
+from service.wire import REQUEST_KINDS, Answer, Format, decode_request, identifier
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -119,6 +120,7 @@ def _writing_replies(
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
+@explain_option
 @hand_option
 @robot_option
 @json_option
@@ -127,6 +129,7 @@ def batch(
     file: Path | None,
     resume: bool,
     workers: int | None,
+    unexplained: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -148,6 +151,8 @@ def batch(
         _check_output(file, requests, resume)
     numbers, lines = _lines(requests)
     folder = Path() if requests == "-" else Path(requests).parent
+    if unexplained:
+        lines = [_unexplained(line) for line in lines]
     told = _answered(file, lines) if resume and file is not None else []
     before, begun = len(told), perf_counter()
     try:
@@ -186,6 +191,15 @@ def _lines(source: str) -> tuple[list[int], list[bytes]]:
         raise InvalidInputError(f"{error.strerror}: {source}", field="REQUESTS") from None
     kept = [(i, line) for i, line in enumerate(data.split(b"\n"), start=1) if line.strip()]
     return [i for i, _ in kept], [line for _, line in kept]
+
+
+def _unexplained(line: bytes) -> bytes:
+    """Return a request that is not to be explained; one that is none stays as it is."""
+    try:
+        request = decode_request(line, PlanRequest, Format.JSON)
+    except CruxError:
+        return line
+    return Format.JSON.encode(msgspec.structs.replace(request, explain=False))
 
 
 def _check_output(file: Path, requests: str, resume: bool) -> None:

@@ -24,6 +24,7 @@ from service.commands.network import demo, query, serve
 from service.commands.options import (
     asked,
     draws_option,
+    explain_option,
     folder_option,
     hand_option,
     json_option,
@@ -141,6 +142,7 @@ def crux() -> None:
     help="And how far utilisation and load factor spread over what is not known of hand and rock.",
 )
 @draws_option
+@explain_option
 @hand_option
 @robot_option
 @json_option
@@ -150,6 +152,7 @@ def plan(
     robust: bool,
     spread: bool,
     draws: list[Draw] | None,
+    unexplained: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -164,6 +167,8 @@ def plan(
     request = asked(read_request(stance), hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)
+    if unexplained:
+        request = msgspec.structs.replace(request, explain=False)
     request = with_extras(request, *extras, whole=not as_json)
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
@@ -190,7 +195,7 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
-    alone = replace(request, stance=stance, want=["load_factor"], draws=[])
+    alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
     try:
         reply = answering.plan(alone, robots)
     except DeadlineError:
@@ -205,6 +210,7 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
+@explain_option
 @hand_option
 @robot_option
 @json_option
@@ -212,6 +218,7 @@ def route(
     route: str,
     folder: Path,
     workers: int | None,
+    unexplained: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -226,7 +233,10 @@ def route(
     from service.answering import robots_of
     from service.tables import print_route
 
-    climb = answering.route(asked(read_route(route), hand, robot), robots_of(robot))
+    request = asked(read_route(route), hand, robot)
+    if unexplained:
+        request = msgspec.structs.replace(request, explain=False)
+    climb = answering.route(request, robots_of(robot))
     with progress(f"planning {climb.name}") as tell:
         result = evaluate(climb, workers, tell)
     with filling_folder():

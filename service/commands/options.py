@@ -23,6 +23,7 @@ __all__ = [
     "FiniteRange",
     "asked",
     "draws_option",
+    "explain_option",
     "folder_option",
     "hand_option",
     "json_option",
@@ -140,6 +141,12 @@ hand_option = click.option(
     callback=_read_hand,
     metavar="FILE",
     help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
+)
+explain_option = click.option(
+    "--no-explain",
+    "unexplained",
+    is_flag=True,
+    help="Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
 )
 draws_option = click.option(
     "--draws",

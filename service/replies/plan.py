@@ -49,10 +49,11 @@ class PlanReply(StanceReply, kw_only=True):
     it may so be a few tenths of a percent above the least. ``joints``: the
     angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
     joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
-    would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a
-    deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
-    proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
-    ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
+    would take off the effort, where the objective is ``min_effort``. ``certificate`` is null where
+    there is a plan within the limits, and where the request says ``"explain": false``.
+    ``unfinished``: what a deadline has left out, and a warning tells: ``least_utilisation`` (that
+    no plan uses less is not proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
+    ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
     ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
     ``"want": ["spread"]``.
     """

@@ -73,6 +73,13 @@ ObjectiveName = Annotated[
         "max_reliability is not supported in this version"
     ),
 ]
+Explain = Annotated[
+    bool,
+    Meta(
+        description="whether a certificate proves what keeps the stance from a plan, and names "
+        "limits that together do; without it, the same status is there sooner"
+    ),
+]
 Want = Literal["load_factor", "prices", "model", "robust", "spread"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
@@ -171,6 +178,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
             description="over which the spread is told; by default those of draws.toml",
         ),
     ] = []
+    explain: Explain = True
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
@@ -257,6 +265,7 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     objective: ObjectiveName = "max_margin"
     limits: Limits = Limits()
     moves: Annotated[list[Move], Meta(max_length=10_000)]
+    explain: Explain = True
 
 
 def about_the_same(kind: type[Q], request: Query, **more: Any) -> Q:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -185,9 +185,9 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         conic.SOLVERS.clear()
         plan(late[number])
 
-    def heavy(number: int, twin: int, deadline: float | None) -> Question:
+    def heavy(number: int, twin: int, **more: Any) -> Question:
         asked = question_of(number, twin)
-        return replace(asked, load=replace(asked.load, mass=HEAVY), deadline=deadline)
+        return replace(asked, load=replace(asked.load, mass=HEAVY), **more)
 
     def soon(number: int) -> None:
         # on a bad moment there is not even a plan in time
@@ -197,13 +197,23 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
     count = range(rounds + WARM)
     requests = [request(number, twin=6) for number in count]
     shapes, late = [shaped(number) for number in count], [question_of(k, twin=7) for k in count]
-    overloaded = [heavy(number, 8, None) for number in count]
-    hurried = [heavy(number, 9, SOON) for number in count]
+    overloaded = [heavy(number, twin=8) for number in count]
+    hurried = [heavy(number, twin=9, deadline=SOON) for number in count]
+    untold = [heavy(number, twin=13, explain=False) for number in count]
+    light = [question_of(number, twin=14) for number in count]
     alone = race({"shape": lambda k: plan(shapes[k]), "first": first}, rounds)
     sure = [question_of(number, twin=11, want=("spread",)) for number in count]
     bare = [question_of(number, twin=12) for number in count]
     spread = race({"spread": lambda k: plan(sure[k]), "plan": lambda k: plan(bare[k])}, rounds)
-    beyond = race({"explained": lambda k: plan(overloaded[k]), "soon": soon}, rounds)
+    beyond = race(
+        {
+            "explained": lambda k: plan(overloaded[k]),
+            "untold": lambda k: plan(untold[k]),
+            "soon": soon,
+            "plan": lambda k: plan(light[k]),
+        },
+        rounds,
+    )
     among = race(
         {
             "plan": lambda k: plan(question(requests[k])),
@@ -217,9 +227,11 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         Line("new stance, after 20 ms of other work", (span(among.median("plan")), *blank)),
         Line("new stance of a shape that is new, too", (span(alone.median("shape")), *blank)),
         Line(
-            "overloaded stance, with what is in the way proven and named",
+            "overloaded stance, with what is in the way proven and named, "
+            f"{beyond.ratio('explained', 'plan'):.1f} plans",
             (span(beyond.median("explained")), *blank),
         ),
+        Line('… the same with `"explain": false`', (span(beyond.median("untold")), *blank)),
         Line(
             f"… the same with a deadline of {span(SOON)}: the explanation is left out",
             (span(beyond.median("soon")), *blank),

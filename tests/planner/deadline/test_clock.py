@@ -21,7 +21,7 @@ from hand_models.rock import Plane
 from planner import deadline, programs
 from planner.deadline import Budget, DeadlineError
 from planner.explanation import certificate
-from planner.explanation.infeasibility import vertex
+from planner.explanation.farkas_program import FarkasProgram
 from planner.floating import continuation
 from planner.prepare import prepared_stance
 from planner.programs import WRENCH_UNIT, solvers
@@ -151,11 +151,13 @@ def test_the_end_of_the_time_is_the_end_of_every_budget(clock):
 
 
 def test_no_linear_program_begins_after_the_end(clock):
-    asked = np.ones(1), (np.zeros(1), np.ones(1)), np.ones((1, 1)), np.ones(1)
-    assert vertex(*asked) is not None
+    program = FarkasProgram(np.ones((1, 1)), np.ones(1), np.ones((1, 1)), np.ones(1))
+    asked = np.ones(1, dtype=bool), np.ones(1, dtype=bool)
+    assert program.least_violation(*asked) is not None
     with deadline.within(1.0):
+        assert program.least_violation(*asked) is not None
         clock.now += 1.0
-        assert vertex(*asked) is None
+        assert program.least_violation(*asked) is None
 
 
 def test_the_error_says_how_long_and_what_was_missing_also_after_a_journey():
