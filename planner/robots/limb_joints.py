@@ -39,7 +39,7 @@ def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
     """
     joints = {joint.name: joint for joint in tree.joints.values()}
     units = {n: LOCKED_UNITS[j.type] for n, j in joints.items() if j.type in LOCKED_UNITS}
-    found = {name: joint.lower for name, joint in joints.items() if joint.lower == joint.upper}
+    found = {name: joint.lower for name, joint in joints.items() if _stuck(joint)}
     for section, name, quantity in section_table(described.locked, "locked", units):
         field = f"{section}.{name}"
         if isinstance(quantity.value, list):
@@ -53,6 +53,10 @@ def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
             )
         found[name] = value
     return found
+
+
+def _stuck(joint: JointElement) -> bool:
+    return joint.lower == joint.upper
 
 
 def limb_joints(
@@ -72,8 +76,10 @@ def limb_joints(
         with within(field):
             chains[limb] = tree.chain(body, mount.link, locked)
         if not chains[limb]:
+            stuck = [each.name for each in tree.chain(body, mount.link, ()) if _stuck(each)]
+            why = f" (the limits of {', '.join(map(repr, stuck))} are equal)" if stuck else ""
             raise InvalidInputError(
-                f"no joint moves between {body!r} and {mount.link!r}; a limb has at least one",
+                f"no joint moves between {body!r} and {mount.link!r}{why}; a limb has at least one",
                 field=field,
             )
         if len(chains[limb]) > MOST_JOINTS:

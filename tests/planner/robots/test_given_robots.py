@@ -131,6 +131,18 @@ def test_a_joint_with_equal_limits_is_fixed_there():
     check_tree(one, {"leg": np.array([0.3])})
 
 
+def test_a_limb_of_joints_whose_limits_are_equal_is_told_why_it_is_none():
+    """As where a URDF leaves limits out: it takes these for zero."""
+    text = re.sub(' type="continuous"', ' type="revolute"', TWO_LINK)
+    bare = '<limit effort="0" velocity="0"/>'
+    text = text.replace('<axis xyz="0 1 0"/></joint>', f'<axis xyz="0 1 0"/>{bare}</joint>')
+    text = text.replace('lower="-2.5" upper="2.5" ', "")
+    assert refusal(limbs_toml("walker", {"leg": "foot"}), text) == (
+        "limbs.leg.link: no joint moves between 'trunk' and 'foot' (the limits of 'hip', 'knee' "
+        "are equal); a limb has at least one"
+    )
+
+
 def test_a_waist_is_locked_where_the_file_says():
     """As good as a waist that is drawn there, with each joint's turn or shift in its origin."""
     walker = robot(ARMS + LOCKED, WAIST)
