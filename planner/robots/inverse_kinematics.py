@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
-from planner.robots.nearest_pose import PLACED, angles_near, lacking
+from planner.robots.nearest_pose import PLACED, angles_near, lacking, starts_beside
 from planner.robots.pose_search import TOLERANCE, find_angles
 from planner.robots.robot import Robot
 from planner.robots.torque_lowering import lower_torques
@@ -91,11 +91,12 @@ def solve_limbs(
     for i in np.flatnonzero(~solved).tolist():
         deadline.check("it was known how far a hand is out of reach")
         limb = batch.limbs[i]
-        nearest = None if near is None else angles_near(batch, i, found[limb], near)
+        alone, starts = starts_beside(batch, i, found[limb])
+        nearest = None if near is None else angles_near(alone, starts, near)
         if nearest is not None:
             approached[limb] = nearest
             continue
-        missing[limb], angle = lacking(batch, i, found[limb])
+        missing[limb], angle = lacking(alone, starts)
         if angle is not None:
             turned[limb] = angle
     if missing:
