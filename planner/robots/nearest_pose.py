@@ -29,6 +29,9 @@ DAMPED: Final = 8
 STARTS: Final = 8
 """So many of them, the nearest, are followed to the end."""
 
+TOLD: Final = 4
+"""From so many starts what is missing is told: there it decides nothing."""
+
 STEPS: Final = 150
 """Most steps from a start."""
 
@@ -120,7 +123,7 @@ def angles_near(
 def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | None]:
     """Return what a limb's pose lacks that no joint angles give.
 
-    From every start, the hand is put in its place and turned as far as that lets it; and it is
+    From the first starts, the hand is put in its place and turned as far as that lets it; and it is
     turned as asked and brought as near as that lets it.
 
     Parameters
@@ -140,7 +143,7 @@ def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | No
         [rad].
     """
     (way, turn), (near, askew) = (
-        min(_ends(limb, starts, weights), key=lambda end: end.measure).off.tolist()
+        min(_ends(limb, starts[:TOLD], weights), key=lambda end: end.measure).off.tolist()
         for weights in (np.array([FIRST**2, 1.0]), np.array([1.0, FIRST**2]))
     )
     # without a posture that is turned as asked, what is told is how far away the place is
