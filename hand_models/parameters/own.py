@@ -44,7 +44,8 @@ def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTa
     Parameters
     ----------
     path : Path
-        TOML in the form of ``hand.toml``, with none but the entries that differ.
+        TOML in the form of ``hand.toml``, with none but the entries that differ. Bare numbers are
+        in the units of ``hand.toml``, and `assumed`.
     base : ParameterTable, optional
         The hand that they are to change; the bundled one by default.
 
@@ -58,7 +59,7 @@ def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTa
     InvalidInputError
         In one line that names file, entry and value.
     """
-    own = ParameterTable.load(path)
+    own = ParameterTable.load(path, hand_table().units)
     try:
         own_hand(own, base)
     except InvalidInputError as error:

@@ -35,6 +35,9 @@ __all__ = [
 
 Source = Literal["paper", "measured", "calibrated", "assumed"]
 
+Units = Mapping[str, Mapping[str, str]]
+"""By section and name."""
+
 ENTRY: Final = "{ value, unit, source, note (optional) }"
 """Form of an entry."""
 
@@ -84,8 +87,8 @@ class ParameterTable:
         self.sections = {name: dict(section) for name, section in sections.items()}
 
     @classmethod
-    def read(cls, text: str, origin: str) -> ParameterTable:
-        """Parse a parameter file.
+    def read(cls, text: str, origin: str, units: Units | None = None) -> ParameterTable:
+        """Parse a parameter file, with bare numbers as in `of`.
 
         Raises
         ------
@@ -93,15 +96,22 @@ class ParameterTable:
             If the text is not TOML or an entry is not a quantity of finite numbers.
         """
         try:
-            return cls.of(tomllib.loads(text))
+            return cls.of(tomllib.loads(text), units)
         except (ValueError, InvalidInputError) as error:
             raise InvalidInputError(str(error), field=origin) from None
         except RecursionError:
             raise InvalidInputError("is nested too deep", field=origin) from None
 
     @classmethod
-    def of(cls, raw: Mapping[str, Any]) -> ParameterTable:
+    def of(cls, raw: Mapping[str, Any], units: Units | None = None) -> ParameterTable:
         """Take quantities as TOML or JSON has them.
+
+        Parameters
+        ----------
+        raw : mapping of str to object
+        units : mapping of str to mapping of str to str, optional
+            By section and name. Entries may then be bare numbers, or lists of numbers: in this
+            unit (1 for an entry that has none here), and `assumed`.
 
         Raises
         ------
@@ -113,12 +123,13 @@ class ParameterTable:
             if not isinstance(entries, Mapping):
                 raise InvalidInputError("a section of entries is needed", field=section)
             sections[section] = {
-                name: _quantity(entry, f"{section}.{name}") for name, entry in entries.items()
+                name: _quantity(entry, f"{section}.{name}", _unit(units, section, name))
+                for name, entry in entries.items()
             }
         return cls(sections)
 
     @classmethod
-    def load(cls, path: Path) -> ParameterTable:
+    def load(cls, path: Path, units: Units | None = None) -> ParameterTable:
         """Read a parameter file from disk; raises what `read` raises, also if there is none."""
         try:
             text = path.read_text(encoding="utf-8")
@@ -126,7 +137,15 @@ class ParameterTable:
             raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
         except UnicodeDecodeError:
             raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
-        return cls.read(text, str(path))
+        return cls.read(text, str(path), units)
+
+    @property
+    def units(self) -> dict[str, dict[str, str]]:
+        """By section and name."""
+        return {
+            section: {name: quantity.unit for name, quantity in quantities.items()}
+            for section, quantities in self.sections.items()
+        }
 
     def quantity(self, section: str, name: str) -> Quantity:
         """Return one quantity.
@@ -196,7 +215,15 @@ class ParameterTable:
         )
 
 
-def _quantity(raw: Any, field: str) -> Quantity:
+def _unit(units: Units | None, section: str, name: str) -> str | None:
+    return None if units is None else units.get(section, {}).get(name, "1")
+
+
+def _quantity(raw: Any, field: str, unit: str | None) -> Quantity:
+    """Return an entry; ``unit``: of a bare number, None where there may be none."""
+    # to Python a truth value is a number
+    if unit is not None and isinstance(raw, int | float | list) and not isinstance(raw, bool):
+        raw = {"value": raw, "unit": unit, "source": "assumed"}
     try:
         quantity = msgspec.convert(raw, Quantity)
     except msgspec.ValidationError as error:

@@ -27,6 +27,7 @@ from .sentences import (
     UNPROVEN as UNPROVEN,
     constraint_words as constraint_words,
     limit_sentence as limit_sentence,
+    off_sentences as off_sentences,
     overload_sentence as overload_sentence,
     shortfall_sentence as shortfall_sentence,
     warnings as warnings,

@@ -13,7 +13,7 @@ from hand_models.fixed_wrist import HAND_LOAD
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from planner.explanation.active_limits import LimitUse
 from planner.explanation.infeasibility import HELD_WRENCH
-from planner.prepare import FORCE_CAP, TENSION_CHANGE, HandBatch
+from planner.prepare import FORCE_CAP, TENSION_CHANGE, HandBatch, Posture
 from planner.programs import JOINT_TORQUE, WRENCH_UNIT
 from planner.question import Stance
 from planner.result import Certificate, HandPlan, LimitName
@@ -25,6 +25,7 @@ __all__ = [
     "blocking_sentence",
     "constraint_words",
     "limit_sentence",
+    "off_sentences",
     "overload_sentence",
     "shortfall_sentence",
     "warnings",
@@ -332,6 +333,16 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     for i in sorted(first.values()):
         found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
     return tuple(found)
+
+
+def off_sentences(where: Posture | None) -> tuple[str, ...]:
+    """Return which hands no joint angles put exactly where they hold, and how near some come."""
+    off = {} if where is None else where.off
+    return tuple(
+        f"{limb}: no joint angles put its hand exactly there; the nearest, which are taken, put it "
+        f"{way:.2g} m away and turn it by {turned:.2g} rad"
+        for limb, (way, turned) in off.items()
+    )
 
 
 def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:

@@ -1,14 +1,14 @@
 """Where the joints of a stance are, what they bear without hands, and what the robot weighs there.
 
-Angles are given, or found by inverse kinematics from the hands' poses; limbs without a hand or an
-angle are at their zero. Torques and the weight are those of one Newton–Euler pass over the whole
-robot, its body accelerated and its joints at rest.
+Angles are given, or found by inverse kinematics from the hands' poses; hands may be a little off
+these. Limbs without a hand or an angle are at their zero. Torques and the weight are those of one
+Newton–Euler pass over the whole robot, its body accelerated and its joints at rest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -22,10 +22,13 @@ from planner.robots import UnreachableError, solve_limbs
 __all__ = ["Posture", "posture"]
 
 OFF: Final = 0.01
-"""How far a hand's pose may be from where given joints put it [m]."""
+"""How far a hand's pose may be from where its joints put it [m]."""
 
 TURNED: Final = 0.05
 """How far its axes may be turned from those [rad]."""
+
+EXACT: Final = 5e-6
+"""Up to so far [m], and so much turned [rad], joints that were found put a hand at its pose."""
 
 BEYOND: Final = 1e-6
 """How far a given angle may be beyond its joint's limit [rad]."""
@@ -43,11 +46,15 @@ class Posture:
         What every limb's joints bear.
     body_wrench : ndarray, shape (6,)
         That the rock must exert on the robot for its own weight and acceleration, in B.
+    off : mapping of str to tuple of float, float
+        By limb, of those whose pose no joint angles were found for, only some near it: how far its
+        hand is off there [m], and by how much it is turned [rad].
     """
 
     angles: Mapping[str, Array]
     joints: Mapping[str, JointLoads]
     body_wrench: Array
+    off: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def idle(self, stance: Stance) -> dict[str, JointLoads]:
         """Return what the joints bear of limbs that have no hand in a stance."""
@@ -73,12 +80,12 @@ def posture(question: Question) -> Posture | None:
     body = stance.body.inverse()
     poses = {hand.limb: body @ hand.pose for hand in stance.hands}
     gravity, acceleration = gravity_and_acceleration(question)
-    angles: Mapping[str, Array]
     if isinstance(stance.joints, str):
         angles = _solved(question, poses, gravity - acceleration[:3])
-    else:
-        angles = _given(stance, stance.joints, poses)
-    return posture_at(question, angles)
+        off = _off(stance, angles, poses)
+        far = {limb: each for limb, each in off.items() if max(each) > EXACT}
+        return replace(posture_at(question, angles), off=far)
+    return posture_at(question, _given(stance, stance.joints, poses))
 
 
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
@@ -147,15 +154,13 @@ def _given(
                     f"{chain.joints[i]} goes from {least:.6g} to {most:.6g} rad, got {angle:.6g}",
                     field=f"stance.joints.{limb}[{i}]",
                 )
-    there = stance.robot.hand_poses(joints)
-    for i, (limb, pose) in enumerate(poses.items()):
+    for limb in poses:
         if limb not in joints:
             raise InvalidInputError(
                 f"missing for {limb}, which holds on; valid are all limbs with a hand, or 'solve'",
                 field="stance.joints",
             )
-        off = float(np.linalg.norm(pose.position - there[limb].position))
-        turned = Rotation.from_matrix(there[limb].rotation.T @ pose.rotation).magnitude()
+    for i, (limb, (off, turned)) in enumerate(_off(stance, joints, poses).items()):
         if off > OFF or turned > TURNED:
             raise InvalidInputError(
                 f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
@@ -163,6 +168,20 @@ def _given(
                 field=f"stance.hands[{i}].pose",
             )
     return joints
+
+
+def _off(
+    stance: Stance, angles: Mapping[str, Array], poses: Mapping[str, Pose]
+) -> dict[str, tuple[float, float]]:
+    """Return how far joints put hands from their poses in B [m], and turned by how much [rad]."""
+    there = stance.robot.hand_poses(angles)
+    return {
+        limb: (
+            float(np.linalg.norm(pose.position - there[limb].position)),
+            float(Rotation.from_matrix(there[limb].rotation.T @ pose.rotation).magnitude()),
+        )
+        for limb, pose in poses.items()
+    }
 
 
 def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> dict[str, Array]:
@@ -173,7 +192,7 @@ def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> di
         limb: np.concatenate([pose.rotation.T @ force, np.zeros(3)]) for limb, pose in poses.items()
     }
     try:
-        return solve_limbs(robot, poses, shares, gravity)
+        return solve_limbs(robot, poses, shares, gravity, (OFF, TURNED))
     except UnreachableError as error:
         index = list(poses).index(next(iter(error.missing)))
         error.field = f"stance.hands[{index}].pose"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final
@@ -11,16 +11,17 @@ import numpy as np
 import pinocchio as pin
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, within
+from planner.robots.limb_joints import limb_joints, locked_joints
 from planner.robots.robot_file import Mount, RobotDescription
-from planner.robots.urdf import JointElement, Urdf, parse_urdf
+from planner.robots.urdf import JointElement, parse_urdf
 
 __all__ = ["Chain", "build_model", "pose_of"]
 
 ROOT_JOINT: Final = 1
 """Index of the joint that lets the whole robot move freely, in Pinocchio's model."""
 
-MOST_JOINTS: Final = 64
-"""More joints of a limb than this no request names."""
+ROOT_NAME: Final = "free body\x01"
+"""Its name, which no joint of a URDF can have: XML does not allow its last character."""
 
 ON_AXIS: Final = 1e-9
 """How far from a joint's axis the next joint may be and still count as on it [m]."""
@@ -80,41 +81,12 @@ def pose_of(placement: Any) -> Pose:
     return Pose(np.array(placement.translation), np.array(placement.rotation))
 
 
-def _limb_joints(
-    tree: Urdf, body: str, mounts: Mapping[str, Mount]
-) -> dict[str, tuple[JointElement, ...]]:
-    """Return every limb's joints; refuse limbs without any, and limbs that share some."""
-    chains: dict[str, tuple[JointElement, ...]] = {}
-    owner: dict[str, str] = {}
-    for limb, mount in mounts.items():
-        field = f"limbs.{limb}.link"
-        with within(field):
-            chain = tree.chain(body, mount.link)
-        if not chain:
-            raise InvalidInputError(
-                f"no joint moves between {body!r} and {mount.link!r}; a limb has at least one",
-                field=field,
-            )
-        if len(chain) > MOST_JOINTS:
-            raise InvalidInputError(
-                f"a limb has at most {MOST_JOINTS} joints, got {len(chain)}", field=field
-            )
-        for joint in chain:
-            other = owner.setdefault(joint.name, limb)
-            if other != limb:
-                raise InvalidInputError(
-                    f"limbs {other!r} and {limb!r} share joint {joint.name!r}; every limb needs "
-                    "joints of its own",
-                    field=field,
-                )
-        chains[limb] = chain
-    return chains
-
-
 def build_model(
     urdf: str, described: RobotDescription, hand_mass: float
-) -> tuple[Any, Pose, dict[str, Chain]]:
-    """Return Pinocchio's model of a robot that floats, with its hands, other joints at zero.
+) -> tuple[Any, Pose, dict[str, Chain], dict[str, float]]:
+    """Return Pinocchio's model of a robot that floats, with its hands.
+
+    Joints that no limb has are where they are locked, or at zero.
 
     Returns
     -------
@@ -123,6 +95,8 @@ def build_model(
         B in the root link.
     chains : dict of str to Chain
         By limb.
+    locked : dict of str to float
+        Where joints are that never move, by name [rad, or m].
 
     Raises
     ------
@@ -136,23 +110,50 @@ def build_model(
         tree.require(described.body)
     if not any(link.mass > 0.0 for link in tree.links.values()):
         raise InvalidInputError("no link has a mass; at least one must", field="urdf")
-    joints = _limb_joints(tree, described.body, described.mounts)
+    locked = locked_joints(tree, described)
+    joints = limb_joints(tree, described, locked)
     try:
-        whole = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), "free body")
+        whole = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), ROOT_NAME)
     except (ValueError, RuntimeError) as error:
         raise InvalidInputError(
             f"Pinocchio cannot read it: {' '.join(str(error).split())}", field="urdf"
         ) from None
-    kept = {joint.name for chain in joints.values() for joint in chain}
-    locked = [i for i in range(ROOT_JOINT + 1, whole.njoints) if whole.names[i] not in kept]
-    model = pin.buildReducedModel(whole, locked, pin.neutral(whole))
+    model = _reduced(whole, {joint.name for chain in joints.values() for joint in chain}, locked)
     model.gravity.setZero()  # gravity comes as an acceleration of the root, so that it may vary
     root = pose_of(model.frames[model.getFrameId(described.body, pin.FrameType.BODY)].placement)
     chains = {
         limb: _mounted(model, root, limb, mount, joints[limb], hand_mass)
         for limb, mount in described.mounts.items()
     }
-    return model, root, chains
+    return model, root, chains, locked
+
+
+def _reduced(whole: Any, kept: Collection[str], locked: Mapping[str, float]) -> Any:
+    """Return Pinocchio's model of the joints that are kept; all others stay where they are.
+
+    `buildReducedModel` looks up frames by name alone, whatever they are frames of. URDF lets a
+    link have the name of a joint, so meanwhile names tell what they are names of.
+    """
+    q, others = pin.neutral(whole), []
+    for i in range(ROOT_JOINT + 1, whole.njoints):
+        joint, name = whole.joints[i], whole.names[i]
+        if name not in kept:
+            others.append(i)
+        if name in locked:
+            value = locked[name]
+            q[joint.idx_q : joint.idx_q + joint.nq] = (
+                (np.cos(value), np.sin(value)) if joint.nq == 2 else value
+            )
+        whole.names[i] = f"joint {name}"
+    for frame in list(whole.frames)[ROOT_JOINT + 1 :]:
+        kind = "link" if frame.type == pin.FrameType.BODY else "joint"
+        frame.name = f"{kind} {frame.name}"
+    model = pin.buildReducedModel(whole, others, q)
+    for i in range(ROOT_JOINT + 1, model.njoints):
+        model.names[i] = model.names[i].removeprefix("joint ")
+    for frame in list(model.frames)[ROOT_JOINT + 1 :]:
+        frame.name = frame.name.partition(" ")[2]
+    return model
 
 
 def _mounted(
@@ -164,7 +165,8 @@ def _mounted(
     hand_mass: float,
 ) -> Chain:
     """Put a hand on its link in Pinocchio's model, and return the limb that it is on."""
-    ids = tuple(model.getJointId(joint.name) for joint in elements)
+    names = list(model.names)
+    ids = tuple(names.index(joint.name, ROOT_JOINT + 1) for joint in elements)
     joints = [model.joints[i] for i in ids]
     # limbs share no joints and the others are locked, so a limb's joints follow each other
     columns = slice(joints[0].idx_v, joints[-1].idx_v + 1)

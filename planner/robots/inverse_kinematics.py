@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Final
+from collections.abc import Mapping
 
 import numpy as np
-import pinocchio as pin
-from scipy.optimize import least_squares
+from numpy.typing import NDArray
 
 from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
-from planner.robots.pose_search import TOLERANCE, find_angles, starts_near
+from planner.robots.nearest_pose import PLACED, angles_near, lacking, starts_beside
+from planner.robots.pose_search import TOLERANCE, find_angles
 from planner.robots.robot import Robot
 from planner.robots.torque_lowering import lower_torques
 
 __all__ = ["UnreachableError", "solve_limbs"]
-
-STARTS: Final = 2
-"""Postures from which a pose out of reach is approached, beside the best found."""
-
-FIRST: Final = 300.0
-"""How much heavier what comes first counts than what comes second."""
-
-STEPS: Final = 40
-"""Most steps from a start."""
-
-PLACED: Final = 1e-3
-"""Distance up to which a hand counts as in its place [m]."""
-
-TURNED: Final = 2e-3
-"""Angle up to which it counts as turned as asked [rad]."""
 
 
 class UnreachableError(InvalidInputError):
@@ -69,7 +53,11 @@ class UnreachableError(InvalidInputError):
 
 
 def solve_limbs(
-    robot: Robot, poses: Mapping[str, Pose], loads: Mapping[str, Array], gravity: Array
+    robot: Robot,
+    poses: Mapping[str, Pose],
+    loads: Mapping[str, Array],
+    gravity: Array,
+    near: tuple[float, float] | None = None,
 ) -> dict[str, Array]:
     """Return joint angles for poses of the hands, within the joints' limits, shape (n,) each [rad].
 
@@ -85,83 +73,51 @@ def solve_limbs(
         Wrench that a hand is to exert on the rock, in H [N, N·m]; none where it is left out.
     gravity : ndarray, shape (3,)
         In B [m/s²]. Without gravity and loads there is no torque to lower.
+    near : tuple of float, float, optional
+        Distance [m] and angle [rad] up to which a hand may be off a pose that no angles solve; then
+        it is put where it comes nearest, as if that were its pose. By default it may not be off.
 
     Raises
     ------
     UnreachableError
-        That names every limb whose pose is not solved.
+        That names every limb whose pose is not solved, nor come near to.
     DeadlineError
         If the time is over before.
     """
     batch = LimbBatch(robot, poses, loads, gravity)
-    angles = lower_torques(batch, find_angles(batch))
-    solved = np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCE
-    if solved.all():
-        parts = zip(poses, angles, batch.joints, strict=True)
-        return {limb: mine[:n] for limb, mine, n in parts}
-    missing, turned = {}, {}
+    angles, solved = _solved(batch)
+    found = {limb: angles[i, : batch.joints[i]] for i, limb in enumerate(poses)}
+    missing, turned, approached = {}, {}, {}
     for i in np.flatnonzero(~solved).tolist():
         deadline.check("it was known how far a hand is out of reach")
         limb = batch.limbs[i]
-        missing[limb], angle = _lacking(batch, i, angles[i, : batch.joints[i]])
+        alone, starts = starts_beside(batch, i, found[limb])
+        nearest = None if near is None else angles_near(alone, starts, near)
+        if nearest is not None:
+            approached[limb] = nearest
+            continue
+        missing[limb], angle = lacking(alone, starts)
         if angle is not None:
             turned[limb] = angle
-    raise UnreachableError(missing, turned)
+    if missing:
+        raise UnreachableError(missing, turned)
+    return found | (_lowered(batch, approached) if approached else {})
 
 
-def _lacking(batch: LimbBatch, i: int, best: Array) -> tuple[float, float | None]:
-    """Return what a pose lacks that no joint angles give.
+def _solved(batch: LimbBatch) -> tuple[Array, NDArray[np.bool_]]:
+    """Return angles (L, m) with low torques, and which limbs' poses they solve, shape (L,)."""
+    angles = lower_torques(batch, find_angles(batch))
+    return angles, np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCE
 
-    From several starts, the hand is put in its place and turned as far as that lets it; and it is
-    turned as asked and brought as near as that lets it.
 
-    Returns
-    -------
-    missing : float
-        How far away the hand stays, turned as asked if it can be, and not less than the pose is
-        beyond the stretched limb [m].
-    turned : float or None
-        Where the place is within reach, but not with these axes: the angle that is missing there
-        [rad].
+def _lowered(batch: LimbBatch, angles: Mapping[str, Array]) -> dict[str, Array]:
+    """Return angles that put hands where these do, found as if that had been asked for.
+
+    So a pose a little beyond reach is held as one that is just within.
     """
-    part = batch.part(np.array([i]))
-    starts = [best, *starts_near(batch, i, 0)[:STARTS, : batch.joints[i]]]
-    place, turn = _nearest(part, starts, FIRST, 1.0)
-    way, askew = _nearest(part, starts, 1.0, FIRST)
-    # without a posture that is turned as asked, what is told is how far away the place is
-    missing = way if askew <= TURNED else place
-    beyond = float(batch.beyond[i])
-    if beyond > 0.0 and missing <= beyond + PLACED:
-        missing = beyond
-    return missing, turn if place <= PLACED else None
-
-
-def _nearest(
-    limb: LimbBatch, starts: Sequence[Array], place: float, turn: float
-) -> tuple[float, float]:
-    """Return a hand's distance [m] and angle [rad] where their weighted sum of squares is least."""
-    (pose,), (reach,) = limb.poses.values(), limb.reach.tolist()
-
-    def weighed(angles: Array) -> Array:
-        way, turned = limb.errors(angles[None, None])[0].reshape(2, 3)
-        return np.concatenate([place * reach * _axes(pose, turned) @ way, turn * turned])
-
-    def slope(angles: Array) -> Array:
-        errors, jacobians = limb.errors(angles[None, None])
-        turned, (linear, angular) = errors[0, 0, 3:], np.split(jacobians[0, 0], 2)
-        # Jₗ⁻¹(r), which is Jᵣ⁻¹(r)ᵀ, is how a rotation vector r changes with a rotation before it
-        turning = pin.Jlog3(pin.exp3(turned)).T
-        return -np.vstack([place * reach * _axes(pose, turned) @ linear, turn * turning @ angular])
-
-    low, high = limb.lower[0], limb.upper[0]
-    ends = [
-        least_squares(weighed, np.clip(start, low, high), slope, bounds=(low, high), max_nfev=STEPS)
-        for start in starts
-    ]
-    way, turned = weighed(min(ends, key=lambda end: float(end.cost)).x).reshape(2, 3)
-    return float(np.linalg.norm(way)) / place, float(np.linalg.norm(turned)) / turn
-
-
-def _axes(pose: Pose, turned: Array) -> Array:
-    """Return a hand's axes in B, shape (3, 3), that lack a turn (3,) in H to those of a pose."""
-    return np.asarray(pose.rotation @ pin.exp3(-turned))
+    robot = batch.robot
+    there = robot.hand_poses(angles)
+    again = LimbBatch(robot, {limb: there[limb] for limb in angles}, batch.loads, batch.gravity)
+    found, solved = _solved(again)
+    parts = zip(angles.items(), found, solved, again.joints, strict=True)
+    return {limb: mine[:n] if met else given for (limb, given), mine, met, n in parts}

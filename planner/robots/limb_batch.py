@@ -46,6 +46,8 @@ class LimbBatch:
         [m]
     beyond : ndarray, shape (L,)
         How far each pose is out of reach of the limb, stretched out [m]; zero if it is not.
+    levers : ndarray, shape (L,)
+        Distance of H from the end of the limb, up to which its reach goes [m].
     """
 
     def __init__(
@@ -63,6 +65,8 @@ class LimbBatch:
             self.upper[i, :n] = chain.upper
             self._limits[i, :n] = chain.torque_limits
         self.reach = np.array([chain.reach for chain in self._chains])
+        mounts = robot.description.mounts
+        self.levers = np.array([np.linalg.norm(mounts[limb].pose.position) for limb in poses])
         stretches = robot.stretches(Pose.identity(), self.limbs, list(poses.values()))
         beyond = (np.array(stretches) - 1.0) * self.reach
         self.beyond = np.where(beyond > ROUNDING * self.reach, beyond, 0.0)

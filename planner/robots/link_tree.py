@@ -61,12 +61,17 @@ class LinkTree:
             self._beyond[[index[name] for name in trail], index[trail[0]]] = 1.0
 
     def places(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """Return every link in B, for angles by the joints' names; joints left out are at zero."""
+        """Return every link in B, for angles by the joints' names.
+
+        Joints left out are where they are locked, or at zero.
+        """
         found = {self.links[0].name: Pose.identity()}
-        rotations = [angles.get(joint.name, 0.0) * joint.axis for joint in self._joints]
-        turns = Rotation.from_rotvec(rotations).as_matrix()
-        for joint, turn in zip(self._joints, turns, strict=True):
-            at = Pose(joint.place.position, joint.place.rotation @ turn)
+        where = {**self.robot.locked, **angles}
+        moved = np.array([where.get(joint.name, 0.0) * joint.axis for joint in self._joints])
+        slides = np.array([[joint.type == "prismatic"] for joint in self._joints])
+        turns = Rotation.from_rotvec(np.where(slides, 0.0, moved)).as_matrix()
+        for joint, turn, shift in zip(self._joints, turns, moved * slides, strict=True):
+            at = joint.place @ Pose(shift, turn)
             found[joint.child] = found[joint.parent] @ at
         from_body = found[self.robot.description.body].inverse()
         return {name: from_body @ pose for name, pose in found.items()}

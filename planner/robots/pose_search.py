@@ -19,7 +19,7 @@ from planner import deadline
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.robot import Robot
 
-__all__ = ["TOLERANCE", "damped_step", "find_angles", "starts_near"]
+__all__ = ["TOLERANCE", "damped_step", "find_angles", "postures_near"]
 
 EYE: Final = np.eye(6)
 
@@ -73,7 +73,7 @@ def find_angles(batch: LimbBatch) -> Array:
         left = np.flatnonzero((least > TOLERANCE) & ((batch.beyond <= 0.0) | np.isinf(least)))
         if not len(left):
             break
-        starts = np.stack([starts_near(batch, int(i), k) for i in left], axis=1)
+        starts = np.stack([_starts_near(batch, int(i), k) for i in left], axis=1)
         part = batch.part(left)
         angles, size = _follow(part, starts[:, :, : part.shape[1]])
         better = size < least[left]
@@ -125,14 +125,19 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     return np.asarray(np.minimum(np.maximum(moved, batch.lower), batch.upper))
 
 
-def starts_near(batch: LimbBatch, i: int, k: int) -> Array:
+def _starts_near(batch: LimbBatch, i: int, k: int) -> Array:
     """Return a limb's angles to start from in round k, shape (S, m), the most promising first."""
+    starts = np.zeros((ABREAST, batch.shape[1]))
+    starts[:, : batch.joints[i]] = postures_near(batch, i, ABREAST * (k + 1))[-ABREAST:]
+    return starts
+
+
+def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
+    """Return so many angles of limb i that put its hand near its pose, shape (count, n)."""
     limb = batch.limbs[i]
     samples, tree = _postures(batch.robot)[limb]
-    _, nearest = tree.query(_place(batch.poses[limb], batch.reach[i]), ABREAST * (k + 1))
-    starts = np.zeros((ABREAST, batch.shape[1]))
-    starts[:, : batch.joints[i]] = samples[nearest[-ABREAST:]]
-    return starts
+    _, nearest = tree.query(_place(batch.poses[limb], batch.reach[i]), count)
+    return np.asarray(samples[nearest])
 
 
 @lru_cache(maxsize=32)

@@ -44,8 +44,9 @@ class Robot:
     """A climbing robot: a body and its limbs, each a chain of turning joints that ends in a hand.
 
     Angles are always a mapping of limb to an array (n,) [rad], from the body outward; limbs that
-    are left out are at zero. Joints of the URDF that no limb has are locked at zero. A hand counts
-    as a point mass. Threads may share a robot.
+    are left out are at zero. Joints of the URDF that no limb has are where the robot's file locks
+    them, or their limits; otherwise at zero. A hand counts as a point mass. Threads may share a
+    robot.
 
     Parameters
     ----------
@@ -75,6 +76,8 @@ class Robot:
         Pinocchio's; the body floats, with its root link at the origin.
     root : Pose
         B in the root link.
+    locked : dict of str to float
+        Where joints are that never move, by name [rad, or m].
 
     Raises
     ------
@@ -85,7 +88,7 @@ class Robot:
 
     def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
         self.description, self.urdf, self.hand = description, urdf, hand
-        self.model, self.root, self.chains = build_model(urdf, description, hand.mass)
+        self.model, self.root, self.chains, self.locked = build_model(urdf, description, hand.mass)
         self._local = threading.local()
         self._from_root = self.root.inverse()
         self._to_body = wrench_transport(self._from_root)

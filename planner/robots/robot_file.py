@@ -2,7 +2,9 @@
 
 TOML in the form of ``parameters/robosimian.toml``: ``name``, ``urdf`` (a path, from the file's
 folder) and ``body`` (a link), then numbers with unit and source. ``[limbs.NAME]`` names the
-``link`` that carries a limb's hand; ``[every_limb]`` has what limbs do not say themselves.
+``link`` that carries a limb's hand; ``[every_limb]`` has what limbs do not say themselves;
+``[locked]`` has joints that do not move, and where they are. A bare number, or list of numbers, is
+in the SI unit of its entry, and `assumed`.
 """
 
 from __future__ import annotations
@@ -18,13 +20,16 @@ from typing import Any, Final
 from hand_models.base import InvalidInputError, Pose, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 
-__all__ = ["Mount", "RobotDescription", "RobotFile"]
+__all__ = ["Mount", "RobotDescription", "RobotFile", "section_table"]
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 """What a robot and a limb may be called: their names are part of keys."""
 
 TEXTS: Final = ("name", "urdf", "body")
 """Entries of the file that are plain text."""
+
+SECTIONS: Final = ("robot", "locked", "every_limb", "limbs")
+"""Its sections."""
 
 ROBOT_UNITS: Final = {"com": "m"}
 """Entries of the whole robot, by name, with their units."""
@@ -120,6 +125,9 @@ class RobotDescription:
         Centre of mass in B [m] while no joint angles are given.
     mounts : mapping of str to Mount
         By limb.
+    locked : mapping of str to object
+        Where joints are that do not move, by name, as the file has them: their units are known
+        with the URDF only.
     """
 
     name: str
@@ -127,6 +135,7 @@ class RobotDescription:
     body: str
     com: tuple[float, ...] | None
     mounts: Mapping[str, Mount]
+    locked: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
@@ -144,13 +153,13 @@ class RobotDescription:
         called, urdf, body = (_string(raw.get(name), name) for name in TEXTS)
         _named(called, "name")
         for name in raw:
-            if name not in (*TEXTS, "robot", "every_limb", "limbs"):
-                raise InvalidInputError(
-                    f"unknown; known are {', '.join(TEXTS)}, robot, every_limb, limbs", field=name
-                )
-        whole = _table(raw.get("robot", {}), "robot", ROBOT_UNITS)
+            if name not in (*TEXTS, *SECTIONS):
+                known = ", ".join((*TEXTS, *SECTIONS))
+                raise InvalidInputError(f"unknown; known are {known}", field=name)
+        whole = section_table(raw.get("robot", {}), "robot", ROBOT_UNITS)
+        locked = _mapping(raw.get("locked", {}), "locked")
         every = _mapping(raw.get("every_limb", {}), "every_limb")
-        _table(every, "every_limb", LIMB_UNITS)
+        section_table(every, "every_limb", LIMB_UNITS)
         limbs = _mapping(raw.get("limbs", {}), "limbs")
         if not 1 <= len(limbs) <= MOST_LIMBS:
             raise InvalidInputError(
@@ -163,9 +172,10 @@ class RobotDescription:
             _named(limb, "limbs")
             entries = dict(_mapping(entries, section))
             link = _string(entries.pop("link", None), f"{section}.link")
-            mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
+            both = {**every, **entries}
+            mounts[limb] = _mount(link, section_table(both, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(called, urdf, body, com, mounts)
+        return cls(called, urdf, body, com, mounts, locked)
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -202,16 +212,30 @@ def _mapping(value: Any, field: str) -> Mapping[str, Any]:
     return value
 
 
-def _table(entries: Any, section: str, units: Mapping[str, str]) -> ParameterTable:
-    """Return a section's quantities; refuse unknown names and other units."""
+def section_table(entries: Any, section: str, units: Mapping[str, str]) -> ParameterTable:
+    """Return a section's quantities.
+
+    Parameters
+    ----------
+    entries : mapping of str to object
+        As TOML has them: quantities, or bare numbers and lists of numbers, which are in the
+        entry's unit and `assumed`.
+    section : str
+    units : mapping of str to str
+        Of all entries that there may be.
+
+    Raises
+    ------
+    InvalidInputError
+        If an entry is none of these, or in another unit.
+    """
     entries = _mapping(entries, section)
     for name in entries:
         if name not in units:
             link = "link, " if section.startswith("limbs.") else ""
-            raise InvalidInputError(
-                f"unknown entry; known are {link}{', '.join(units)}", field=f"{section}.{name}"
-            )
-    table = ParameterTable.of({section: entries})
+            known = shorten(f"{link}{', '.join(units)}", LONGEST_QUOTE, placeholder=" …")
+            raise InvalidInputError(f"unknown entry; known are {known}", field=f"{section}.{name}")
+    table = ParameterTable.of({section: entries}, {section: units})
     for _, name, quantity in table:
         if quantity.unit != units[name]:
             unit = shorten(quantity.unit, LONGEST_QUOTE, placeholder=" …")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from textwrap import shorten
@@ -17,10 +17,7 @@ from hand_models.base import Array, InvalidInputError, Pose
 
 __all__ = ["JointElement", "Link", "Urdf", "parse_urdf"]
 
-TURNING: Final = ("revolute", "continuous")
-"""Types of joint that a limb may have."""
-
-TYPES: Final = (*TURNING, "fixed", "prismatic", "floating", "planar")
+TYPES: Final = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
 """Types of joint that URDF knows."""
 
 LONGEST: Final = 100.0
@@ -37,6 +34,9 @@ WIDEST: Final = 100.0
 
 NEGATIVE: Final = 1e-9
 """How far below zero rounding may put a principal moment, over the largest."""
+
+THIN: Final = 1e-6
+"""Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class JointElement:
     axis : ndarray, shape (3,)
         In its own frame, of unit length.
     lower, upper : float
-        Limits [rad]; infinite for any but revolute joints.
+        Limits [rad]; infinite for any but revolute joints. Where they are equal nothing moves.
     mimic : bool
         Whether it follows another joint.
     """
@@ -114,36 +114,30 @@ class Urdf:
             trail.append(parent)
         return trail
 
-    def chain(self, body: str, link: str) -> tuple[JointElement, ...]:
+    def chain(self, body: str, link: str, locked: Collection[str]) -> tuple[JointElement, ...]:
         """Return the joints that move between a link and the body, from the body outward.
+
+        Parameters
+        ----------
+        body, link : str
+        locked : collection of str
+            Joints that do not move although they could.
 
         Raises
         ------
         InvalidInputError
-            If there is no such link, it does not hang on the body, or a joint between them
-            neither turns nor is fixed, or follows another.
+            If there is no such link, or it does not hang on the body.
         """
         self.require(link)
         trail = self.trail(link)
         if body not in trail:
             raise InvalidInputError(
                 f"link {link!r} does not hang on the body {body!r}; every limb must be a chain "
-                "of joints from the body to its link"
+                f"of joints from the body to its link; all hang on body = {trail[-1]!r}"
             )
         joints = [self.joints[at] for at in trail[: trail.index(body)]]
-        chain = [joint for joint in reversed(joints) if joint.type != "fixed"]
-        for joint in reversed(chain):
-            if joint.type not in TURNING:
-                raise InvalidInputError(
-                    f"joint {joint.name!r} between {body!r} and {link!r} is {joint.type}; "
-                    f"a limb's joints must be {' or '.join(TURNING)}, or fixed"
-                )
-            if joint.mimic:
-                raise InvalidInputError(
-                    f"joint {joint.name!r} between {body!r} and {link!r} follows another "
-                    "(mimic); each joint of a limb must move by itself"
-                )
-        return tuple(chain)
+        moving = (joint for joint in reversed(joints) if joint.type != "fixed")
+        return tuple(joint for joint in moving if joint.name not in locked)
 
     def require(self, link: str) -> None:
         """Refuse a link that is not there."""
@@ -253,7 +247,7 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
     place = _origin(owner, element)
     given = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0])
-    if given is not None and kind in (*TURNING, "prismatic", "planar"):
+    if given is not None and kind not in ("fixed", "floating"):
         axis = np.array(_numbers(owner, given, "xyz", 3, LONGEST))
         length = np.linalg.norm(axis)
         if not length > 0.0:
@@ -273,9 +267,9 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         )
         if kind == "revolute":
             lower, upper = low, high
-            if not lower < upper:
+            if lower > upper:
                 raise InvalidInputError(
-                    f"{owner}: lower must be less than upper, got {lower:g} and {upper:g} rad"
+                    f"{owner}: lower must not be above upper, got {lower:g} and {upper:g} rad"
                 )
     return JointElement(
         name=name,
@@ -310,7 +304,7 @@ def _link(element: ElementTree.Element) -> Link:
     )
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     principal = np.linalg.eigvalsh(own)
-    if principal[0] < -NEGATIVE * principal[-1]:
+    if principal[0] < -max(NEGATIVE * principal[-1], THIN**2 * mass):
         raise InvalidInputError(
             f"{owner}: its inertia must have no negative principal moment, got {principal[0]:g}"
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array, BoundedStore
 from planner import programs
-from planner.explanation import LimitUse, joint_name, warnings
+from planner.explanation import LimitUse, joint_name, off_sentences, warnings
 from planner.floating import WristSolution
 from planner.prepare import HandBatch, PreparedStance, Sets
 from planner.result import (
@@ -60,7 +60,10 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
         recovery=None if hands.floating else _recovery(prepared),
         check=Check(prepared.question, prepared.batch, prepared.where),
         idle=_idle_joints(prepared),
-        oddities=warnings(prepared.question.stance, prepared.batch),
+        oddities=(
+            *warnings(prepared.question.stance, prepared.batch),
+            *off_sentences(prepared.where),
+        ),
     )
 
 

@@ -30,10 +30,10 @@ WEIGHT: Final = 1e-9
 """Largest disagreement of the body wrench with the robot's weight and acceleration, relative."""
 
 PLACED: Final = (0.01, 0.05)
-"""How far given joints may put a hand from its pose [m], and turn it [rad]."""
+"""How far joints may put a hand from its pose [m], and turn it [rad]."""
 
-FOUND: Final = (1e-5, 1e-5)
-"""The same of joints that were found."""
+TOLD: Final = 1e-5
+"""How far what is told of that may be from it, of joints that were found [m, rad]."""
 
 BEYOND: Final = 1e-6
 """How far an angle may be beyond its joint's limit [rad]."""
@@ -108,13 +108,17 @@ def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) 
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
-    most_off, most_turned = FOUND if isinstance(stance.joints, str) else PLACED
+    most_off, most_turned = PLACED
+    solved = isinstance(stance.joints, str)
     body = stance.body.inverse()
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
         off = float(np.linalg.norm(pose.position - there.position))
-        turned = Rotation.from_matrix(there.rotation.T @ pose.rotation).magnitude()
-        if not (off <= most_off and turned <= most_turned):
+        turned = float(Rotation.from_matrix(there.rotation.T @ pose.rotation).magnitude())
+        told_off, told_turned = where.off.get(place.limb, (0.0, 0.0))
+        near = off <= most_off and turned <= most_turned
+        told = abs(off - told_off) <= TOLD and abs(turned - told_turned) <= TOLD
+        if not (near and (told or not solved)):
             found.append(
                 f"{place.limb}: its joints put the hand {off:.3g} m and {turned:.3g} rad from its "
                 "pose"

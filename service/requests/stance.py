@@ -153,7 +153,7 @@ class Stance(Strict, frozen=True, kw_only=True):
         dict[Name, Angles] | Literal["solve"] | None,
         Meta(
             description="angles of every limb with a hand, or that inverse kinematics finds them; "
-            "with joints their torques count"
+            "either way hands may be 10 mm and 0.05 rad off; with joints their torques count"
         ),
     ] = None
     rocks: Annotated[

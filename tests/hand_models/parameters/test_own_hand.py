@@ -133,6 +133,19 @@ def test_twice_the_pulleys_change_the_normals_by_the_balance_of_the_joints() -> 
         )
 
 
+@pytest.mark.parametrize("name", ["radians", "list", "integer"])
+def test_a_bare_number_is_in_the_unit_of_its_entry(name: str, tmp_path: Path) -> None:
+    """Of hand.toml, and assumed; the entry is that which says so."""
+    section, entry, value = {
+        "radians": ("seat", "turn", 0.5),
+        "list": ("finger", "pulley_radii", [0.005, 0.003, 0.002]),
+        "integer": ("hand", "mass", 3),
+    }[name]
+    path = tmp_path / "mine.toml"
+    path.write_text(f"[{section}]\n{entry} = {value}\n")
+    assert load_own_hand(path) == own(section, entry, value)
+
+
 def test_four_heavier_hands_weigh_on_the_body() -> None:
     heavy = robosimian(own_hand(own("hand", "mass", 5.6)))
     assert heavy.mass == pytest.approx(robosimian().mass + 4 * 3.0)
@@ -289,6 +302,11 @@ BAD = {
         '[hand]\nmass = { value = 1.0, source = "assumed" }',
         "hand.mass: object missing required field unit; an entry is { value, unit, source, note",
     ),
+    "an unknown number": ("[hand]\nmasse = 1.0", "hand.masse: unknown entry; known are mass"),
+    "no number": (
+        "[hand]\nmass = true",
+        "hand.mass: expected object, got bool; an entry is { value, unit, source, note",
+    ),
     "a source that is none": (
         '[hand]\nmass = { value = 1.0, unit = "kg", source = "guess" }',
         "hand.mass.source: must be one of paper, measured, calibrated, assumed, got 'guess'",
@@ -297,7 +315,6 @@ BAD = {
         '[hand]\nmass = { value = "a", unit = "kg", source = "assumed" }',
         "hand.mass.value: must be a number or a list of numbers, got 'a'",
     ),
-    "a bare number": ("[hand]\nmass = 2.0\n", "hand.mass: expected object, got float"),
     "no section": ("mass = 2.0\n", "mass: a section of entries is needed"),
     "no TOML": ("[hand\n", "Expected"),
     "no text": (b"\xff\xfe", "must be TOML in UTF-8"),

@@ -191,7 +191,7 @@ def test_what_no_limb_can_do_without(missing):
             'type="revolute"',
             "urdf: joint 'knee' is revolute and has no <limit>",
         ),
-        ('upper="2.5"', 'upper="-2.5"', "urdf: joint 'hip': lower must be less than upper"),
+        ('upper="2.5"', 'upper="-2.6"', "urdf: joint 'hip': lower must not be above upper"),
         (
             'upper="2.5"',
             'upper="inf"',
@@ -219,6 +219,11 @@ def test_what_no_limb_can_do_without(missing):
         (
             'ixx="0.0"',
             'ixx="-1.0"',
+            "urdf: link 'trunk': its inertia must have no negative principal",
+        ),
+        (
+            'ixx="0.0"',
+            'ixx="-1.1e-11"',  # of 10 kg: a micrometre and a little more
             "urdf: link 'trunk': its inertia must have no negative principal",
         ),
         ('link name="head"', 'link name="foot"', "urdf: link 'foot' appears twice"),
@@ -256,6 +261,7 @@ def test_a_robot_without_mass_is_refused():
 
 def test_limbs_that_share_a_joint_are_refused():
     toml = limbs_toml("walker", {"leg": "foot", "other": "thigh"})
+    # without the hip, the other would have none
     assert refusal(toml) == (
         "limbs.other.link: limbs 'leg' and 'other' share joint 'hip'; every limb needs joints of "
         "its own"
@@ -264,7 +270,9 @@ def test_limbs_that_share_a_joint_are_refused():
 
 def test_a_limb_beside_the_body_is_refused():
     toml = TOML.replace('body = "trunk"', 'body = "head"')
-    assert refusal(toml).startswith("limbs.leg.link: link 'foot' does not hang on the body 'head'")
+    told = refusal(toml)
+    assert told.startswith("limbs.leg.link: link 'foot' does not hang on the body 'head'")
+    assert told.endswith("; all hang on body = 'trunk'")
 
 
 def test_a_limb_that_only_turns_its_hand_in_its_place_is_refused():

@@ -6,15 +6,19 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from hand_models.base import Pose
 from planner.prepare import Posture, posture
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
+from planner.robots import RobotFile, robot_of
 from planner.solving import plan
 from planner.verification import limbs
 from tests.suite.helpers.checks import problems
+from tests.suite.helpers.robots import arm
 from tests.suite.helpers.stances import on_wall
-from tests.suite.helpers.stances_with_joints import random_question_with_joints
+from tests.suite.helpers.stances_with_joints import at_joints, random_question_with_joints
 
 LIMB = "rear_left"
 INDEX = 2
@@ -103,6 +107,62 @@ def test_joints_that_were_found_must_put_hands_where_they_are():
     found = replace(asked(), stance=replace(asked().stance, joints="solve"))
     told = complaints(found, with_angle(LIMB, 0.001))
     assert any("its joints put the hand" in each for each in told), told
+
+
+@cache
+def put_near() -> tuple[Question, Plan, Posture]:
+    """A pose that one joint comes near to: 3 mm and 0.0023 rad beside its circle."""
+    toml, text = arm(1, ("left", "right"))
+    robot = robot_of(RobotFile("arms", toml, text))
+    angles = {"left": np.array([0.3]), "right": np.array([-0.4])}
+    stance = at_joints(robot, angles, robot.limbs, gravity=(0.0, 0.0, -0.1))
+    left, right = stance.hands
+    turn = Rotation.from_rotvec([0.0023, 0.0, 0.0]).as_matrix()
+    beside = Pose(left.pose.position + np.array([0.0, 0.0, 0.003]), left.pose.rotation @ turn)
+    hands = (replace(left, pose=beside), right)
+    question = Question(replace(stance, hands=hands, joints="solve"))
+    return question, plan(question), posture(question)
+
+
+def test_hands_that_are_near_their_poses_are_told_of():
+    question, answer, where = put_near()
+    assert answer.verified
+    assert where.off == {"left": pytest.approx((0.003, 0.0023), rel=0.01)}
+    (told,) = (each for each in answer.warnings if "no joint angles" in each)
+    assert told == (
+        "left: no joint angles put its hand exactly there; the nearest, which are taken, put it "
+        "0.003 m away and turn it by 0.0023 rad"
+    )
+    # as the same angles, given
+    given = replace(question, stance=replace(question.stance, joints=dict(answer.joints)))
+    same = plan(given)
+    assert same.verified
+    assert same.utilisation == pytest.approx(answer.utilisation, abs=1e-9)
+    for limb, torques in answer.joint_torque.items():
+        np.testing.assert_allclose(same.joint_torque[limb], torques, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "off",
+    [{}, {"right": (0.003, 0.0023)}, {"left": (0.0031, 0.0023)}, {"left": (0.003, 0.002)}],
+    ids=["untold", "other", "distance", "angle"],
+)
+def test_hands_that_are_elsewhere_than_told_are_found(off):
+    question, answer, where = put_near()
+    assert problems(question, answer, where=where) == []
+    told = problems(question, answer, where=replace(where, off=off))
+    assert any("its joints put the hand" in each for each in told), told
+
+
+def test_hands_that_are_too_far_are_found_although_told():
+    question, answer, where = put_near()
+    far = replace(where, angles={**where.angles, "left": where.angles["left"] + 0.06})
+    stance = question.stance
+    pose, there = stance.hands[0].pose, stance.robot.hand_poses(far.angles)["left"]
+    off = float(np.linalg.norm(there.position - pose.position))
+    turned = Rotation.from_matrix(there.rotation.T @ pose.rotation).magnitude()
+    told = problems(question, answer, where=replace(far, off={"left": (off, float(turned))}))
+    assert any("left: its joints put the hand" in each for each in told), told
 
 
 def test_joints_that_are_left_out_are_found():
