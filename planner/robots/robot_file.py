@@ -26,10 +26,19 @@ NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 TEXTS: Final = ("name", "urdf", "body")
 """Entries of the file that are plain text."""
 
+SECTIONS: Final = ("robot", "every_limb", "limbs", "capsules")
+"""Its sections."""
+
 ROBOT_UNITS: Final = {"com": "m"}
 """Entries of the whole robot, by name, with their units."""
 
-LIMB_UNITS: Final = {"position": "m", "orientation": "1", "hand_com": "m", "torque_limit": "N·m"}
+LIMB_UNITS: Final = {
+    "position": "m",
+    "orientation": "1",
+    "hand_com": "m",
+    "torque_limit": "N·m",
+    "radius": "m",
+}
 """Entries of a limb, by name, with their units."""
 
 MOST_LIMBS: Final = 16
@@ -41,6 +50,12 @@ units."""
 
 WEAKEST: Final = 1e-3
 """Smallest torque limit that is taken for one [N·m]."""
+
+THICKEST: Final = 1.0
+"""Largest radius of a link that is taken for one [m]."""
+
+CAPSULE: Final = 7
+"""Numbers of a capsule: both ends of its segment, and its radius."""
 
 STRONGEST: Final = 1e6
 """Largest torque limit that is taken for one [N·m]."""
@@ -97,12 +112,15 @@ class Mount:
         The hand's centre of mass in H [m].
     torque_limits : tuple of float
         One number for all joints of the limb, or one each [N·m].
+    radius : float, optional
+        Of its links that have no capsules [m].
     """
 
     link: str
     pose: Pose
     hand_com: tuple[float, ...]
     torque_limits: tuple[float, ...]
+    radius: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +138,9 @@ class RobotDescription:
         Centre of mass in B [m] while no joint angles are given.
     mounts : mapping of str to Mount
         By limb.
+    capsules : mapping of str to tuple
+        Of links, by a pattern of their names: the ends of each one's segment in the link and its
+        radius, seven numbers [m].
     """
 
     name: str
@@ -127,6 +148,7 @@ class RobotDescription:
     body: str
     com: tuple[float, ...] | None
     mounts: Mapping[str, Mount]
+    capsules: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
@@ -144,9 +166,9 @@ class RobotDescription:
         called, urdf, body = (_string(raw.get(name), name) for name in TEXTS)
         _named(called, "name")
         for name in raw:
-            if name not in (*TEXTS, "robot", "every_limb", "limbs"):
+            if name not in (*TEXTS, *SECTIONS):
                 raise InvalidInputError(
-                    f"unknown; known are {', '.join(TEXTS)}, robot, every_limb, limbs", field=name
+                    f"unknown; known are {', '.join((*TEXTS, *SECTIONS))}", field=name
                 )
         whole = _table(raw.get("robot", {}), "robot", ROBOT_UNITS)
         every = _mapping(raw.get("every_limb", {}), "every_limb")
@@ -165,7 +187,8 @@ class RobotDescription:
             link = _string(entries.pop("link", None), f"{section}.link")
             mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(called, urdf, body, com, mounts)
+        capsules = _capsules(raw.get("capsules", {}))
+        return cls(called, urdf, body, com, mounts, capsules)
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -232,6 +255,30 @@ def _triple(table: ParameterTable, section: str, name: str) -> tuple[float, ...]
     return values
 
 
+def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return the capsules of links, by a pattern of their names."""
+    names = _mapping(entries, "capsules")
+    table = _table(names, "capsules", dict.fromkeys(names, "m"))
+    found = {}
+    for _, name, _ in table:
+        values = table.vector("capsules", name)
+        rows = tuple(values[i : i + CAPSULE] for i in range(0, len(values), CAPSULE))
+        sound = [
+            len(row) == CAPSULE
+            and all(abs(value) <= FARTHEST for value in row)
+            and 0.0 < row[-1] <= THICKEST
+            for row in rows
+        ]
+        if not (rows and all(sound)):
+            raise InvalidInputError(
+                f"must be {CAPSULE} numbers a capsule, the ends of its segment within ±{FARTHEST:g}"
+                f" m and a radius up to {THICKEST:g} m, got {_quoted(values)}",
+                field=f"capsules.{name}",
+            )
+        found[name] = rows
+    return found
+
+
 def _mount(link: str, table: ParameterTable, section: str) -> Mount:
     position, orientation = (
         _triple(table, section, "position"),
@@ -248,7 +295,12 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
             f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
-    return Mount(link, pose, hand_com, limits)
+    radius = table.positive(section, "radius") if "radius" in table.sections[section] else None
+    if radius is not None and radius > THICKEST:
+        raise InvalidInputError(
+            f"must be at most {THICKEST:g} m, got {radius:g}", field=f"{section}.radius"
+        )
+    return Mount(link, pose, hand_com, limits, radius)
 
 
 def _quoted(values: tuple[float, ...]) -> str:
