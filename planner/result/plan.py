@@ -13,6 +13,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
 from planner.result.hand_plan import HandPlan
 from planner.result.plain_parts import (
+    Finding,
     LimitName,
     Price,
     RobustLoadFactor,
@@ -131,10 +132,12 @@ class Plan:
     reason : str
         One sentence that a climber understands.
     warnings : tuple of str
-        What is odd about the stance: hands that touch nothing, or are out of reach. What a deadline
-        has left unfinished.
+        What is odd about the stance: the messages of its findings, hands that touch nothing. What a
+        deadline has left unfinished.
     solver : Solver
     time : Time
+    findings : tuple of Finding
+        What is odd about the stance as a scene: is it meant?
     unfinished : tuple of str
         What a deadline has left unfinished, by name: see `planner.deadline.Unfinished`. Values that
         are missing for it are None.
@@ -166,6 +169,7 @@ class Plan:
     warnings: tuple[str, ...]
     solver: Solver
     time: Time
+    findings: tuple[Finding, ...] = ()
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
     spread: Spread | None = None

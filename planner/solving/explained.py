@@ -127,6 +127,7 @@ def explained_plan(
         path=told.path,
         verified=told.status != "failed",
         reason=told.reason,
+        findings=checks.findings,
         warnings=(*checks.oddities, *_warnings(prepared, found, factor, told, unfinished)),
         solver=Solver(SOLVER, found.outcome.status, found.outcome.iterations),
         time=Time(times.model, times.solve, time.perf_counter() - start),

@@ -24,6 +24,7 @@ WHOLE: Final = (
     "load_factor_unbounded",
     "joints",
     "warnings",
+    "findings",
     "time",
 )
 """Fields of a brief reply that are left out beside set-points."""

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import LimitName, Price, RobustLoadFactor, Solver, Spread, TensionPath, Time
+from planner.result import (
+    Finding,
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Solver,
+    Spread,
+    TensionPath,
+    Time,
+)
 from service.replies.hand import Hand, WrenchSet
 from service.replies.reply import StanceReply, Vector
 from service.replies.stream import HandSetPoints
@@ -54,7 +63,8 @@ class PlanReply(StanceReply, kw_only=True):
     proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
     ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
     ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
-    ``"want": ["spread"]``.
+    ``"want": ["spread"]``. ``findings``: what is odd about the stance, each with its ``field`` in
+    the request and what was measured; ``warnings`` has their messages, too.
     """
 
     status: str
@@ -79,6 +89,7 @@ class PlanReply(StanceReply, kw_only=True):
     solver: Solver
     time: Time
     warnings: list[str] = []
+    findings: list[Finding] = []
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
@@ -104,4 +115,5 @@ class BriefPlanReply(StanceReply, kw_only=True):
     load_factor_unbounded: bool | UnsetType = UNSET
     joints: dict[str, Vector] | UnsetType | None = UNSET
     warnings: list[str] | UnsetType = UNSET
+    findings: list[Finding] | UnsetType = UNSET
     time: Time | UnsetType = UNSET
