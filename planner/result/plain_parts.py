@@ -148,8 +148,8 @@ class Distance(Struct, frozen=True):
     Attributes
     ----------
     between : list of str
-        Their names: a limb's hand is ``front_left``, its rock ``rock of front_left``; links have
-        the names of the URDF.
+        Their names, such as ``hand of front_left``, ``rock of front_left``, ``body``; a link has
+        its own, or that of the joint that moves it.
     distance : float
         Below zero: how deep one is in the other [m].
     points : list of (list of float)

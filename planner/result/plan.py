@@ -13,6 +13,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
 from planner.result.hand_plan import HandPlan
 from planner.result.plain_parts import (
+    Clearance,
     Finding,
     LimitName,
     Price,
@@ -146,6 +147,8 @@ class Plan:
         body wrench is zero, any multiple of which is the same.
     spread : Spread or None
         Utilisation and load factor over draws of the numbers, if it was asked for.
+    clearance : Clearance or None
+        The least distances, if they were asked for.
     """
 
     status: Status
@@ -173,6 +176,7 @@ class Plan:
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
     spread: Spread | None = None
+    clearance: Clearance | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, InvalidInputError
 from planner.result import Finding
-from planner.scene.rock import bounded, depth, smooth_depths
+from planner.scene.rock import bounded, depth
 from planner.scene.scene import Scene
-from planner.scene.segments import segment_distances
+from planner.scene.solids import capsule_solids, distance_between, hand_solids
 
 __all__ = ["findings"]
 
@@ -155,23 +155,19 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
     how deep B's origin is.
     """
     points, radii = _body_points(*scene.stance.robot.body_capsules)
-    shapes = {i: scene.hands[i].hold.swept for i in hands}
-    smooth = [(i, shape) for i, shape in shapes.items() if shape is not None]
+    smooth = [i for i in hands if scene.hands[i].hold.swept is not None]
     found = {}
     if smooth:
-        rocks = [scene.rocks[i] for i, _ in smooth]
-        turned = points @ np.array([rock.rotation.T for rock in rocks])
-        seen = turned + np.array([rock.position for rock in rocks])[:, None]
-        deep = smooth_depths([shape for _, shape in smooth], seen)
-        for (i, _), origin in zip(smooth, deep[:, 0].tolist(), strict=True):
-            if origin > DEEP and bounded(scene.hands[i].hold):
+        deep = scene.smooth_depths(smooth, points)
+        for i, origin in zip(smooth, deep[:, 0].tolist(), strict=True):
+            hand = scene.hands[i]
+            if origin > DEEP and bounded(hand.hold):
                 raise InvalidInputError(
-                    f"the body's origin is {origin:.2g} m deep in the rock of "
-                    f"{scene.hands[i].limb}; up to {DEEP:g} m is taken for a rough shape",
+                    f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; "
+                    f"up to {DEEP:g} m is taken for a rough shape",
                     field="stance.body.position",
                 )
-        most = (deep + radii).max(axis=1).tolist()
-        found = {i: value for (i, _), value in zip(smooth, most, strict=True)}
+        found = dict(zip(smooth, (deep + radii).max(axis=1).tolist(), strict=True))
     return [
         found[i] if i in found else depth(scene.hands[i].hold, scene.rocks[i].position)
         for i in hands
@@ -192,10 +188,9 @@ def _overlapping(scene: Scene) -> Iterator[Finding]:
     # every hand is close to itself
     if np.count_nonzero(close) == len(close):
         return
-    first, second = np.nonzero(np.triu(close, 1))
-    segments, radius = scene.palms
-    gaps = segment_distances(segments[first], segments[second]) - 2.0 * radius
-    for i, j, gap in zip(first.tolist(), second.tolist(), gaps.tolist(), strict=True):
+    hands = hand_solids(scene)
+    for i, j in np.argwhere(np.triu(close, 1)).tolist():
+        gap = distance_between(hands[i], hands[j])[0]
         if gap < 0.0:
             one, other = _in_order(scene, i, j)
             field = _of_hand(j, "pose.position")
@@ -227,17 +222,16 @@ def _in_body(scene: Scene) -> Iterator[Finding]:
     near = np.flatnonzero(np.einsum("nx,nx->n", scene.places, scene.places) < reach**2)
     if not len(near):
         return
-    segments, radius = scene.palms
-    hand, part = (each.ravel() for each in np.meshgrid(near, np.arange(len(ends)), indexing="ij"))
-    gaps = segment_distances(segments[hand], ends[part]) - radius - radii[part]
-    for i, gap in zip(near.tolist(), gaps.reshape(len(near), -1).min(axis=1), strict=True):
+    hands, body = hand_solids(scene), capsule_solids(["body"] * len(ends), ends, radii)
+    for i in near.tolist():
+        gap = min(distance_between(hands[i], part)[0] for part in body)
         if gap < 0.0:
             message = (
                 f"{scene.hands[i].limb}: the hand is {-gap:.2g} m in the body: are both positions "
                 "in W, in metres?"
             )
             field = _of_hand(i, "pose.position")
-            yield Finding("hand_in_body", field, message, float(-gap), "m")
+            yield Finding("hand_in_body", field, message, -gap, "m")
 
 
 def _crossed(scene: Scene) -> Iterator[Finding]:
@@ -273,8 +267,10 @@ def _gravity(scene: Scene) -> Iterator[Finding]:
         yield Finding("gravity_up", "stance.gravity", message, float(stance.gravity[2]), "m/s²")
     up = stance.body.rotation.T @ stance.gravity / -size
     fingers = scene.axes[:, :, 0] @ up
-    down = fingers < DOWN
-    if upward and down.all():
+    # in a pinch the outer fingers pull the other way
+    alike = np.array([math.cos(hand.grasp.outer_rotation) > 0.0 for hand in scene.hands])
+    down = alike & (fingers < DOWN)
+    if upward and (fingers < DOWN).all():
         return
     for i in np.flatnonzero(down).tolist():
         message = (

@@ -11,6 +11,7 @@ import numpy as np
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
 from planner.question import HandOnHold, Stance
+from planner.scene.rock import smooth_depths
 
 __all__ = ["Scene", "scene_of"]
 
@@ -42,6 +43,19 @@ class Scene:
     def hands(self) -> tuple[HandOnHold, ...]:
         """The stance's."""
         return self.stance.hands
+
+    def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
+        """Return how deep points (n, 3) in B are in the smooth rock of hands, shape (k, n) [m]."""
+        rocks = [self.rocks[i] for i in hands]
+        turned = points @ np.array([rock.rotation.T for rock in rocks])
+        seen = turned + np.array([rock.position for rock in rocks])[:, None]
+        shapes = [self.hands[i].hold.swept for i in hands]
+        return smooth_depths([shape for shape in shapes if shape is not None], seen)
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Of the hands."""
+        return tuple(hand.limb for hand in self.hands)
 
     @cached_property
     def palms(self) -> tuple[Array, float]:

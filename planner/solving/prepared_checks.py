@@ -21,7 +21,7 @@ from planner.result import (
     WristPlan,
     recover_floating_hand,
 )
-from planner.scene import findings, scene_of
+from planner.scene import findings, link_findings, scene_of
 from planner.verification import Check
 
 __all__ = ["PreparedChecks", "Reading", "prepare_checks", "read_loads"]
@@ -66,10 +66,13 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
         If the stance cannot be; the field is relative to the question.
     """
     hands, stance, batch = prepared.hands, prepared.question.stance, prepared.batch
-    odd = findings(scene_of(stance, batch.hands))
+    scene, where = scene_of(stance, batch.hands), prepared.where
+    odd = findings(scene)
+    if where is not None:
+        odd = (*odd, *link_findings(scene, where.angles))
     return PreparedChecks(
         recovery=None if hands.floating else _recovery(prepared),
-        check=Check(prepared.question, batch, prepared.where),
+        check=Check(prepared.question, batch, where),
         idle=_idle_joints(prepared),
         findings=odd,
         oddities=(*(each.message for each in odd), *warnings(stance, batch)),

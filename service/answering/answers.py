@@ -55,6 +55,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         certificate=certificate,
         robust=answer.robust or UNSET,
         spread=answer.spread or UNSET,
+        clearance=answer.clearance or UNSET,
     )
 
 

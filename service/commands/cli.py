@@ -140,6 +140,9 @@ def crux() -> None:
     is_flag=True,
     help="And how far utilisation and load factor spread over what is not known of hand and rock.",
 )
+@click.option(
+    "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
+)
 @draws_option
 @hand_option
 @robot_option
@@ -149,6 +152,7 @@ def plan(
     picture: Path | None,
     robust: bool,
     spread: bool,
+    clearance: bool,
     draws: list[Draw] | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
@@ -161,6 +165,7 @@ def plan(
 
     extras: list[Want] = ["robust"] if robust else []
     extras += ["spread"] if spread or draws else []
+    extras += ["clearance"] if clearance else []
     request = asked(read_request(stance), hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)

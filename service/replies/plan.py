@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import UNSET, Struct, UnsetType
 
 from planner.result import (
+    Clearance,
     Finding,
     LimitName,
     Price,
@@ -62,9 +63,9 @@ class PlanReply(StanceReply, kw_only=True):
     deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
     proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
     ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
-    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
-    ``"want": ["spread"]``. ``findings``: what is odd about the stance, each with its ``field`` in
-    the request and what was measured; ``warnings`` has their messages, too.
+    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` and ``clearance`` with
+    ``"want"`` of their names. ``findings``: what is odd about the stance, each with its ``field``
+    in the request and what was measured; ``warnings`` has their messages, too.
     """
 
     status: str
@@ -93,6 +94,7 @@ class PlanReply(StanceReply, kw_only=True):
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
+    clearance: Clearance | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):

@@ -12,7 +12,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from planner.explanation import constraint_words
-from planner.result import LimitName, Price, RobustLoadFactor, Spread, TensionPath
+from planner.result import (
+    Clearance,
+    Distance,
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Spread,
+    TensionPath,
+)
 from service.replies import (
     AXES,
     AxisCapability,
@@ -85,6 +93,8 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if isinstance(reply.robust, RobustLoadFactor):
         out.print(robust_sentence(reply.robust), markup=False)
+    if isinstance(reply.clearance, Clearance):
+        _print_clearance(reply.clearance, out)
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
@@ -106,6 +116,18 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
             show(title, _price_table(prices[:MOST_PRICES]), out)
     if reply.certificate is not None:
         _print_certificate(reply.certificate, reply.body_wrench, out)
+
+
+def _print_clearance(clearance: Clearance, out: Console) -> None:
+    """Print the least distances, and what was not measured."""
+    table = table_of("", numbers=["mm"], words=["between", "and"])
+    for name in ("link_rock", "link_link", "hand_hand", "hand_body", "body_rock"):
+        near: Distance | None = getattr(clearance, name)
+        if near is not None:
+            table.add_row(name.replace("_", " "), f"{1e3 * near.distance:.0f}", *near.between)
+    show("least distances; below zero: how deep one is in the other", table, out)
+    for missing in clearance.unchecked:
+        out.print(f"not measured: {missing}", markup=False)
 
 
 def _first_line(reply: PlanReply, spread: Spread | None) -> Iterator[str]:
