@@ -31,8 +31,12 @@ BEHIND: Final = 0.05
 """How far the body's origin may be on the rock's side of a palm that points out of its back [m]."""
 
 BEYOND: Final = 0.1
-"""The same of the palms of all hands, wherever they point, before the body is behind the rock: two
-logs on either side may be a little above it [m]."""
+"""The same of palms that point out of its belly, of all hands: two logs on either side may be a
+little above it [m]."""
+
+BELLY: Final = -0.7
+"""Cosine between z of H and z of B up to which a hand points out of the body's belly: 134°. Hands
+that hug a boulder point sideways."""
 
 IN_ROCK: Final = 0.05
 """How deep the body may be in rock: its capsules, and rock far from a hand, are rough [m]."""
@@ -74,7 +78,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
         *_out_of_reach(scene),
         *_palms(scene, away, above),
         *_reversed(scene, back & ~away, along),
-        *_in_rock(scene, away, above),
+        *_in_rock(scene, away, above, along),
         *_overlapping(scene),
         *_in_body(scene),
         *_crossed(scene),
@@ -129,13 +133,15 @@ def _reversed(scene: Scene, back: NDArray[np.bool_], along: Array) -> Iterator[F
         yield Finding("body_reversed", "stance.body.orientation", message, value, "1")
 
 
-def _in_rock(scene: Scene, away: NDArray[np.bool_], above: Array) -> Iterator[Finding]:
+def _in_rock(
+    scene: Scene, away: NDArray[np.bool_], above: Array, along: Array
+) -> Iterator[Finding]:
     """Yield a body that is in rock, or behind all of it."""
     asked = np.flatnonzero(~away).tolist()
     deepest = dict(zip(asked, _depths(scene, asked), strict=True))
     found = {scene.hands[i].limb: deep for i, deep in deepest.items() if deep > IN_ROCK}
     where = "in the rock"
-    if not found and not away.any() and above.min() > BEYOND:
+    if not found and above.min() > BEYOND and along.max() < BELLY:
         where = "behind the rock"
         found = {hand.limb: up for hand, up in zip(scene.hands, above.tolist(), strict=True)}
     if found:
