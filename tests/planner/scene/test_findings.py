@@ -15,7 +15,7 @@ from planner.scene.rock import smooth_depths
 from planner.solving import KnownStance, plan
 from service.answering.questions import question
 from service.commands.stances import read_request
-from tests.suite.helpers.rocks import distance, random_hold
+from tests.suite.helpers.rocks import distance, random_ellipsoid, random_hold
 from tests.suite.helpers.scenes import (
     BASES,
     HOLDS,
@@ -168,7 +168,8 @@ def test_exchanged_limbs_are_as_much_nearer_as_shoulders_say(bases):
 def test_depth_in_smooth_rock_is_its_distance():
     rng = np.random.default_rng(5)
     seen = set()
-    for hold in [random_hold(rng) for _ in range(60)]:
+    boulders = [random_ellipsoid(rng) for _ in range(10)]
+    for hold in [*boulders, *(random_hold(rng) for _ in range(60))]:
         if hold.swept is None:
             continue
         seen.add(hold.shape)
@@ -179,7 +180,7 @@ def test_depth_in_smooth_rock_is_its_distance():
             assert (np.sign(got) == np.sign(expected)).all()
         else:
             assert got == pytest.approx(expected, abs=1e-9)
-    assert seen == {"plane", "cylinder", "sphere", "edge"}
+    assert seen == {"plane", "cylinder", "sphere", "edge", "ellipsoid"}
 
 
 def test_plans_tell_what_is_odd_in_words_and_structured(bases):
