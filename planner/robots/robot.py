@@ -70,6 +70,8 @@ class Robot:
         In the order of the robot's file.
     chains : dict of str to Chain
         By limb.
+    back : ndarray, shape (3,), or None
+        Direction out of its back in B, where that is known.
     reach : float
         The longest limb's [m].
     model
@@ -92,6 +94,7 @@ class Robot:
         self._to_body = wrench_transport(self._from_root)
         self.name = description.name
         self.limbs = tuple(self.chains)
+        self.back = None if description.back is None else np.array(description.back)
         self.reach = max(chain.reach for chain in self.chains.values())
         self.mass = float(pin.computeTotalMass(self.model))
         self.com = self.com_at({}) if description.com is None else np.array(description.com)

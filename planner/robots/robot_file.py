@@ -7,6 +7,7 @@ folder) and ``body`` (a link), then numbers with unit and source. ``[limbs.NAME]
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -29,7 +30,7 @@ TEXTS: Final = ("name", "urdf", "body")
 SECTIONS: Final = ("robot", "every_limb", "limbs", "capsules")
 """Its sections."""
 
-ROBOT_UNITS: Final = {"com": "m"}
+ROBOT_UNITS: Final = {"com": "m", "back": "1"}
 """Entries of the whole robot, by name, with their units."""
 
 LIMB_UNITS: Final = {
@@ -136,6 +137,8 @@ class RobotDescription:
         The link whose frame is B.
     com : tuple of float, optional
         Centre of mass in B [m] while no joint angles are given.
+    back : tuple of float, optional
+        Direction out of its back in B, of unit length.
     mounts : mapping of str to Mount
         By limb.
     capsules : mapping of str to tuple
@@ -149,6 +152,7 @@ class RobotDescription:
     com: tuple[float, ...] | None
     mounts: Mapping[str, Mount]
     capsules: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    back: tuple[float, ...] | None = None
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
@@ -188,7 +192,7 @@ class RobotDescription:
             mounts[limb] = _mount(link, _table({**every, **entries}, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
         capsules = _capsules(raw.get("capsules", {}))
-        return cls(called, urdf, body, com, mounts, capsules)
+        return cls(called, urdf, body, com, mounts, capsules, _direction(whole, "robot", "back"))
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -277,6 +281,17 @@ def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
             )
         found[name] = rows
     return found
+
+
+def _direction(table: ParameterTable, section: str, name: str) -> tuple[float, ...] | None:
+    """Return a direction of unit length; None where there is none."""
+    if name not in table.sections[section]:
+        return None
+    values = _triple(table, section, name)
+    length = math.hypot(*values)
+    if not length > 0.0:
+        raise InvalidInputError("must not be zero", field=f"{section}.{name}")
+    return tuple(value / length for value in values)
 
 
 def _mount(link: str, table: ParameterTable, section: str) -> Mount:

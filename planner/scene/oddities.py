@@ -1,10 +1,10 @@
 """What is odd about a stance without a look at its joints, and may not be meant.
 
 All is judged in the body's frame, so that it does not hang on how the world's lies; only gravity
-that points up is about W, whose z is up by the contract. z of B is the body's back. So a palm is
-one of three: it *faces the rock* (its plane has the body behind it), the *palm* is turned around (z
-of H points out of the body's back, and the body is on the rock's side of it), or the *body* is
-(z of H points out of its back, but the body is behind the palm).
+that points up is about W, whose z is up by the contract. A hand that points out of the body's back
+is turned around itself, if the body is on the rock's side of its palm; or the body is, if the palm
+has the body behind it. Where a robot's file does not say which way its back is, it is away from
+where most hands point.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ from planner.scene.solids import capsule_solids, distance_between, hand_solids
 __all__ = ["findings"]
 
 BACK: Final = 0.5
-"""Cosine between z of H and z of B from which on a hand points out of the body's back: 60°."""
+"""Cosine between z of H and the body's back from which on a hand points out of that: 60°."""
+
+AGREED: Final = 0.3
+"""Length of the mean of z of all H from which on it tells where a body's belly is."""
 
 BEHIND: Final = 0.05
 """How far the body's origin may be on the rock's side of a palm that points out of its back [m]."""
@@ -35,7 +38,7 @@ BEYOND: Final = 0.1
 little above it [m]."""
 
 BELLY: Final = -0.7
-"""Cosine between z of H and z of B up to which a hand points out of the body's belly: 134°. Hands
+"""Cosine between z of H and its back up to which a hand points out of the body's belly: 134°. Hands
 that hug a boulder point sideways."""
 
 IN_ROCK: Final = 0.05
@@ -70,7 +73,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
         If it cannot be: two hands in one place, or a body deep in rock; the field is relative to
         the question.
     """
-    along = scene.axes[:, 2, 2]
+    along = _back(scene) @ scene.axes[:, :, 2].T
     above = -np.einsum("nx,nx->n", scene.places, scene.axes[:, :, 2])
     back = along > BACK
     away = back & (above > BEHIND)
@@ -84,6 +87,16 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
         *_crossed(scene),
         *_gravity(scene),
     )
+
+
+def _back(scene: Scene) -> Array:
+    """Return the direction out of the body's back in B; zero where nothing tells of it."""
+    known = scene.stance.robot.back
+    if known is not None:
+        return known
+    total = scene.axes[:, :, 2].sum(axis=0)
+    size = float(np.linalg.norm(total))
+    return -total / size if size > AGREED * len(scene.axes) else np.zeros(3)
 
 
 def _of_hand(index: int, entry: str) -> str:
@@ -127,8 +140,8 @@ def _reversed(scene: Scene, back: NDArray[np.bool_], along: Array) -> Iterator[F
     if back.all():
         value = float(along.mean())
         message = (
-            "the body is the wrong way round, z of B points into the rock of all hands, which its "
-            f"back is turned to: {QUATERNION}"
+            "the body is the wrong way round, z of all hands, into their rock, points out of its "
+            f"back: {QUATERNION}"
         )
         yield Finding("body_reversed", "stance.body.orientation", message, value, "1")
 

@@ -117,6 +117,16 @@ def test_a_file_may_have_capsules_of_links_and_a_radius_of_the_others():
     assert radii.tolist() == [0.1]
 
 
+def test_a_file_may_say_which_way_the_robots_back_is():
+    assert robot_of(RobotFile("arm", TOML, TWO_LINK)).back is None
+    told = "[robot]\n" + entry("back", [0.0, 3.0, 4.0], "1")
+    robot = robot_of(RobotFile("arm", f"{TOML}\n{told}", TWO_LINK))
+    assert robot.back.tolist() == [0.0, 0.6, 0.8]
+    assert robosimian().back.tolist() == [0.0, 0.0, 1.0]
+    none = "[robot]\n" + entry("back", [0.0, 0.0, 0.0], "1")
+    assert refusal(f"{TOML}\n{none}") == "robot.back: must not be zero"
+
+
 @pytest.mark.parametrize(
     ("values", "unit", "message"),
     [

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import InvalidInputError, Pose
 from hand_models.rock import Cylinder, Plane
 from planner.question import Question
-from planner.robots import robosimian
+from planner.robots import Robot, robosimian
 from planner.scene.rock import smooth_depths
 from planner.solving import KnownStance, plan
 from service.answering.questions import question
@@ -209,3 +209,17 @@ def test_two_forward_hands_side_by_side_are_two_holds():
     there = replace(stance, hands=(stance.hands[0], replace(stance.hands[1], pose=apart)))
     assert "hands_overlap" not in kinds(there)
     assert kinds(lifted(stance)) == {"out_of_reach"}
+
+
+def test_without_a_known_back_most_hands_tell_where_the_belly_is(bases):
+    description = robosimian().description
+    anywhere = Robot(replace(description, back=None), robosimian().urdf, robosimian().hand)
+
+    def asked(stance):
+        return replace(stance, robot=anywhere)
+
+    assert kinds(asked(turned_hand(bases["logs"], 3, TURN_X))) == {"palm_away"}
+    assert kinds(asked(SLIPS["the body beyond the wall"][0](bases["logs"]))) == {"body_in_rock"}
+    # which way round such a body is meant to be nobody knows
+    assert "body_reversed" not in kinds(asked(SLIPS["the body rolled over"][0](bases["logs"])))
+    assert not any(look(asked(stance)) for stance in sound_stances(10, seed=2))
