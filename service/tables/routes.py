@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from planner.pictures import summary
 from planner.route import RouteResult
-from service.tables.plans import table_of
+from service.tables.layout import table_of
 
 __all__ = ["print_route"]
 
