@@ -295,25 +295,11 @@ def blocking_sentence(names: Sequence[LimitName]) -> str:
     return ", ".join(told)
 
 
-def _farther(stretch: float) -> str:
-    """Say how many times as far something is, or how much farther where that is less than twice."""
-    if stretch >= 2.0:
-        return f"{stretch:.2g} times as far as"
-    return f"{max(100.0 * (stretch - 1.0), 0.1):.2g} % farther than"
-
-
 def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
-    """Return what is odd about a stance that can be planned all the same."""
+    """Return what is odd about the hands and rock of a stance that is planned all the same."""
     found: list[str] = []
-    limbs = [place.limb for place in stance.hands]
-    stretches = stance.robot.stretches(stance.body, limbs, [place.pose for place in stance.hands])
     settled, holding, count = batch.hands, batch.touch.holding, len(FINGERS)
-    for h, (place, hand, stretch) in enumerate(zip(stance.hands, settled, stretches, strict=True)):
-        if stretch > 1.0:
-            found.append(
-                f"{place.limb}: out of reach, {_farther(stretch)} its limb goes; "
-                "positions in metres, quaternions as [x, y, z, w]?"
-            )
+    for h, (place, hand) in enumerate(zip(stance.hands, settled, strict=True)):
         most = hand.surface.strongest_tile
         if most is not None:
             found.append(

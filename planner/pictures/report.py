@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
+from msgspec.structs import asdict
 
 from hand_models.base import whole_file
 from planner.result import LimitName, Plan
@@ -64,7 +66,7 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
 
 
 def summary(result: RouteResult) -> dict[str, Any]:
-    """Return the climb in short: whether it goes, and its crux."""
+    """Return the climb in short: whether it goes, its crux, and what is odd about its stances."""
     crux = result.crux
     stage, plan = result.stages[crux], result.plans[crux]
     statuses = [p.status for p in result.plans]
@@ -75,7 +77,40 @@ def summary(result: RouteResult) -> dict[str, Any]:
         "stages": len(statuses),
         "statuses": {status: statuses.count(status) for status in sorted(set(statuses))},
         "crux": {**_row(stage, plan), "sentence": _sentence(stage, plan)},
+        "warnings": list(_warnings(result)),
+        "findings": list(_findings(result)),
     }
+
+
+def _warnings(result: RouteResult) -> Iterator[str]:
+    """Yield what is odd about stances, once each, with their moves."""
+    moves: dict[str, list[int]] = {}
+    for stage, plan in zip(result.stages, result.plans, strict=True):
+        for warning in plan.warnings:
+            moves.setdefault(warning, []).append(stage.move)
+    for warning, when in moves.items():
+        yield f"{_spoken(when)}: {warning}"
+
+
+def _spoken(moves: Sequence[int]) -> str:
+    """Name moves in order, and the start: ``start, moves 1 to 3, 5``."""
+    numbers = sorted({move for move in moves if move})
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told = [f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+    named = ["move" + "s" * (len(numbers) > 1) + " " + ", ".join(told)] if told else []
+    return ", ".join(["start"] * (0 in moves) + named)
+
+
+def _findings(result: RouteResult) -> Iterator[dict[str, Any]]:
+    """Yield the same structured, stage by stage; fields are those of each stage's question."""
+    for stage, plan in zip(result.stages, result.plans, strict=True):
+        for finding in plan.findings:
+            yield {"stage": stage.index, "move": stage.move, **asdict(finding)}
 
 
 def _sentence(stage: RouteStage, plan: Plan | OutOfReach) -> str:
@@ -108,6 +143,7 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
         "limiting_phalanx": name.phalanx,
         "limiting_limit": name.limit or None,
         "reason": plan.reason,
+        "warnings": "; ".join(plan.warnings),
     }
 
 

@@ -173,7 +173,7 @@ Objective = Literal["max_margin", "min_effort"]
 OBJECTIVES: Final = get_args(Objective)
 """What a plan may be the best in."""
 
-Want = Literal["load_factor", "prices", "model", "robust", "spread"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance"]
 
 WANTS: Final = get_args(Want)
 """What may be wanted beside a plan."""
@@ -193,7 +193,7 @@ class Question:
         In B [N, N·m]; computed from ``load`` if it is not given.
     load : Load
     limits : Limits
-    want : frozenset of {'load_factor', 'prices', 'model', 'robust', 'spread'}
+    want : frozenset of {'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance'}
         Extras.
     objective : {'max_margin', 'min_effort'}
         Least utilisation; or least sum of squared relative tensions and joint torques, at a

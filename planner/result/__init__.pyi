@@ -2,6 +2,9 @@ from .floating_load_recovery import recover_floating_hand as recover_floating_ha
 from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
 from .load_recovery import LoadRecovery as LoadRecovery
 from .plain_parts import (
+    Clearance as Clearance,
+    Distance as Distance,
+    Finding as Finding,
     Finger as Finger,
     LimitName as LimitName,
     Price as Price,

@@ -9,6 +9,9 @@ from msgspec import UNSET, Struct, UnsetType
 from msgspec.structs import astuple
 
 __all__ = [
+    "Clearance",
+    "Distance",
+    "Finding",
     "Finger",
     "LimitName",
     "Price",
@@ -112,6 +115,76 @@ class TensionPath(Struct, frozen=True):
     utilisation_at_present: float | None
     largest_change: float
     limiting: list[LimitName] = []
+
+
+class Finding(Struct, frozen=True):
+    """Something odd about a stance, which is planned all the same.
+
+    Attributes
+    ----------
+    kind : str
+        ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
+        ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up`` or, where joints are
+        known, ``link_in_rock`` and ``links_collide``.
+    field : str
+        Its place in the question, such as ``stance.hands[0].pose.orientation``.
+    message : str
+        What is odd, and the slip that it is likely to come of.
+    value : float
+        What was measured: how deep, how far, how much of its reach, or a cosine.
+    unit : str
+        Of that: ``m``, ``m/s²`` or ``1``.
+    """
+
+    kind: str
+    field: str
+    message: str
+    value: float
+    unit: str
+
+
+class Distance(Struct, frozen=True):
+    """The least distance between two things.
+
+    Attributes
+    ----------
+    between : list of str
+        Their names, such as ``hand of front_left``, ``rock of front_left``, ``body``; a link has
+        its own, or that of the joint that moves it.
+    distance : float
+        Below zero: how deep one is in the other [m].
+    points : list of (list of float)
+        The nearest point of each, in W [m].
+    """
+
+    between: list[str]
+    distance: float
+    points: list[Vector]
+
+
+class Clearance(Struct, frozen=True, kw_only=True):
+    """The least distances about a stance; None where nothing was measured.
+
+    Links that are joined, and a hand with its own rock or the link that carries it, are left out.
+
+    Attributes
+    ----------
+    link_rock, link_link : Distance or None
+        Of a limb's link from rock; from another link, the body or another limb's hand.
+    hand_hand, hand_body : Distance or None
+        Of a hand from another hand, and from the body.
+    body_rock : Distance or None
+        Of the body from rock.
+    unchecked : list of str
+        What was not measured, and why.
+    """
+
+    link_rock: Distance | None = None
+    link_link: Distance | None = None
+    hand_hand: Distance | None = None
+    hand_body: Distance | None = None
+    body_rock: Distance | None = None
+    unchecked: list[str] = []
 
 
 class RobustLoadFactor(Struct, frozen=True):

@@ -13,6 +13,8 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
 from planner.result.hand_plan import HandPlan
 from planner.result.plain_parts import (
+    Clearance,
+    Finding,
     LimitName,
     Price,
     RobustLoadFactor,
@@ -132,10 +134,12 @@ class Plan:
     reason : str
         One sentence that a climber understands.
     warnings : tuple of str
-        What is odd about the stance: hands that touch nothing, or are out of reach. What a deadline
-        has left unfinished.
+        What is odd about the stance: the messages of its findings, hands that touch nothing. What a
+        deadline has left unfinished.
     solver : Solver
     time : Time
+    findings : tuple of Finding
+        What is odd about the stance as a scene: is it meant?
     unfinished : tuple of str
         What a deadline has left unfinished, by name: see `planner.deadline.Unfinished`. Values that
         are missing for it are None.
@@ -144,6 +148,8 @@ class Plan:
         body wrench is zero, any multiple of which is the same.
     spread : Spread or None
         Utilisation and load factor over draws of the numbers, if it was asked for.
+    clearance : Clearance or None
+        The least distances, if they were asked for.
     """
 
     status: Status
@@ -167,9 +173,11 @@ class Plan:
     warnings: tuple[str, ...]
     solver: Solver
     time: Time
+    findings: tuple[Finding, ...] = ()
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
     spread: Spread | None = None
+    clearance: Clearance | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

@@ -1,3 +1,4 @@
+from .capsules import Capsules as Capsules
 from .inverse_kinematics import (
     UnreachableError as UnreachableError,
     solve_limbs as solve_limbs,

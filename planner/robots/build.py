@@ -46,6 +46,8 @@ class Chain:
         Upper bound of the distance from the shoulder to the link that carries the hand [m]: the
         sum of the distances from joint to joint, or where that link only turns in its place, the
         distance of H from there.
+    spacing : ndarray, shape (n,)
+        How far each joint is from the one before it, the first from B [m].
     ids, frame : tuple of int, int
         Of the joints and of H in Pinocchio's model.
     places : ndarray, shape (n,)
@@ -62,6 +64,7 @@ class Chain:
     torque_limits: Array
     shoulder: Array
     reach: float
+    spacing: Array
     ids: tuple[int, ...]
     frame: int
     places: Indices
@@ -198,6 +201,7 @@ def _mounted(
         torque_limits=np.broadcast_to(np.array(mount.torque_limits), len(joints)).copy(),
         shoulder=root.inverse().apply(shoulder),
         reach=reach,
+        spacing=np.array([np.linalg.norm(model.jointPlacements[i].translation) for i in ids]),
         ids=ids,
         frame=frame,
         places=np.array([joint.idx_q for joint in joints]),

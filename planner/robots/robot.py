@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib import resources
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from hand_models.base import Array, InvalidInputError, Pose, finite_vector, wren
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
 from planner.robots.build import build_model, pose_of
+from planner.robots.capsules import Capsules, capsules_of
 from planner.robots.robot_file import RobotDescription, RobotFile
 
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
@@ -70,6 +71,8 @@ class Robot:
         In the order of the robot's file.
     chains : dict of str to Chain
         By limb.
+    back : ndarray, shape (3,), or None
+        Direction out of its back in B, where that is known.
     reach : float
         The longest limb's [m].
     model
@@ -94,6 +97,7 @@ class Robot:
         self._to_body = wrench_transport(self._from_root)
         self.name = description.name
         self.limbs = tuple(self.chains)
+        self.back = None if description.back is None else np.array(description.back)
         self.reach = max(chain.reach for chain in self.chains.values())
         self.mass = float(pin.computeTotalMass(self.model))
         self.com = self.com_at({}) if description.com is None else np.array(description.com)
@@ -199,6 +203,25 @@ class Robot:
         """Return the centre of mass of the robot with its hands in B, shape (3,) [m]."""
         centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))
         return self._from_root.apply(np.array(centre))
+
+    @cached_property
+    def capsules(self) -> Capsules:
+        """What of it could be in the way; its hands are left out."""
+        return capsules_of(self.model, self.description, self.chains)
+
+    @cached_property
+    def body_capsules(self) -> tuple[Array, Array]:
+        """Those that no joint moves: segments in B, shape (n, 2, 3), and radii, shape (n,) [m]."""
+        count = int((self.capsules.steps == 0).sum())
+        return self._from_root.apply(self.capsules.ends[:count]), self.capsules.radii[:count]
+
+    def placed_capsules(self, angles: Mapping[str, Array]) -> Array:
+        """Return the segments of all `capsules` in B, shape (n, 2, 3) [m]."""
+        data = self.data
+        pin.forwardKinematics(self.model, data, self.configuration(angles))
+        moved = [pose_of(data.oMi[int(joint)]) for joint in self.capsules.joints]
+        placed = [pose.apply(pair) for pose, pair in zip(moved, self.capsules.ends, strict=True)]
+        return self._from_root.apply(np.array(placed).reshape(-1, 2, 3))
 
     def link_chain(self, angles: Mapping[str, Array], limb: str) -> Array:
         """Return the places in B of a limb's joints and of its H, shape (n + 1, 3) [m]."""

@@ -9,6 +9,7 @@ in the SI unit of its entry, and `assumed`.
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -28,13 +29,19 @@ NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 TEXTS: Final = ("name", "urdf", "body")
 """Entries of the file that are plain text."""
 
-SECTIONS: Final = ("robot", "locked", "every_limb", "limbs")
+SECTIONS: Final = ("robot", "locked", "every_limb", "limbs", "capsules")
 """Its sections."""
 
-ROBOT_UNITS: Final = {"com": "m"}
+ROBOT_UNITS: Final = {"com": "m", "back": "1"}
 """Entries of the whole robot, by name, with their units."""
 
-LIMB_UNITS: Final = {"position": "m", "orientation": "1", "hand_com": "m", "torque_limit": "N·m"}
+LIMB_UNITS: Final = {
+    "position": "m",
+    "orientation": "1",
+    "hand_com": "m",
+    "torque_limit": "N·m",
+    "radius": "m",
+}
 """Entries of a limb, by name, with their units."""
 
 MOST_LIMBS: Final = 16
@@ -46,6 +53,12 @@ units."""
 
 WEAKEST: Final = 1e-3
 """Smallest torque limit that is taken for one [N·m]."""
+
+THICKEST: Final = 1.0
+"""Largest radius of a link that is taken for one [m]."""
+
+CAPSULE: Final = 7
+"""Numbers of a capsule: both ends of its segment, and its radius."""
 
 STRONGEST: Final = 1e6
 """Largest torque limit that is taken for one [N·m]."""
@@ -102,12 +115,15 @@ class Mount:
         The hand's centre of mass in H [m].
     torque_limits : tuple of float
         One number for all joints of the limb, or one each [N·m].
+    radius : float, optional
+        Of its links that have no capsules [m].
     """
 
     link: str
     pose: Pose
     hand_com: tuple[float, ...]
     torque_limits: tuple[float, ...]
+    radius: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,11 +139,16 @@ class RobotDescription:
         The link whose frame is B.
     com : tuple of float, optional
         Centre of mass in B [m] while no joint angles are given.
+    back : tuple of float, optional
+        Direction out of its back in B, of unit length.
     mounts : mapping of str to Mount
         By limb.
     locked : mapping of str to object
         Where joints are that do not move, by name, as the file has them: their units are known
         with the URDF only.
+    capsules : mapping of str to tuple
+        Of links, by a pattern of their names: the ends of each one's segment in the link and its
+        radius, seven numbers [m].
     """
 
     name: str
@@ -136,6 +157,8 @@ class RobotDescription:
     com: tuple[float, ...] | None
     mounts: Mapping[str, Mount]
     locked: Mapping[str, Any] = field(default_factory=dict)
+    capsules: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    back: tuple[float, ...] | None = None
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
@@ -175,7 +198,9 @@ class RobotDescription:
             both = {**every, **entries}
             mounts[limb] = _mount(link, section_table(both, section, LIMB_UNITS), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
-        return cls(called, urdf, body, com, mounts, locked)
+        capsules = _capsules(raw.get("capsules", {}))
+        back = _direction(whole, "robot", "back")
+        return cls(called, urdf, body, com, mounts, locked, capsules, back)
 
 
 def _text(path: Path, field: str, what: str) -> str:
@@ -256,6 +281,41 @@ def _triple(table: ParameterTable, section: str, name: str) -> tuple[float, ...]
     return values
 
 
+def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return the capsules of links, by a pattern of their names."""
+    names = _mapping(entries, "capsules")
+    table = section_table(names, "capsules", dict.fromkeys(names, "m"))
+    found = {}
+    for _, name, _ in table:
+        values = table.vector("capsules", name)
+        rows = tuple(values[i : i + CAPSULE] for i in range(0, len(values), CAPSULE))
+        sound = [
+            len(row) == CAPSULE
+            and all(abs(value) <= FARTHEST for value in row)
+            and 0.0 < row[-1] <= THICKEST
+            for row in rows
+        ]
+        if not (rows and all(sound)):
+            raise InvalidInputError(
+                f"must be {CAPSULE} numbers a capsule, the ends of its segment within ±{FARTHEST:g}"
+                f" m and a radius up to {THICKEST:g} m, got {_quoted(values)}",
+                field=f"capsules.{name}",
+            )
+        found[name] = rows
+    return found
+
+
+def _direction(table: ParameterTable, section: str, name: str) -> tuple[float, ...] | None:
+    """Return a direction of unit length; None where there is none."""
+    if name not in table.sections[section]:
+        return None
+    values = _triple(table, section, name)
+    length = math.hypot(*values)
+    if not length > 0.0:
+        raise InvalidInputError("must not be zero", field=f"{section}.{name}")
+    return tuple(value / length for value in values)
+
+
 def _mount(link: str, table: ParameterTable, section: str) -> Mount:
     position, orientation = (
         _triple(table, section, "position"),
@@ -272,7 +332,12 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
             f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
-    return Mount(link, pose, hand_com, limits)
+    radius = table.positive(section, "radius") if "radius" in table.sections[section] else None
+    if radius is not None and radius > THICKEST:
+        raise InvalidInputError(
+            f"must be at most {THICKEST:g} m, got {radius:g}", field=f"{section}.radius"
+        )
+    return Mount(link, pose, hand_com, limits, radius)
 
 
 def _quoted(values: tuple[float, ...]) -> str:

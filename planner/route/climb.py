@@ -18,7 +18,7 @@ from hand_models.base import InvalidInputError, Pose
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
-from planner.result import Plan
+from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.solving import plan
 
@@ -113,6 +113,8 @@ class OutOfReach:
     load_factor: None = None
     limiting: None = None
     joint_utilisation: None = None
+    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

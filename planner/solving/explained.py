@@ -32,6 +32,7 @@ from planner.prepare import PreparedStance
 from planner.programs import SLACK, SOLVER
 from planner.result import (
     Certificate,
+    Clearance,
     HandPlan,
     LimitName,
     Plan,
@@ -41,6 +42,7 @@ from planner.result import (
     TensionPath,
     Time,
 )
+from planner.scene import clearance, scene_of
 from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
 from planner.solving.prepared_checks import PreparedChecks, Reading
 from planner.solving.solution import Solution, not_least
@@ -127,13 +129,21 @@ def explained_plan(
         path=told.path,
         verified=told.status != "failed",
         reason=told.reason,
+        findings=checks.findings,
         warnings=(*checks.oddities, *_warnings(prepared, found, factor, told, unfinished)),
         solver=Solver(SOLVER, found.outcome.status, found.outcome.iterations),
         time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=unfinished,
         robust=robust,
         spread=spread,
+        clearance=_clearance(prepared) if "clearance" in question.want else None,
     )
+
+
+def _clearance(prepared: PreparedStance) -> Clearance:
+    where, stance = prepared.where, prepared.question.stance
+    angles = None if where is None else where.angles
+    return clearance(scene_of(stance, prepared.batch.hands), angles)
 
 
 def _of_plan(

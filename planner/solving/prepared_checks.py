@@ -14,12 +14,14 @@ from planner.explanation import LimitUse, joint_name, off_sentences, warnings
 from planner.floating import WristSolution
 from planner.prepare import HandBatch, PreparedStance, Sets
 from planner.result import (
+    Finding,
     HandPlan,
     LoadRecovery,
     PlanArrays,
     WristPlan,
     recover_floating_hand,
 )
+from planner.scene import findings, link_findings, scene_of
 from planner.verification import Check
 
 __all__ = ["PreparedChecks", "Reading", "prepare_checks", "read_loads"]
@@ -36,13 +38,16 @@ class PreparedChecks(NamedTuple):
         What every plan must pass.
     idle : tuple of LimitUse
         How much of their joints' torque limbs without a hand use.
+    findings : tuple of Finding
+        What is odd about the stance as a scene.
     oddities : tuple of str
-        What is odd about the stance.
+        What is odd about it, these included, in words.
     """
 
     recovery: LoadRecovery | None
     check: Check
     idle: tuple[LimitUse, ...]
+    findings: tuple[Finding, ...]
     oddities: tuple[str, ...]
 
 
@@ -54,15 +59,26 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
     """Return what reading and checking plans of a stance needs.
 
     It changes nothing but a store that threads may share, so it may run beside a solver.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
     """
-    hands = prepared.hands
+    hands, stance, batch = prepared.hands, prepared.question.stance, prepared.batch
+    scene, where = scene_of(stance, batch.hands), prepared.where
+    odd = findings(scene)
+    if where is not None:
+        odd = (*odd, *link_findings(scene, where.angles))
     return PreparedChecks(
         recovery=None if hands.floating else _recovery(prepared),
-        check=Check(prepared.question, prepared.batch, prepared.where),
+        check=Check(prepared.question, batch, where),
         idle=_idle_joints(prepared),
+        findings=odd,
         oddities=(
-            *warnings(prepared.question.stance, prepared.batch),
-            *off_sentences(prepared.where),
+            *(each.message for each in odd),
+            *warnings(stance, batch),
+            *off_sentences(where),
         ),
     )
 

@@ -103,4 +103,4 @@ def _checks(there: PreparedStance, idle: Sequence[LimitUse]) -> PreparedChecks:
     batch, hands, recovery = there.batch, there.hands, None
     if not hands.floating:
         recovery = LoadRecovery(batch, hands.spaces, hands.scaled)
-    return PreparedChecks(recovery, Check(there.question, batch, there.where), tuple(idle), ())
+    return PreparedChecks(recovery, Check(there.question, batch, there.where), tuple(idle), (), ())

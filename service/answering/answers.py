@@ -24,6 +24,7 @@ WHOLE: Final = (
     "load_factor_unbounded",
     "joints",
     "warnings",
+    "findings",
     "time",
 )
 """Fields of a brief reply that are left out beside set-points."""
@@ -54,6 +55,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         certificate=certificate,
         robust=answer.robust or UNSET,
         spread=answer.spread or UNSET,
+        clearance=answer.clearance or UNSET,
     )
 
 

@@ -85,6 +85,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         angular_acceleration=turning,
         along=None if linear is None else [one for one in along if one is not None],
         time=Time(modelled - start, ended - modelled, ended - start),
+        findings=list(space.plan.findings),
         warnings=[*space.plan.warnings, *_warnings(space, linear is not None, error)],
     )
     return Explored(space, section, reply)

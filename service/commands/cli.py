@@ -141,6 +141,9 @@ def crux() -> None:
     is_flag=True,
     help="And how far utilisation and load factor spread over what is not known of hand and rock.",
 )
+@click.option(
+    "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
+)
 @draws_option
 @explain_option
 @hand_option
@@ -151,6 +154,7 @@ def plan(
     picture: Path | None,
     robust: bool,
     spread: bool,
+    clearance: bool,
     draws: list[Draw] | None,
     unexplained: bool,
     hand: ParameterTable | None,
@@ -164,6 +168,7 @@ def plan(
 
     extras: list[Want] = ["robust"] if robust else []
     extras += ["spread"] if spread or draws else []
+    extras += ["clearance"] if clearance else []
     request = asked(read_request(stance), hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from planner.result import LimitName, Time
+from planner.result import Finding, LimitName, Time
 from service.replies.reply import StanceReply, Vector
 
 __all__ = [
@@ -80,3 +80,4 @@ class BodySpaceReply(StanceReply, kw_only=True):
     along: list[Acceleration] | None
     time: Time
     warnings: list[str] = []
+    findings: list[Finding] = []

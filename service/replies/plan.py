@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import LimitName, Price, RobustLoadFactor, Solver, Spread, TensionPath, Time
+from planner.result import (
+    Clearance,
+    Finding,
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Solver,
+    Spread,
+    TensionPath,
+    Time,
+)
 from service.replies.hand import Hand, WrenchSet
 from service.replies.reply import StanceReply, Vector
 from service.replies.stream import HandSetPoints
@@ -54,8 +64,9 @@ class PlanReply(StanceReply, kw_only=True):
     ``unfinished``: what a deadline has left out, and a warning tells: ``least_utilisation`` (that
     no plan uses less is not proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
     ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
-    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
-    ``"want": ["spread"]``.
+    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` and ``clearance`` with
+    ``"want"`` of their names. ``findings``: what is odd about the stance, each with its ``field``
+    in the request and what was measured; ``warnings`` has their messages, too.
     """
 
     status: str
@@ -80,9 +91,11 @@ class PlanReply(StanceReply, kw_only=True):
     solver: Solver
     time: Time
     warnings: list[str] = []
+    findings: list[Finding] = []
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
+    clearance: Clearance | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):
@@ -105,4 +118,5 @@ class BriefPlanReply(StanceReply, kw_only=True):
     load_factor_unbounded: bool | UnsetType = UNSET
     joints: dict[str, Vector] | UnsetType | None = UNSET
     warnings: list[str] | UnsetType = UNSET
+    findings: list[Finding] | UnsetType = UNSET
     time: Time | UnsetType = UNSET

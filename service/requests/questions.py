@@ -80,7 +80,7 @@ Explain = Annotated[
         "limits that together do; without it, the same status is there sooner"
     ),
 ]
-Want = Literal["load_factor", "prices", "model", "robust", "spread"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]
@@ -167,7 +167,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         list[Want],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
-            "spread: utilisation and load factor over draws of the hand's and the rock's numbers"
+            "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
+            "clearance: the least distances of body, hands, links and rock"
         ),
     ] = []
     draws: Annotated[

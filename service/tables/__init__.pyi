@@ -1,10 +1,8 @@
 from .body_spaces import print_body_space as print_body_space
+from .layout import console as console, table_of as table_of, unit_of as unit_of
 from .plans import (
-    console as console,
     print_plan as print_plan,
     print_robust as print_robust,
     print_wrench_space as print_wrench_space,
-    table_of as table_of,
-    unit_of as unit_of,
 )
 from .routes import print_route as print_route

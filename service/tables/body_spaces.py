@@ -12,7 +12,7 @@ from planner.capability import COMPONENTS, OTHERS
 from planner.result import LimitName
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.plans import show, table_of, unit_of
+from service.tables.layout import show, table_of, unit_of
 
 __all__ = ["print_body_space"]
 

@@ -6,13 +6,19 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from planner.explanation import constraint_words
-from planner.result import LimitName, Price, RobustLoadFactor, Spread, TensionPath
+from planner.result import (
+    Clearance,
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Spread,
+    TensionPath,
+)
 from service.replies import (
     AXES,
     AxisCapability,
@@ -23,17 +29,11 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
+from service.tables.clearances import print_clearance
+from service.tables.layout import show, table_of, unit_of
 from service.tables.spreads import robust_sentence, spread_sentence, within
 
-__all__ = [
-    "console",
-    "print_plan",
-    "print_robust",
-    "print_wrench_space",
-    "show",
-    "table_of",
-    "unit_of",
-]
+__all__ = ["print_plan", "print_robust", "print_wrench_space"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
@@ -51,11 +51,6 @@ CARRIES: Final[Mapping[str, str]] = {
     "drags_and_presses": "drags and presses on the rock",
 }
 """What a palm does in each of its modes."""
-
-
-def console(stderr: bool = False) -> Console:
-    """Return the console on standard output, or on standard error."""
-    return Console(highlight=False, stderr=stderr)
 
 
 def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None = None) -> None:
@@ -85,6 +80,8 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if isinstance(reply.robust, RobustLoadFactor):
         out.print(robust_sentence(reply.robust), markup=False)
+    if isinstance(reply.clearance, Clearance):
+        print_clearance(reply.clearance, out)
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
@@ -293,29 +290,6 @@ def _load_factor(reply: PlanReply) -> str:
     if reply.load_factor_unbounded:
         return "unbounded"
     return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
-
-
-def show(title: str, table: Table, out: Console) -> None:
-    """Print a table under its title."""
-    out.print(f"\n[bold]{title}[/bold]")
-    out.print(table)
-
-
-def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
-    """Return a table with columns of names, then of numbers, then of words, which may wrap."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    for name in names:
-        table.add_column(name, no_wrap=True)
-    for name in numbers:
-        table.add_column(name, justify="right")
-    for name in words:
-        table.add_column(name)
-    return table
-
-
-def unit_of(axis: str) -> str:
-    """Return the unit of a component of a wrench."""
-    return "N" if axis.startswith("f") else "N·m"
 
 
 def _ends_of(ways: Iterable[tuple[float | None, float | None]]) -> Iterator[str]:

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from planner.pictures import summary
 from planner.route import RouteResult
-from service.tables.plans import table_of
+from service.tables.layout import table_of
 
 __all__ = ["print_route"]
 
@@ -28,6 +28,9 @@ def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) ->
         hard = stage.index == result.crux
         table.add_row("crux" if hard else "", *cells, style="bold" if hard else "")
     out.print(table)
-    out.print(summary(result)["crux"]["sentence"], markup=False)
+    told = summary(result)
+    for warning in told["warnings"]:
+        out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    out.print(told["crux"]["sentence"], markup=False)
     for name, path in files.items():
         out.print(f"{name}: {path}", markup=False, soft_wrap=True)

@@ -62,6 +62,8 @@ def _kept(value: Any, full: bool, name: str = "") -> Any:
     if not isinstance(value, dict):
         return value
     value = {key: part for key, part in value.items() if key not in WORDS}
+    if not value.get("findings", True):
+        del value["findings"]  # nothing is odd, as about nearly all that is asked
     if not isinstance(value.get("error", {}), dict):
         del value["error"]  # of a linearisation; not an error reply
     left_out = set() if full else DETAIL.get(name, set())

@@ -1,6 +1,7 @@
 """A robot's own file and URDF: what they make, and the one line that says what is wrong."""
 
 import dataclasses
+import math
 import pickle
 import re
 from importlib import resources
@@ -87,6 +88,68 @@ hand_com = { value = [0.0, 0.0, -0.04], unit = "m", source = "measured" }
     plain = robot_of(RobotFile("arms", toml + own.replace("-0.04", "0.0"), text))
     lift = robot.hand.mass * 0.04 / robot.mass
     np.testing.assert_allclose(robot.com - plain.com, [0.0, 0.0, lift], atol=1e-12)
+
+
+def test_links_without_capsules_have_one_from_joint_to_joint():
+    robot = robot_of(RobotFile("arm", TOML, TWO_LINK))
+    found = robot.capsules
+    assert found.names == robot.chains["leg"].joints
+    assert found.limbs == ("leg", "leg")
+    assert found.radii.tolist() == [0.05, 0.05]  # assumed, in scene.toml
+    # stretched out along x from (0.5, 0, 0), links of 0.6 and 0.4 m
+    placed = robot.placed_capsules({})
+    assert placed[:, :, 0] == pytest.approx(np.array([[0.5, 1.1], [1.1, 1.5]]))
+    assert robot.body_capsules[0].shape == (0, 2, 3)
+    # turned about y by a quarter they hang down
+    down = robot.placed_capsules({"leg": np.array([math.pi / 2.0, 0.0])})
+    assert down[:, :, 2] == pytest.approx(np.array([[0.0, -0.6], [-0.6, -1.0]]), abs=1e-12)
+
+
+def test_a_file_may_have_capsules_of_links_and_a_radius_of_the_others():
+    thick = TOML + entry("radius", 0.08, "m")
+    assert robot_of(RobotFile("arm", thick, TWO_LINK)).capsules.radii.tolist() == [0.08, 0.08]
+    own = "[capsules]\n" + entry('"tr*"', [0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.1], "m")
+    robot = robot_of(RobotFile("arm", f"{thick}\n{own}", TWO_LINK))
+    assert robot.capsules.names[0] == "trunk"
+    assert robot.capsules.limbs == (None, "leg", "leg")
+    ends, radii = robot.body_capsules
+    assert ends.tolist() == [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.3]]]
+    assert radii.tolist() == [0.1]
+
+
+def test_a_file_may_say_which_way_the_robots_back_is():
+    assert robot_of(RobotFile("arm", TOML, TWO_LINK)).back is None
+    told = "[robot]\n" + entry("back", [0.0, 3.0, 4.0], "1")
+    robot = robot_of(RobotFile("arm", f"{TOML}\n{told}", TWO_LINK))
+    assert robot.back.tolist() == [0.0, 0.6, 0.8]
+    assert robosimian().back.tolist() == [0.0, 0.0, 1.0]
+    none = "[robot]\n" + entry("back", [0.0, 0.0, 0.0], "1")
+    assert refusal(f"{TOML}\n{none}") == "robot.back: must not be zero"
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "message"),
+    [
+        ([0.0, 0.0, 0.0, 0.1], "m", "capsules.trunk: must be 7 numbers a capsule"),
+        ([0.0] * 7, "m", "capsules.trunk: must be 7 numbers a capsule, .* a radius up to 1 m"),
+        ([0.0] * 6 + [50.0], "m", "capsules.trunk: must be 7 numbers a capsule"),
+        ([0.0] * 6 + [0.1], "mm", "capsules.trunk.unit: must be in 'm'"),
+    ],
+)
+def test_capsules_that_are_none(values, unit, message):
+    assert re.match(message, refusal(TOML + "\n[capsules]\n" + entry("trunk", values, unit)))
+
+
+def test_the_bundled_robots_capsules_are_about_its_torso_and_all_links():
+    robot = robosimian()
+    found = robot.capsules
+    assert found.names.count("torso") == 7
+    assert {limb: found.limbs.count(limb) for limb in robot.limbs} == dict.fromkeys(robot.limbs, 10)
+    ends, radii = robot.body_capsules
+    reach = (np.abs(ends).max(axis=1) + radii[:, None]).max(axis=0)
+    # 0.93 m long, 0.5 m wide without its shoulders
+    assert reach[0] == pytest.approx(0.475, abs=0.011)
+    assert reach[1] == pytest.approx(0.26, abs=0.011)
 
 
 def test_the_centre_of_mass_may_be_given():

@@ -21,6 +21,7 @@ from planner.solving import plan
 from service.answering import questions
 from service.commands.cli import run
 from service.commands.stances import bundled, read_request, read_route
+from service.tables import console, print_route
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -367,3 +368,36 @@ def test_a_route_file_takes_joints_and_an_objective(
     path.write_text(json.dumps(text), encoding="utf-8")
     assert run(["route", str(path), "-o", str(tmp_path / "out")]) == 2
     assert capfd.readouterr().err.startswith("crux: objective: max_reliability is not supported")
+
+
+def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: Path, capsys):
+    first = route.moves[0].hand
+    high = Pose(np.array([*first.pose.position[:2], 3.0]), first.pose.rotation)
+    far = replace(route.moves[0], hand=replace(first, pose=high))
+    climbed = evaluate(replace(route, moves=(far, *route.moves[1:2])))
+    odd = [bool(answer.findings) for answer in climbed.plans]
+    holds = [
+        any(hand.limb == first.limb and hand.pose is high for hand in stage.question.stance.hands)
+        for stage in climbed.stages
+    ]
+    # from where it is placed on; the body's shift changes how far that is
+    assert odd == holds
+    assert any(odd)
+    told = summary(climbed)
+    reached = [answer.findings[0] for answer in climbed.plans if answer.findings]
+    assert {found.kind for found in reached} == {"out_of_reach"}
+    assert [each["message"] for each in told["findings"]] == [each.message for each in reached]
+    assert {each["move"] for each in told["findings"]} == {1, 2}
+    assert len(told["warnings"]) == len({found.message for found in reached})
+    assert told["warnings"][0].endswith(reached[0].message)
+    assert told["warnings"][0].startswith("move")
+    files = write_report(climbed, tmp_path)
+    with files["table"].open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [bool(row["warnings"]) for row in rows] == odd
+    print_route(climbed, files, console())
+    assert capsys.readouterr().out.count("warning:") == len(told["warnings"])
+
+
+def test_a_sound_route_has_nothing_odd(result):
+    assert summary(result)["warnings"] == summary(result)["findings"] == []

@@ -1,0 +1,117 @@
+"""What of a robot could be in the way: capsules about its links.
+
+A capsule is all places within its radius of a segment. A robot's file may have those of any link
+(``[capsules]``, by the link's name or a pattern of it). A limb's link without any has one from its
+joint to the next, of the limb's ``radius`` or else that of ``parameters/scene.toml``; other links
+have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from functools import cache
+from importlib import resources
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from hand_models.base import Array, Indices
+from hand_models.parameters import ParameterTable
+from planner.robots.build import ROOT_JOINT, Chain, pose_of
+from planner.robots.robot_file import RobotDescription
+
+__all__ = ["Capsules", "capsules_of"]
+
+BODY: Final = 0
+"""Step of what no joint moves."""
+
+
+class Capsules(NamedTuple):
+    """Capsules about links. Those of the body come first, then limb by limb, outward.
+
+    Attributes
+    ----------
+    names : tuple of str, length n
+        Of their links; several may be of one.
+    limbs : tuple of str or None, length n
+        Whose they are; None for the body's.
+    steps : ndarray of int, shape (n,)
+        How many of its limb's joints move a capsule; zero for the body's.
+    joints : ndarray of int, shape (n,)
+        Those that move them, in Pinocchio's model.
+    ends : ndarray, shape (n, 2, 3)
+        Of their segments, in these joints' frames [m].
+    radii : ndarray, shape (n,)
+        [m]
+    """
+
+    names: tuple[str, ...]
+    limbs: tuple[str | None, ...]
+    steps: Indices
+    joints: Indices
+    ends: Array
+    radii: Array
+
+
+class _Capsule(NamedTuple):
+    name: str
+    limb: str | None
+    step: int
+    joint: int
+    ends: Array
+    radius: float
+
+
+def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Chain]) -> Capsules:
+    """Return the capsules about a robot's links."""
+    places = {ROOT_JOINT: (None, BODY)} | {
+        joint: (limb, step)
+        for limb, chain in chains.items()
+        for step, joint in enumerate(chain.ids, start=1)
+    }
+    found = list(_given(model, described, places))
+    known = {capsule.joint for capsule in found}
+    for limb, chain in chains.items():
+        radius = described.mounts[limb].radius
+        radius = _default_radius() if radius is None else radius
+        link = model.frames[model.getFrameId(described.mounts[limb].link, pin.FrameType.BODY)]
+        steps = [model.jointPlacements[joint].translation for joint in chain.ids[1:]]
+        tips = zip(chain.ids, [*steps, link.placement.translation], strict=True)
+        for step, (joint, tip) in enumerate(tips, start=1):
+            if joint not in known:
+                name, segment = chain.joints[step - 1], np.array([np.zeros(3), tip])
+                found.append(_Capsule(name, limb, step, joint, segment, radius))
+    order = [None, *chains]
+    found.sort(key=lambda each: (order.index(each.limb), each.step))
+    return Capsules(
+        names=tuple(each.name for each in found),
+        limbs=tuple(each.limb for each in found),
+        steps=np.array([each.step for each in found], dtype=np.intp),
+        joints=np.array([each.joint for each in found], dtype=np.intp),
+        ends=np.array([each.ends for each in found]).reshape(-1, 2, 3),
+        radii=np.array([each.radius for each in found], dtype=float),
+    )
+
+
+def _given(
+    model: Any, described: RobotDescription, places: Mapping[int, tuple[str | None, int]]
+) -> Iterator[_Capsule]:
+    """Yield the capsules that a robot's file has; those of links that no limb has stay out."""
+    for frame in model.frames:
+        if frame.type != pin.FrameType.BODY or frame.parentJoint not in places:
+            continue
+        limb, step = places[frame.parentJoint]
+        for pattern, rows in described.capsules.items():
+            if fnmatchcase(frame.name, pattern):
+                for row in rows:
+                    ends = pose_of(frame.placement).apply(np.reshape(row[:6], (2, 3)))
+                    yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, row[6])
+
+
+@cache
+def _default_radius() -> float:
+    """Return the radius of a link of which nothing is known [m]."""
+    text = resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8")
+    return ParameterTable.read(text, "scene.toml").positive("link", "radius")

@@ -1,0 +1,5 @@
+"""A question looked at as a scene: what is odd, and may not be meant, and what is near what."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

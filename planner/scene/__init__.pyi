@@ -1,0 +1,3 @@
+from .distances import clearance as clearance, link_findings as link_findings
+from .oddities import findings as findings
+from .scene import Scene as Scene, scene_of as scene_of

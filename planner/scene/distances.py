@@ -1,0 +1,230 @@
+"""What is near what: the least distances, and with joints links in rock and in each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from planner.result import Clearance, Distance, Finding
+from planner.robots import Robot
+from planner.scene.scene import Scene
+from planner.scene.solids import Solid, capsule_solids, distance_between, hand_solids, rock_solids
+
+__all__ = ["clearance", "link_findings"]
+
+TOUCHING: Final = 0.02
+"""How deep links may be in rock or in each other before that is odd: capsules are rough [m]."""
+
+BODY: Final = "body"
+"""What messages and distances call what no joint moves."""
+
+NO_JOINTS: Final = "links: the joints are not known; give stance.joints, or 'solve'"
+"""Why no link is measured."""
+
+NO_BODY: Final = "body: the robot's file has no capsules of it"
+"""Why the body is not."""
+
+
+class _Pairs(NamedTuple):
+    """Solids that are measured from each other.
+
+    Attributes
+    ----------
+    first, second : sequence of Solid
+    which : ndarray of int, shape (n, 2)
+        One of the first and one of the second.
+    least : ndarray, shape (n,)
+        Lower bounds of their distances [m].
+    """
+
+    first: Sequence[Solid]
+    second: Sequence[Solid]
+    which: Indices
+    least: Array
+
+
+class _Near(NamedTuple):
+    first: Solid
+    second: Solid
+    distance: float
+    points: Sequence[Array]
+
+
+def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
+    """Return the least distances about a stance.
+
+    Parameters
+    ----------
+    scene : Scene
+    angles : mapping of str to ndarray, or None
+        Of every limb [rad]; None where they are not known: then links are not measured.
+    """
+    hands, rocks, body = hand_solids(scene), rock_solids(scene), _body(scene)
+    unchecked = [] if body else [NO_BODY]
+    of_links: dict[str, Distance | None] = {}
+    if angles is None:
+        unchecked.append(NO_JOINTS)
+    else:
+        links = _links(scene, angles)
+        of_links["link_rock"] = _least(scene, _with_rock(scene, links[len(body) :], rocks))
+        of_links["link_link"] = _least(scene, _among_links(scene, links, hands))
+    return Clearance(
+        **of_links,
+        hand_hand=_least(scene, _pairs(hands, hands, np.argwhere(np.tri(len(hands), k=-1)))),
+        hand_body=_least(scene, _pairs(hands, body, _every(hands, body))),
+        body_rock=_least(scene, _with_rock(scene, body, rocks)),
+        unchecked=unchecked,
+    )
+
+
+def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, ...]:
+    """Return links in rock and in each other.
+
+    Of given joints the deepest of each limb, and of each two of them; of solved ones, which nobody
+    has asked for one by one, the deepest of all.
+
+    Parameters
+    ----------
+    scene : Scene
+    angles : mapping of str to ndarray
+        Of every limb [rad].
+    """
+    robot, links = scene.stance.robot, _links(scene, angles)
+    owners = dict(zip(robot.capsules.names, robot.capsules.limbs, strict=True))
+    hands = hand_solids(scene)
+    owners |= dict(zip((hand.name for hand in hands), scene.limbs, strict=True))
+    moving = links[len(robot.body_capsules[0]) :]
+    asked = {
+        "link_in_rock": _with_rock(scene, moving, rock_solids(scene)),
+        "links_collide": _among_links(scene, links, hands),
+    }
+    solved = isinstance(scene.stance.joints, str)
+    found: dict[tuple[str, ...], _Near] = {}
+    for kind, pairs in asked.items():
+        for near in _inside(pairs):
+            limbs = [owners.get(solid.name) for solid in (near.first, near.second)]
+            key = (kind, *([] if solved else sorted(limb for limb in limbs if limb is not None)))
+            if key not in found or near.distance < found[key].distance:
+                found[key] = near
+    return tuple(_link_finding(*key[:2], near=near) for key, near in found.items())
+
+
+def _link_finding(kind: str, limb: str | None = None, *, near: _Near) -> Finding:
+    """Return what is said of a link; ``limb``: whose, where its joints were given."""
+    field, slip = "stance.joints", "'solve' looks at the hands alone; give angles that keep clear"
+    if limb is not None:
+        field, slip = f"stance.joints.{limb}", "are its angles in rad, from the body outward?"
+    deep = -near.distance
+    message = f"{near.first.name} is {deep:.2g} m in {near.second.name}: {slip}"
+    return Finding(kind, field, message, deep, "m")
+
+
+# Solids -------------------------------------------------------------------------------------------
+
+
+def _body(scene: Scene) -> tuple[Solid, ...]:
+    ends, radii = scene.stance.robot.body_capsules
+    return capsule_solids([BODY] * len(ends), ends, radii)
+
+
+def _links(scene: Scene, angles: Mapping[str, Array]) -> tuple[Solid, ...]:
+    """Return capsules of the body and all links, in the order of the robot's."""
+    robot = scene.stance.robot
+    named = zip(robot.capsules.names, robot.capsules.limbs, strict=True)
+    names = [BODY if limb is None else name for name, limb in named]
+    return capsule_solids(names, robot.placed_capsules(angles), robot.capsules.radii)
+
+
+# Pairs of them ------------------------------------------------------------------------------------
+
+
+def _every(first: Sequence[Solid], second: Sequence[Solid]) -> Indices:
+    return np.argwhere(np.ones((len(first), len(second))))
+
+
+def _pairs(first: Sequence[Solid], second: Sequence[Solid], which: Indices) -> _Pairs:
+    """Return pairs, which are at least as far from each other as the balls about them."""
+    if not len(which):
+        return _Pairs(first, second, which, np.zeros(0))
+    middles = [np.array([solid.middle for solid in some]) for some in (first, second)]
+    bounds = [np.array([solid.bound for solid in some]) for some in (first, second)]
+    i, j = which.T
+    apart = middles[0][i] - middles[1][j]
+    least = np.sqrt(np.einsum("nx,nx->n", apart, apart)) - bounds[0][i] - bounds[1][j]
+    return _Pairs(first, second, which, least)
+
+
+def _with_rock(scene: Scene, solids: Sequence[Solid], rocks: Sequence[Solid]) -> _Pairs:
+    """Return everything with all rock; of rock that is not smooth no bound is known."""
+    least = np.full((len(solids), len(rocks)), -np.inf)
+    smooth = [i for i, hand in enumerate(scene.hands) if hand.hold.swept is not None]
+    if smooth and solids:
+        middles = np.array([solid.middle for solid in solids])
+        bounds = np.array([solid.bound for solid in solids])
+        least[:, smooth] = -scene.smooth_depths(smooth, middles).T - bounds[:, None]
+    return _Pairs(solids, rocks, _every(solids, rocks), least.ravel())
+
+
+def _among_links(scene: Scene, links: Sequence[Solid], hands: Sequence[Solid]) -> _Pairs:
+    """Return links with links, the body and hands, but for those that are joined.
+
+    So are parts of one link, and those joined by joints that are nearer than both are thick. Hands
+    are measured from each other and from the body without joints.
+    """
+    robot, solids = scene.stance.robot, (*links, *hands)
+    order = [None, *robot.limbs]
+    limb = np.array([order.index(each) for each in (*robot.capsules.limbs, *scene.limbs)])
+    ends = [len(robot.chains[each].joints) for each in scene.limbs]
+    step = np.append(robot.capsules.steps, ends)
+    radii = np.array([solid.shape.radius for solid in solids])
+    i, j = np.triu_indices(len(solids), 1)
+    near, far = np.minimum(step[i], step[j]), np.maximum(step[i], step[j])
+    along, whose = _along(robot), np.maximum(limb[i], limb[j])
+    between = along[whose, far] - along[whose, near + 1]
+    alike = (limb[i] == limb[j]) | (limb[i] == 0) | (limb[j] == 0)
+    joined = alike & ((far - near <= 1) | (between < radii[i] + radii[j]))
+    of_hands = (j >= len(links)) & ((i >= len(links)) | (limb[i] == 0))
+    return _pairs(solids, solids, np.column_stack([i, j])[~(joined | of_hands)])
+
+
+def _along(robot: Robot) -> Array:
+    """Return how far along its limb each joint is [m]: rows by limb, the body's first; by step."""
+    most = max(len(chain.joints) for chain in robot.chains.values())
+    table = np.zeros((1 + len(robot.chains), most + 2))
+    for row, chain in zip(table[1:], robot.chains.values(), strict=True):
+        row[1:] = chain.spacing.sum()
+        row[1 : len(chain.spacing) + 1] = chain.spacing.cumsum()
+    return table
+
+
+# Their distances ----------------------------------------------------------------------------------
+
+
+def _inside(pairs: _Pairs) -> Iterator[_Near]:
+    """Yield pairs that are in each other."""
+    for i, j in pairs.which[pairs.least < -TOUCHING].tolist():
+        near = _measured(pairs, i, j)
+        if near.distance < -TOUCHING:
+            yield near
+
+
+def _least(scene: Scene, pairs: _Pairs) -> Distance | None:
+    """Return the least distance of pairs; None where there are none."""
+    best: _Near | None = None
+    for k in np.argsort(pairs.least, kind="stable").tolist():
+        if best is not None and pairs.least[k] >= best.distance:
+            break
+        near = _measured(pairs, *pairs.which[k].tolist())
+        best = near if best is None or near.distance < best.distance else best
+    if best is None:
+        return None
+    points = [scene.stance.body.apply(point).tolist() for point in best.points]
+    return Distance([best.first.name, best.second.name], best.distance, points)
+
+
+def _measured(pairs: _Pairs, i: int, j: int) -> _Near:
+    first, second = pairs.first[i], pairs.second[j]
+    return _Near(first, second, *distance_between(first, second))

@@ -1,0 +1,95 @@
+"""A stance as a scene: all that is looked at, in the body's frame, whatever the world's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hand_models.base import Array, Pose
+from hand_models.hand import SettledHand
+from planner.question import HandOnHold, Stance
+from planner.scene.rock import smooth_depths
+
+__all__ = ["Scene", "scene_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Where everything is, as seen from the body. Arrays are of the hands, in their order.
+
+    Attributes
+    ----------
+    stance : Stance
+    places : ndarray, shape (n, 3)
+        H's origins in B [m].
+    axes : ndarray, shape (n, 3, 3)
+        H's axes in B, as columns.
+    shoulders : ndarray, shape (n, 3)
+        Where the limbs begin, in B [m].
+    rocks : tuple of Pose
+        B in each hold's frame.
+    """
+
+    stance: Stance
+    places: Array
+    axes: Array
+    shoulders: Array
+    rocks: tuple[Pose, ...]
+
+    @property
+    def hands(self) -> tuple[HandOnHold, ...]:
+        """The stance's."""
+        return self.stance.hands
+
+    def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
+        """Return how deep points (n, 3) in B are in the smooth rock of hands, shape (k, n) [m]."""
+        rocks = [self.rocks[i] for i in hands]
+        turned = points @ np.array([rock.rotation.T for rock in rocks])
+        seen = turned + np.array([rock.position for rock in rocks])[:, None]
+        shapes = [self.hands[i].hold.swept for i in hands]
+        return smooth_depths([shape for shape in shapes if shape is not None], seen)
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Of the hands."""
+        return tuple(hand.limb for hand in self.hands)
+
+    @cached_property
+    def palms(self) -> tuple[Array, float]:
+        """A capsule in each hand, behind its palm's face: segments in B (n, 2, 3), radius [m].
+
+        It is as long as the palm and as wide as the bases of its outer fingers.
+        """
+        hand = self.stance.robot.hand
+        radius = min(abs(hand.outer_axis.item(1)), 0.5 * hand.palm_length)
+        half = 0.5 * hand.palm_length - radius
+        segment = np.array([[-half, 0.0, -radius], [half, 0.0, -radius]])
+        turned = np.einsum("nxy,ky->nkx", self.axes, segment)
+        return self.places[:, None] + turned, radius
+
+
+def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
+    """Return a stance, with its hands closed on their holds, as a scene."""
+    turn, hands = stance.body.rotation, stance.hands
+    positions = np.array([hand.pose.position for hand in hands])
+    rotations = np.array([hand.pose.rotation for hand in hands])
+    places = (positions - stance.body.position) @ turn
+    axes = turn.T @ rotations
+    chains = stance.robot.chains
+    seats = [each.seating.pose for each in settled]
+    seat_places = np.array([seat.position for seat in seats])
+    rock_axes = axes @ np.array([seat.rotation for seat in seats])
+    rock_places = places + np.einsum("nxy,ny->nx", axes, seat_places)
+    origins = -np.einsum("nxy,nx->ny", rock_axes, rock_places)
+    return Scene(
+        stance=stance,
+        places=places,
+        axes=axes,
+        shoulders=np.array([chains[hand.limb].shoulder for hand in hands]),
+        rocks=tuple(
+            [Pose(origin, each.T) for origin, each in zip(origins, rock_axes, strict=True)]
+        ),
+    )

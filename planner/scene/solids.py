@@ -1,0 +1,180 @@
+"""What can be in the way as shapes that `coal` measures, in B: capsules, hands, rock.
+
+A hold's rock goes on as its kind does: a wall without end, logs, edges and outlines drawn out along
+y, as far as the limbs get.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+import coal
+import numpy as np
+
+from hand_models.base import Array, BoundedStore, Indices, Pose
+from hand_models.rock import Edge, Ellipsoid, Hold, Mesh, Plane, Profile
+from planner.scene.scene import Scene
+
+__all__ = ["Solid", "capsule_solids", "distance_between", "hand_solids", "rock_solids"]
+
+FAR: Final = 4.0
+"""How far rock goes that is drawn out, or along faces of an edge, from its crest [m]."""
+
+KEPT: Final[BoundedStore[Hold, Any]] = BoundedStore("rock as shapes", 64)
+"""Shapes of holds that were asked for last."""
+
+TURN: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Axes of a log, which `coal` has along z, in a hold's frame, which has it along y."""
+
+REQUEST: Final = coal.DistanceRequest(True)
+"""Nearest points are wanted, too."""
+
+
+class Solid(NamedTuple):
+    """Something in its place.
+
+    Attributes
+    ----------
+    name : str
+    shape
+        Of `coal`.
+    place
+        `coal.Transform3s` in B.
+    middle : ndarray, shape (3,)
+        Of a ball about it, in B [m].
+    bound : float
+        Radius of that ball; infinite for rock [m].
+    """
+
+    name: str
+    shape: Any
+    place: Any
+    middle: Array
+    bound: float
+
+
+def capsule_solids(names: Iterable[str], ends: Array, radii: Array) -> tuple[Solid, ...]:
+    """Return capsules with segments (n, 2, 3) in B and radii (n,) [m]."""
+    along, middles = ends[:, 1] - ends[:, 0], 0.5 * (ends[:, 0] + ends[:, 1])
+    lengths = np.linalg.norm(along, axis=1)
+    turns = _along_z(along, lengths)
+    bounds = 0.5 * lengths + radii
+    return tuple(
+        Solid(name, coal.Capsule(radius, length), coal.Transform3s(turn, middle), middle, bound)
+        for name, radius, length, turn, middle, bound in zip(
+            names, radii.tolist(), lengths.tolist(), turns, middles, bounds.tolist(), strict=True
+        )
+    )
+
+
+def _along_z(along: Array, lengths: Array) -> Array:
+    """Return axes whose z is along vectors (n, 3), shape (n, 3, 3)."""
+    size = np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    z = np.where(lengths[:, None] > 0.0, along / size, [0.0, 0.0, 1.0])
+    least = np.eye(3)[np.abs(z).argmin(axis=1)]
+    x = np.cross(least, z)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def hand_solids(scene: Scene) -> tuple[Solid, ...]:
+    """Return a capsule in every hand."""
+    segments, radius = scene.palms
+    names = [f"hand of {limb}" for limb in scene.limbs]
+    return capsule_solids(names, segments, np.full(len(names), radius))
+
+
+def rock_solids(scene: Scene) -> tuple[Solid, ...]:
+    """Return the rock of every hand."""
+    found = []
+    for hand, rock in zip(scene.hands, scene.rocks, strict=True):
+        shape, centre = KEPT.get(hand.hold, partial(_rock, hand.hold, scene))
+        place = rock.inverse() @ centre
+        found.append(
+            Solid(
+                f"rock of {hand.limb}",
+                shape,
+                coal.Transform3s(place.rotation, place.position),
+                place.position,
+                np.inf,
+            )
+        )
+    return tuple(found)
+
+
+def _rock(hold: Hold, scene: Scene) -> tuple[Any, Pose]:
+    """Return a hold's shape, and where that is in the hold's frame."""
+    match hold:
+        case Plane():
+            return coal.Halfspace(np.array([0.0, 0.0, -1.0]), 0.0), Pose.identity()
+        case Edge():
+            return _wedge(hold), Pose.identity()
+        case Ellipsoid():
+            return coal.Ellipsoid(*hold.semi_axes), Pose(
+                np.array([0.0, 0.0, hold.semi_axes[2]]), np.eye(3)
+            )
+        case Mesh():
+            return _surface(*hold.triangles), Pose.identity()
+        case Profile():
+            return _drawn_out(hold, scene), Pose.identity()
+    swept = hold.swept
+    if swept is None:
+        raise TypeError(f"no shape for a {type(hold).__name__}")
+    centre = np.array([0.0, 0.0, swept.depth])
+    if swept.scale_y:
+        return coal.Sphere(swept.radius), Pose(centre, np.eye(3))
+    return coal.Cylinder(swept.radius, 2.0 * FAR), Pose(centre, TURN)
+
+
+def _wedge(edge: Edge) -> Any:
+    """Return an edge's rock: all within the fillet's radius of a sharp one."""
+    radius, half = edge.fillet_radius, 0.5 * edge.angle
+    aside, deep = FAR * np.sin(half), radius + FAR * np.cos(half)
+    section = [(0.0, radius), (aside, deep), (-aside, deep)]
+    points = coal.StdVec_Vec3s()
+    points.extend([np.array([x, y, z]) for x, z in section for y in (-FAR, FAR)])
+    shape = coal.ConvexBase.convexHull(points, True, "Qt")
+    shape.setSweptSphereRadius(radius)
+    return shape
+
+
+def _drawn_out(profile: Profile, scene: Scene) -> Any:
+    """Return outlines drawn out along y, each over its finger's strip."""
+    hand = scene.stance.robot.hand
+    bounds = [FAR, -FAR]
+    if len(profile.outlines) > 1:
+        half_way = 0.5 * float(hand.inner_joint[1] + hand.outer_axis[1])
+        bounds = [FAR, half_way, 0.0, -half_way, -FAR]
+    vertices, faces, count = [], [], 0
+    for outline, top, bottom in zip(profile.outlines, bounds, bounds[1:], strict=False):
+        first = count + np.arange(len(outline) - 1)
+        beside = first + len(outline)
+        vertices += [np.insert(outline, 1, y, axis=1) for y in (bottom, top)]
+        faces += [
+            np.column_stack([first, first + 1, beside]),
+            np.column_stack([beside, first + 1, beside + 1]),
+        ]
+        count += 2 * len(outline)
+    return _surface(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _surface(vertices: Array, faces: Indices) -> Any:
+    """Return triangles."""
+    shape = coal.BVHModelOBBRSS()
+    shape.beginModel(len(faces), len(vertices))
+    shape.addVertices(np.ascontiguousarray(vertices, dtype=float))
+    shape.addTriangles(np.ascontiguousarray(faces, dtype=np.int64))
+    shape.endModel()
+    return shape
+
+
+def distance_between(first: Solid, second: Solid) -> tuple[float, Sequence[Array]]:
+    """Return the distance of two solids, below zero how deep they are in each other [m].
+
+    And the nearest points of both, in B [m].
+    """
+    result = coal.DistanceResult()
+    away = coal.distance(first.shape, first.place, second.shape, second.place, REQUEST, result)
+    return float(away), (result.getNearestPoint1(), result.getNearestPoint2())

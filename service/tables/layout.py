@@ -1,0 +1,39 @@
+"""How tables look, in 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+__all__ = ["console", "show", "table_of", "unit_of"]
+
+
+def console(stderr: bool = False) -> Console:
+    """Return the console on standard output, or on standard error."""
+    return Console(highlight=False, stderr=stderr)
+
+
+def show(title: str, table: Table, out: Console) -> None:
+    """Print a table under its title."""
+    out.print(f"\n[bold]{title}[/bold]")
+    out.print(table)
+
+
+def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
+    """Return a table with columns of names, then of numbers, then of words, which may wrap."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for name in names:
+        table.add_column(name, no_wrap=True)
+    for name in numbers:
+        table.add_column(name, justify="right")
+    for name in words:
+        table.add_column(name)
+    return table
+
+
+def unit_of(axis: str) -> str:
+    """Return the unit of a component of a wrench."""
+    return "N" if axis.startswith("f") else "N·m"
