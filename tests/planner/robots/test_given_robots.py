@@ -278,7 +278,7 @@ def test_what_is_no_bare_number(number, message):
 def test_the_bundled_robot_has_unit_and_source_of_every_number():
     text = resources.files("planner.parameters").joinpath("robosimian.toml").read_text("utf-8")
     entries = list(leaves(tomllib.loads(text)))
-    assert len(entries) == 5
+    assert len(entries) == 11
     assert all({"value", "unit", "source"} <= entry.keys() for entry in entries)
 
 

@@ -121,7 +121,7 @@ def test_what_is_wanted_is_wanted_once() -> None:
 def test_a_scatter_of_many_rows_is_refused_before_it_is_drawn() -> None:
     error = answered(asked(64, want=["robust"]))["error"]
     assert (error["kind"], error["field"]) == ("limit", "want")
-    assert "robust: 1879 rows" in error["message"]
+    assert "robust: 1887 rows" in error["message"]
 
 
 def test_a_hand_that_carries_nothing_has_no_vertices_where_these_are_asked_for() -> None:

@@ -50,7 +50,7 @@ def test_the_first_python_example_prints_a_plan_that_holds(capsys: pytest.Captur
 def test_the_examples_of_draws_tell_how_sure_a_plan_is(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
-    text, _ = blocks("toml")
+    text = next(text for text in blocks("toml") if "[[draws]]" in text)
     file = tmp_path / "draws.toml"
     file.write_text(text, encoding="utf-8")
     assert run(["plan", "wall-300", "--draws", str(file), "--json"]) == 0
@@ -107,7 +107,7 @@ def test_the_example_of_a_floating_hand_prints_stiffness_pose_and_limit(
 def test_the_example_of_an_own_hand_changes_the_plan(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
-    _, text = blocks("toml")
+    text = blocks("toml")[-1]
     file = tmp_path / "mine.toml"
     file.write_text(text, encoding="utf-8")
     assert run(["plan", "wall-300", "--hand", str(file), "--json"]) == 0
