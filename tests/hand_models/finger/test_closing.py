@@ -80,7 +80,7 @@ def on_rough_rock(first, count):
         for on_hold, closed in zip(on_holds, found, strict=True)
         if isinstance(closed, Refused)
     ]
-    assert sum(closed.depth == 0.0 for _, closed in refused) <= 0.003 * count
+    assert sum(closed.depth == 0.0 for _, closed in refused) <= max(1, 0.003 * count)
     deep = [(on_hold, closed) for on_hold, closed in refused if closed.depth > 0.0]
     # one that is deeper in the rock than a phalanx is long may find no way out of it
     deepest = MODEL.joint_spacing
@@ -100,8 +100,9 @@ def test_on_rough_rock_fingers_close():
 
 
 @pytest.mark.slow
-def test_on_rough_rock_fingers_close_slow():
-    on_rough_rock(10_000, 2000)
+@pytest.mark.parametrize("first", range(10_000, 12_000, 500))
+def test_on_rough_rock_fingers_close_slow(first):
+    on_rough_rock(first, 500)
 
 
 def test_spines_are_pulled_off_where_their_drag_is_too_little_for_the_pull():
