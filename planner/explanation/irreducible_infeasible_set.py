@@ -203,6 +203,8 @@ class _Rows(NamedTuple):
                 shares, _ = nnls(np.hstack([above, -N[:, freed]]), missing)
             except RuntimeError:  # it has come to no end
                 continue
+            if not np.isfinite(shares).all():
+                continue
             slack = np.append(np.zeros(BODY), shares[: above.shape[1]])
             slack[freed] -= shares[above.shape[1] :]
             yield place, inverse @ (self.right - slack)

@@ -163,7 +163,7 @@ def _read(question: Question) -> None:
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
     many = isinstance(want, list) and any(each in want for each in DEAR)
-    unread = want is None and bool(bytes(head.want))
+    unread = len(bytes(head.want)) > SMALL
     question.dear = question.dear or many or unread
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 

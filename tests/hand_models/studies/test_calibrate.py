@@ -136,6 +136,7 @@ def test_at_least_thirty_sets_from_several_valleys_are_bundled():
     assert max(table.vector("fit", "misfit")) <= 1.0
 
 
+@pytest.mark.slow
 def test_a_search_goes_down_and_keeps_what_meets_the_data():
     told = []
     met = global_search(FIT, FIT.start(), 0.02, 16, 1, lambda: told.append(1))

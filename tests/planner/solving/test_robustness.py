@@ -59,6 +59,20 @@ def with_all(**changes):
     return replace(stance, hands=tuple(replace(hand, **changes) for hand in stance.hands))
 
 
+def near_one_place(apart: float):
+    stance = on_wall()
+    place = stance.hands[0].pose
+    return replace(
+        stance,
+        hands=tuple(
+            replace(
+                hand, pose=Pose(place.position + np.array([0.0, apart * i, 0.0]), place.rotation)
+            )
+            for i, hand in enumerate(stance.hands)
+        ),
+    )
+
+
 def surface(shear_limit: float) -> Surface:
     return Surface.from_values({"shear_limit": shear_limit})
 
@@ -71,7 +85,7 @@ ANSWERED = {
         "infeasible",
     ),
     "one hand without rock": (with_first(hold_in_hand=FAR), "overloaded"),
-    "four hands at one place": (with_all(pose=on_wall().hands[0].pose), "overloaded"),
+    "four hands nearly at one place": (near_one_place(1e-3), "overloaded"),
     "one hand alone": (on_wall(limbs=("front_left",)), "overloaded"),
     "two hands one above the other": (on_wall(limbs=("front_left", "rear_left")), "overloaded"),
     "tiles of a millinewton": (on_wall(surface=surface(1e-3)), "overloaded"),
