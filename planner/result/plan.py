@@ -11,6 +11,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
+from planner.result.advice import Advice
 from planner.result.hand_plan import HandPlan
 from planner.result.plain_parts import (
     LimitName,
@@ -143,6 +144,10 @@ class Plan:
         body wrench is zero, any multiple of which is the same.
     spread : Spread or None
         Utilisation and load factor over draws of the numbers, if it was asked for.
+    advice : tuple of Advice or None
+        What would make it hold, or hold more, if that was asked for (`planner.advice.plan`): what
+        holds first, the smallest change first of that; of the rest that of most gain for its size.
+        None also where a deadline left no time to begin.
     """
 
     status: Status
@@ -169,6 +174,7 @@ class Plan:
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
     spread: Spread | None = None
+    advice: tuple[Advice, ...] | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

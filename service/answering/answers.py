@@ -54,6 +54,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         certificate=certificate,
         robust=answer.robust or UNSET,
         spread=answer.spread or UNSET,
+        advice=UNSET if answer.advice is None else list(answer.advice),
     )
 
 

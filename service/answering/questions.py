@@ -17,7 +17,17 @@ from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner.prepare import settle_each
-from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
+from planner.question import (
+    EARTH,
+    BodyRange,
+    ForceCap,
+    HandOnHold,
+    Limits,
+    Load,
+    Objective,
+    Question,
+    Stance,
+)
 from planner.route import Move, Route
 from service import requests
 from service.answering.holds import Rocks, placed, pose_of, rocks_of
@@ -67,6 +77,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
         draws=_draws(request.draws),
+        body_range=BodyRange(request.body_range.shift, request.body_range.tilt),
     )
 
 

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import LimitName, Price, RobustLoadFactor, Solver, Spread, TensionPath, Time
+from planner.result import (
+    Advice,
+    LimitName,
+    Price,
+    RobustLoadFactor,
+    Solver,
+    Spread,
+    TensionPath,
+    Time,
+)
 from service.replies.hand import Hand, WrenchSet
 from service.replies.reply import StanceReply, Vector
 from service.replies.stream import HandSetPoints
@@ -52,9 +61,10 @@ class PlanReply(StanceReply, kw_only=True):
     would take off the effort, where the objective is ``min_effort``. ``unfinished``: what a
     deadline has left out, and a warning tells: ``least_utilisation`` (that no plan uses less is not
     proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``, ``path``,
-    ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
+    ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``. ``robust`` comes with
     ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` with
-    ``"want": ["spread"]``.
+    ``"want": ["spread"]``, ``advice`` with ``"want": ["advice"]``: what holds first, the smallest
+    change first of that; of the rest that of most gain for its size.
     """
 
     status: str
@@ -82,6 +92,7 @@ class PlanReply(StanceReply, kw_only=True):
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
+    advice: list[Advice] | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):

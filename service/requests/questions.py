@@ -33,6 +33,7 @@ from service.requests.stance import Entries, Hand, HandEntries, Stance
 __all__ = [
     "Axis",
     "AxisForce",
+    "BodyRange",
     "BodySpaceRequest",
     "Draw",
     "ForceCap",
@@ -73,7 +74,7 @@ ObjectiveName = Annotated[
         "max_reliability is not supported in this version"
     ),
 ]
-Want = Literal["load_factor", "prices", "model", "robust", "spread"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "advice"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]
@@ -140,6 +141,18 @@ class Draw(Strict, frozen=True, kw_only=True):
     ] = None
 
 
+class BodyRange(Strict, frozen=True, kw_only=True):
+    """How far an advice may move the body from where it is."""
+
+    shift: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="along each axis of B, either way [m]")
+    ] = 0.15
+    tilt: Annotated[
+        float,
+        Meta(ge=0.0, le=1.0, description="about an axis of B, through the centre of mass [rad]"),
+    ] = 0.2
+
+
 class PlanRequest(Query, frozen=True, kw_only=True):
     """Asks who carries what in a stance."""
 
@@ -160,7 +173,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         list[Want],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
-            "spread: utilisation and load factor over draws of the hand's and the rock's numbers"
+            "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
+            "advice: what would make it hold, or hold more: verified changes"
         ),
     ] = []
     draws: Annotated[
@@ -171,6 +185,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
             description="over which the spread is told; by default those of draws.toml",
         ),
     ] = []
+    body_range: Annotated[BodyRange, Meta(description="for the advice")] = BodyRange()
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
