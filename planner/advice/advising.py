@@ -110,7 +110,7 @@ def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], 
     # what costs least effort is planned again for what is told
     again = question.objective != "max_margin"
     try:
-        trials = Trials(question, plans - MOST if again else plans)
+        trials = Trials(question, plans - MOST - 1 if again else plans)
     except DeadlineError:
         return (), False
     whole, told = True, []
@@ -119,9 +119,12 @@ def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], 
     except DeadlineError:
         whole = False
     try:
+        known = trials.again(trials.question, question.objective) if again else trials.base
         for tried in _ranked(trials)[:MOST]:
-            trial = trials.again(tried, question.objective) if again else tried.trial
-            told.append(_told(trials, tried.change, trial))
+            trial = trials.again(tried.question, question.objective) if again else tried.trial
+            # what costs least effort may use more than it has to, or have no plan that passes
+            if trial.utilisation < known.utilisation:
+                told.append(_told(trials, tried.change, trial))
     except DeadlineError:
         whole = False
     return tuple(told), whole
@@ -161,6 +164,8 @@ def _order(trials: Trials) -> list[int]:
 def _pair(trials: Trials) -> None:
     """Try pairs of the changes that did most, until one holds."""
     singles = sorted(_best_each(trials), key=lambda tried: tried.utilisation)
+    if not singles:
+        return
     if can_move(trials.base.prepared):
         for tried in [each for each in singles if each.change.kind != "body"][:2]:
             _beside(trials, tried)

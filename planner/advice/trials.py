@@ -103,9 +103,9 @@ class Trials:
         """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
         return self._try(prepared.turned(wrench))
 
-    def again(self, tried: Tried, objective: Objective) -> Trial:
+    def again(self, question: Question, objective: Objective) -> Trial:
         """Plan what was tried for another objective."""
-        return self._try(prepare_stance(replace(tried.question, objective=objective)))
+        return self._try(prepare_stance(replace(question, objective=objective)))
 
     def _asked(self, candidates: Sequence[Change]) -> list[tuple[Change, Question]]:
         found = []

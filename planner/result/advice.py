@@ -20,8 +20,9 @@ class Advice(Struct, frozen=True):
     ----------
     kind : str
         ``body``: shift and tilt it; ``place``: move or turn a hand on its rock, which stays;
-        ``grasp``: take a hold, or all, with outer fingers otherwise; ``let_go``: without a hand;
-        ``free_hand``: with one more, if rock is there; ``strength``: a stronger hold, or all;
+        ``grasp``: take a hold, or all, with outer fingers or closing tension otherwise;
+        ``let_go``: without a hand; ``free_hand``: with one more, if rock is there; ``new_hold``:
+        with a hand elsewhere, if rock is there; ``strength``: a stronger hold, or all;
         ``mass``: a lighter body; ``pair``: two of these.
     limbs : list of str
         Whose hands it is about; none for the body.
@@ -34,15 +35,15 @@ class Advice(Struct, frozen=True):
         first, hands are taken away last.
     size : float
         How large the change is: the body's shift over 0.1 m plus its tilt over 0.2 rad; a hand's
-        way over 0.02 m plus its turn over 0.5 rad; the turn of outer fingers over π/2, summed over
-        hands; 2 for a hand more or less; ln of how many times as strong holds become over ln 1.1,
-        summed over hands; ln of how many times lighter the body becomes over ln 1.1. Of a pair the
-        sum.
+        way over 0.02 m plus its turn over 0.5 rad; the turn of outer fingers over π/2 and the
+        change of closing tension over 10 N, summed over hands; 2 for a hand more, less or
+        elsewhere; ln of how many times as strong holds become over ln 1.1, summed over hands; ln of
+        how many times lighter the body becomes over ln 1.1. Of a pair the sum.
     status : str
         ``optimal`` or ``overloaded``, with the change.
     utilisation : float
     load_factor : float or None
-        None where there is none, or no end to it.
+        None where there is none, no end to it, or no time to find it.
     holds : bool
         Whether the utilisation is within the cap that was asked for.
     """

@@ -147,7 +147,6 @@ class Plan:
     advice : tuple of Advice or None
         What would make it hold, or hold more, if that was asked for (`planner.advice.plan`): what
         holds first, the smallest change first of that; of the rest that of most gain for its size.
-        None also where a deadline left no time to begin.
     """
 
     status: Status

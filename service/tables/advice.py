@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import islice
 from typing import Final
 
+from rich.console import Console
+
 from planner.result import Advice
 
-__all__ = ["advice_lines"]
+__all__ = ["print_advice"]
 
 MOST: Final = 3
 """Changes shown; the best first."""
 
 
-def advice_lines(told: Iterable[Advice]) -> Iterator[str]:
-    """Yield what would make a stance hold, or hold more."""
+def print_advice(told: Iterable[Advice], out: Console) -> None:
+    """Print what would make a stance hold, or hold more."""
     for advice in islice(told, MOST):
         what = "would hold" if advice.holds else "would help"
-        yield f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
+        out.print(f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}", markup=False)

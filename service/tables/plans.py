@@ -23,7 +23,7 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
-from service.tables.advice import advice_lines
+from service.tables.advice import print_advice
 from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = [
@@ -86,8 +86,7 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if isinstance(reply.robust, RobustLoadFactor):
         out.print(robust_sentence(reply.robust), markup=False)
-    for line in advice_lines(reply.advice or ()):
-        out.print(line, markup=False)
+    print_advice(reply.advice or (), out)
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
