@@ -1,3 +1,4 @@
+from .advice import plan as plan
 from .prepare import hand_space as hand_space
 from .question import (
     HandOnHold as HandOnHold,
@@ -7,5 +8,5 @@ from .question import (
     Stance as Stance,
 )
 from .result import Plan as Plan
-from .solving import KnownStance as KnownStance, plan as plan
+from .solving import KnownStance as KnownStance
 from .streaming import WrenchStream as WrenchStream

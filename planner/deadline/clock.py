@@ -50,6 +50,7 @@ Unfinished = Literal[
     "explanation",
     "robust",
     "spread",
+    "advice",
 ]
 
 UNFINISHED: Final[dict[Unfinished, str]] = {
@@ -63,6 +64,7 @@ UNFINISHED: Final[dict[Unfinished, str]] = {
     "explanation": "it was found which limits alone leave no balance",
     "robust": "the load factor was found at all places of the hands",
     "spread": "a plan was found in all draws of the numbers",
+    "advice": "all changes were tried that might make it hold",
 }
 """What was not there yet."""
 

@@ -5,6 +5,7 @@ from .draws import (
 )
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
+    BodyRange as BodyRange,
     ForceCap as ForceCap,
     Limits as Limits,
     Load as Load,

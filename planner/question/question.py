@@ -15,7 +15,7 @@ from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["MOST_DRAWS", "ForceCap", "Limits", "Load", "Objective", "Question"]
+__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Load", "Objective", "Question"]
 
 Frame = Literal["hand", "body", "world"]
 
@@ -173,13 +173,35 @@ Objective = Literal["max_margin", "min_effort"]
 OBJECTIVES: Final = get_args(Objective)
 """What a plan may be the best in."""
 
-Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
 
 WANTS: Final = get_args(Want)
 """What may be wanted beside a plan."""
 
 MOST_DRAWS: Final = 100
 """Of a caller's own: each costs a plan and a load factor."""
+
+
+@dataclass(frozen=True)
+class BodyRange:
+    """How far an advice may move the body from where it is.
+
+    Attributes
+    ----------
+    shift : float
+        Along each axis of B, either way [m].
+    tilt : float
+        About one axis of B through the centre of mass, either way [rad].
+    """
+
+    shift: float = 0.15
+    tilt: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, unit in (("shift", "m"), ("tilt", "rad")):
+            most = getattr(self, name)
+            if not (math.isfinite(most) and most >= 0.0):
+                raise InvalidInputError(f"must be 0 {unit} or more, got {most:g}", field=name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +215,9 @@ class Question:
         In B [N, N·m]; computed from ``load`` if it is not given.
     load : Load
     limits : Limits
-    want : frozenset of {'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance'}
-        Extras.
+    want : frozenset of str
+        Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance', and 'advice',
+        which is given by `planner.advice.plan`.
     objective : {'max_margin', 'min_effort'}
         Least utilisation; or least sum of squared relative tensions and joint torques, at a
         utilisation within the limits.
@@ -207,6 +230,8 @@ class Question:
     explain : bool
         Whether it is proven and told what keeps an overloaded or infeasible stance from a plan.
         That a plan is the least, and that there is none, is always checked.
+    body_range : BodyRange
+        How far the ``advice`` may move the body.
     """
 
     stance: Stance
@@ -219,6 +244,7 @@ class Question:
     deadline: float | None = None
     draws: tuple[Draw, ...] | None = None
     explain: bool = True
+    body_range: BodyRange = BodyRange()
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:

@@ -1,3 +1,4 @@
+from .advice import Advice as Advice, AdviceKind as AdviceKind
 from .floating_load_recovery import recover_floating_hand as recover_floating_hand
 from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
 from .load_recovery import LoadRecovery as LoadRecovery

@@ -11,6 +11,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
+from planner.result.advice import Advice
 from planner.result.hand_plan import HandPlan
 from planner.result.plain_parts import (
     Clearance,
@@ -150,6 +151,9 @@ class Plan:
         Utilisation and load factor over draws of the numbers, if it was asked for.
     clearance : Clearance or None
         The least distances, if they were asked for.
+    advice : tuple of Advice or None
+        What would make it hold, or hold more, if that was asked for (`planner.advice.plan`): what
+        holds first, the smallest change first of that; of the rest that of most gain for its size.
     """
 
     status: Status
@@ -178,6 +182,7 @@ class Plan:
     robust: RobustLoadFactor | None = None
     spread: Spread | None = None
     clearance: Clearance | None = None
+    advice: tuple[Advice, ...] | None = None
 
     @property
     def joint_utilisation(self) -> float | None:

@@ -118,11 +118,33 @@ class Robot:
 
         Above 1 is out of reach.
         """
+        away, reach = self.limb_spans(body, limbs, hands)
+        return (np.sqrt(np.einsum("nx,nx->n", away, away)) / reach).tolist()  # type: ignore[no-any-return]
+
+    def limb_spans(
+        self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]
+    ) -> tuple[Array, Array]:
+        """Return the ways from limbs' shoulders to the links that carry their hands, and reaches.
+
+        Parameters
+        ----------
+        body : Pose
+            B in W.
+        limbs : sequence of str
+        hands : sequence of Pose
+            H in W of each.
+
+        Returns
+        -------
+        away : ndarray, shape (n, 3)
+            In B [m].
+        reach : ndarray, shape (n,)
+            Upper bound of its length [m].
+        """
         ends = np.array([self._ends[limb] for limb in limbs])
         links = np.einsum("nxy,ny->nx", np.array([hand.rotation for hand in hands]), ends[:, :3])
         links += np.array([hand.position for hand in hands]) - body.position
-        away = links @ body.rotation - ends[:, 3:6]
-        return (np.sqrt(np.einsum("nx,nx->n", away, away)) / ends[:, 6]).tolist()  # type: ignore[no-any-return]
+        return links @ body.rotation - ends[:, 3:6], ends[:, 6]
 
     @property
     def data(self) -> Any:

@@ -24,7 +24,7 @@ from planner.result import (
 from planner.scene import findings, link_findings, scene_of
 from planner.verification import Check
 
-__all__ = ["PreparedChecks", "Reading", "prepare_checks", "read_loads"]
+__all__ = ["PreparedChecks", "Reading", "idle_joints", "prepare_checks", "read_loads"]
 
 
 class PreparedChecks(NamedTuple):
@@ -73,7 +73,7 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
     return PreparedChecks(
         recovery=None if hands.floating else _recovery(prepared),
         check=Check(prepared.question, batch, where),
-        idle=_idle_joints(prepared),
+        idle=idle_joints(prepared),
         findings=odd,
         oddities=(
             *(each.message for each in odd),
@@ -90,7 +90,8 @@ def _recovery(prepared: PreparedStance) -> LoadRecovery:
     return made() if hands.own else RECOVERIES.get((batch.hands, cap), made)
 
 
-def _idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
+def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
+    """Return how much of their joints' torque limbs without a hand use."""
     where = prepared.where
     idle = {} if where is None else where.idle(prepared.question.stance)
     return tuple(

@@ -8,25 +8,20 @@ where that was found. A draw's plan has neither certificate nor prices nor words
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
 from planner import deadline
-from planner.deadline import Budget, DeadlineError, Overlap
+from planner.deadline import DeadlineError
 from planner.explanation import LimitUse
-from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance
 from planner.programs import SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
-from planner.result import DrawnPlan, LoadRecovery, Spread
-from planner.solving.load_factor import find_load_factor
-from planner.solving.prepared_checks import PreparedChecks
-from planner.solving.solution import not_least, solve_question
-from planner.solving.why_not import look_again
-from planner.verification import Check
+from planner.result import DrawnPlan, Spread
+from planner.solving.trial import try_stance
 
 __all__ = ["find_spread"]
 
@@ -86,21 +81,8 @@ def _planned(
     except InvalidInputError:
         # a preload that a floating hand does not hold
         return DrawnPlan()
-    checks, budget = Overlap(partial(_checks, there, idle)), Budget(PROGRAMS)
-    found = solve_question(there, checks, budget)
-    if not found.passes:
-        found, _ = look_again(there, checks, found, budget, prove=False)
-    factor = find_load_factor(there, found, idle, budget).factor
-    reading = found.reading
-    if not found.passes or reading is None or not_least(found):
+    trial = try_stance(there, idle)
+    used, factor = trial.utilisation, trial.load_factor().factor
+    if math.isinf(used):
         return DrawnPlan(load_factor=factor)
-    cap = there.question.limits.utilisation
-    return DrawnPlan(reading.whole, factor, reading.whole <= cap + SLACK)
-
-
-def _checks(there: PreparedStance, idle: Sequence[LimitUse]) -> PreparedChecks:
-    """Return what reads and checks plans of a draw, of which nothing is kept."""
-    batch, hands, recovery = there.batch, there.hands, None
-    if not hands.floating:
-        recovery = LoadRecovery(batch, hands.spaces, hands.scaled)
-    return PreparedChecks(recovery, Check(there.question, batch, there.where), tuple(idle), (), ())
+    return DrawnPlan(used, factor, used <= there.question.limits.utilisation + SLACK)

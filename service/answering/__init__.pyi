@@ -1,3 +1,4 @@
+from .advice_requests import advised as advised
 from .body_space import explore as explore
 from .dispatch import (
     SERVICES as SERVICES,
@@ -5,6 +6,7 @@ from .dispatch import (
     handle as handle,
     plan as plan,
     planned as planned,
+    with_advice as with_advice,
 )
 from .hand_spaces import wrench_space as wrench_space
 from .mesh_files import MeshFiles as MeshFiles

@@ -56,6 +56,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         robust=answer.robust or UNSET,
         spread=answer.spread or UNSET,
         clearance=answer.clearance or UNSET,
+        advice=UNSET if answer.advice is None else list(answer.advice),
     )
 
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner import deadline, solving
+from planner import advice, deadline
 from planner.deadline import DeadlineError
 from planner.question import Question
 from planner.result import Plan
@@ -51,6 +51,7 @@ __all__ = [
     "handle",
     "plan",
     "planned",
+    "with_advice",
 ]
 
 log = logging.getLogger(__name__)
@@ -89,7 +90,7 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
         wanted = [want for want in request.want if want in told]
         request = replace(request, want=wanted, draws=[])
     asked = question(request, robots)
-    answer = solving.plan(asked)
+    answer = advice.plan(asked)
     reply: PlanReply | BriefPlanReply
     if request.detail == "full":
         reply = plan_reply(answer, request.id, model="model" in request.want)
@@ -98,6 +99,22 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     if request.detail != "set_points":
         reply.poses = placed_poses(asked.stance)
     return Planned(asked, answer, reply)
+
+
+def with_advice(answer: Planned) -> Planned:
+    """Return an answer with advice, if its reply is whole and there is none yet."""
+    if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
+        return answer
+    found = advice.with_advice(answer.question, answer.plan)
+    told = plan_reply(found, answer.reply.id, model=False)
+    reply = replace(
+        answer.reply,
+        advice=told.advice,
+        warnings=told.warnings,
+        unfinished=told.unfinished,
+        time=told.time,
+    )
+    return Planned(answer.question, found, reply)
 
 
 class _Service(NamedTuple):

@@ -17,7 +17,17 @@ from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner.prepare import settle_each
-from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Objective, Question, Stance
+from planner.question import (
+    EARTH,
+    BodyRange,
+    ForceCap,
+    HandOnHold,
+    Limits,
+    Load,
+    Objective,
+    Question,
+    Stance,
+)
 from planner.route import Move, Route
 from service import requests
 from service.answering.holds import Rocks, placed, pose_of, rocks_of
@@ -68,6 +78,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         deadline=request.deadline,
         draws=_draws(request.draws),
         explain=request.explain,
+        body_range=BodyRange(request.body_range.shift, request.body_range.tilt),
     )
 
 

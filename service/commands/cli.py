@@ -144,6 +144,13 @@ def crux() -> None:
 @click.option(
     "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
 )
+@click.option(
+    "--advice",
+    "advice_folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write what would make it hold there, each advice as a STANCE of its own.",
+)
 @draws_option
 @explain_option
 @hand_option
@@ -155,6 +162,7 @@ def plan(
     robust: bool,
     spread: bool,
     clearance: bool,
+    advice_folder: Path | None,
     draws: list[Draw] | None,
     unexplained: bool,
     hand: ParameterTable | None,
@@ -169,6 +177,7 @@ def plan(
     extras: list[Want] = ["robust"] if robust else []
     extras += ["spread"] if spread or draws else []
     extras += ["clearance"] if clearance else []
+    extras += ["advice"] if advice_folder is not None else []
     request = asked(read_request(stance), hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)
@@ -179,9 +188,13 @@ def plan(
     with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):
             answer = answering.planned(request, robots)
+            if not as_json and answer.reply.status in ("overloaded", "infeasible"):
+                answer = answering.with_advice(answer)
             bare = _without_palms(request, robots) if request.detail == "full" else None
         if picture is not None:
             draw_plan(answer, picture)
+    if advice_folder is not None and isinstance(answer.reply, PlanReply):
+        _write_advice(request, answer.reply, advice_folder)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
     elif as_json:
@@ -190,6 +203,17 @@ def plan(
     else:
         print_plan(answer.reply, console(), without_palm=bare)
     return EXIT_STATUS.get(answer.reply.status, FAILED)
+
+
+def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> None:
+    """Write each advice as a request whose plan gives what it promises."""
+    from service import answering
+
+    with filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+        for i, advice in enumerate(reply.advice or ()):
+            text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
+            (folder / f"advice-{i + 1}.json").write_bytes(text)
 
 
 def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import UNSET, Struct, UnsetType
 
 from planner.result import (
+    Advice,
     Clearance,
     Finding,
     LimitName,
@@ -63,10 +64,12 @@ class PlanReply(StanceReply, kw_only=True):
     there is a plan within the limits, and where the request says ``"explain": false``.
     ``unfinished``: what a deadline has left out, and a warning tells: ``least_utilisation`` (that
     no plan uses less is not proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-    ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``. ``robust`` comes with
-    ``"want": ["robust"]``, but not for a body wrench of zero; ``spread`` and ``clearance`` with
-    ``"want"`` of their names. ``findings``: what is odd about the stance, each with its ``field``
-    in the request and what was measured; ``warnings`` has their messages, too.
+    ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``. ``robust`` comes
+    with ``"want": ["robust"]``, but not for a body wrench of zero; ``spread``, ``clearance`` and
+    ``advice`` with ``"want"`` of their names; the last tells what holds first, the smallest change
+    first of that, and of the rest that of most gain for its size. ``findings``: what is odd about
+    the stance, each with its ``field`` in the request and what was measured; ``warnings`` has their
+    messages, too.
     """
 
     status: str
@@ -96,6 +99,7 @@ class PlanReply(StanceReply, kw_only=True):
     robust: RobustLoadFactor | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
+    advice: list[Advice] | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):

@@ -14,6 +14,7 @@ from .holds import (
 from .questions import (
     Axis as Axis,
     AxisForce as AxisForce,
+    BodyRange as BodyRange,
     BodySpaceRequest as BodySpaceRequest,
     Draw as Draw,
     ForceCap as ForceCap,

@@ -33,6 +33,7 @@ from service.requests.stance import Entries, Hand, HandEntries, Stance
 __all__ = [
     "Axis",
     "AxisForce",
+    "BodyRange",
     "BodySpaceRequest",
     "Draw",
     "ForceCap",
@@ -80,7 +81,7 @@ Explain = Annotated[
         "limits that together do; without it, the same status is there sooner"
     ),
 ]
-Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance"]
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]
@@ -147,6 +148,18 @@ class Draw(Strict, frozen=True, kw_only=True):
     ] = None
 
 
+class BodyRange(Strict, frozen=True, kw_only=True):
+    """How far an advice may move the body from where it is."""
+
+    shift: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="along each axis of B, either way [m]")
+    ] = 0.15
+    tilt: Annotated[
+        float,
+        Meta(ge=0.0, le=1.0, description="about an axis of B, through the centre of mass [rad]"),
+    ] = 0.2
+
+
 class PlanRequest(Query, frozen=True, kw_only=True):
     """Asks who carries what in a stance."""
 
@@ -168,7 +181,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
-            "clearance: the least distances of body, hands, links and rock"
+            "clearance: the least distances of body, hands, links and rock. "
+            "advice: what would make it hold, or hold more: verified changes"
         ),
     ] = []
     draws: Annotated[
@@ -180,6 +194,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         ),
     ] = []
     explain: Explain = True
+    body_range: Annotated[BodyRange, Meta(description="for the advice")] = BodyRange()
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):

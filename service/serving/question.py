@@ -22,7 +22,7 @@ READ: Final = 2**20
 LARGE: Final = 2**18
 """Bytes beyond which one is large: it may take long, and its bytes count while it waits."""
 
-DEAR: Final = ("robust", "spread")
+DEAR: Final = ("robust", "spread", "advice")
 """Extras that take many plans."""
 
 SMALL: Final = 2**12

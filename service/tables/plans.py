@@ -29,6 +29,7 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
+from service.tables.advice import print_advice
 from service.tables.clearances import print_clearance
 from service.tables.layout import show, table_of, unit_of
 from service.tables.spreads import robust_sentence, spread_sentence, within
@@ -82,6 +83,7 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
         out.print(robust_sentence(reply.robust), markup=False)
     if isinstance(reply.clearance, Clearance):
         print_clearance(reply.clearance, out)
+    print_advice(reply.advice or (), out)
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out

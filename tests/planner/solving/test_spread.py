@@ -18,8 +18,9 @@ from planner.prepare import settle_hand
 from planner.question import Limits, Question, Stance
 from planner.result import DrawnPlan, Quantiles, Spread
 from planner.robots import robosimian
-from planner.solving import KnownStance, plan, spread
+from planner.solving import KnownStance, plan
 from planner.streaming import WrenchStream
+from planner.verification import Check
 from service.answering.questions import question
 from service.commands.stances import read_request
 from tests.suite.helpers.stances import TILE_60N, ask, moved, on_wall
@@ -286,7 +287,7 @@ def test_where_no_draw_balances_none_holds():
 def test_a_plan_that_fails_its_check_is_no_answer(monkeypatch):
     asked = ask(on_wall(), "spread", draws=STRENGTHS[:3])
     whole = plan(asked)
-    checked, count = spread.Check.problems, 0
+    checked, count = Check.problems, 0
 
     def problems(self, *args):
         nonlocal count
@@ -295,7 +296,7 @@ def test_a_plan_that_fails_its_check_is_no_answer(monkeypatch):
         count += bad
         return ["off"] if bad else checked(self, *args)
 
-    monkeypatch.setattr(spread.Check, "problems", problems)
+    monkeypatch.setattr(Check, "problems", problems)
     found = plan(asked)
     assert found.verified
     assert count

@@ -1,0 +1,5 @@
+"""What would make a stance hold: changes that are planned and verified."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,241 @@
+"""What would make a stance hold: changes of one thing, of two if none does, in their order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from msgspec.structs import replace as changed_struct
+
+from planner import deadline, solving
+from planner.advice.body import BodySearch, can_move
+from planner.advice.changes import Change, joined
+from planner.advice.hands import TURNS, WAYS, closings, grasps, lettings, placed
+from planner.advice.new_holds import try_new_holds
+from planner.advice.strength import lighter, stronger
+from planner.advice.trials import PLANS, WITHOUT, Trials, Tried
+from planner.deadline import DeadlineError, late_sentence
+from planner.programs import SLACK
+from planner.question import Question
+from planner.result import Advice, Plan
+from planner.solving import Trial
+
+__all__ = ["advise", "plan", "with_advice"]
+
+MOST: Final = 10
+"""Advice that is told."""
+
+WORTH: Final = 0.01
+"""By how much an advice lowers the utilisation at least, relative."""
+
+STRENGTH: Final = 14
+"""Plans for stronger holds, at most."""
+
+MASS: Final = 5
+"""Plans for a lighter body, at most."""
+
+FINER: Final = 3
+"""Hands whose place is looked for more finely."""
+
+SPARE: Final = 5
+"""Of these where pairs are tried, too."""
+
+NEAR: Final = 2.5
+"""Utilisation up to which small changes of every hand are tried."""
+
+PARTNERS: Final = 5
+"""Single changes of which pairs are made."""
+
+PAIRS: Final = 8
+"""Pairs that are made of them."""
+
+PAIR_ROUNDS: Final = 5
+"""Plans of a search for the body's shift beside another change."""
+
+
+def plan(question: Question) -> Plan:
+    """Answer a question as `planner.solving.plan` does, with advice if that is wanted.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question cannot be understood; its ``field`` is relative to the question.
+    DeadlineError
+        If its deadline comes before anything is found that passes the checks.
+    """
+    start = time.perf_counter()
+    with deadline.within(getattr(question, "deadline", None), started=start):
+        answer = solving.plan(question)
+        return with_advice(question, answer) if "advice" in question.want else answer
+
+
+def with_advice(question: Question, answer: Plan) -> Plan:
+    """Return a question's plan with advice; what time was left out is told as ever."""
+    start = time.perf_counter()
+    found, whole = advise(question)
+    seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
+    if not whole and seconds is not None:
+        unfinished = (*unfinished, "advice")
+        warnings = (*warnings, late_sentence(seconds, ["advice"]))
+    total = answer.time.total + time.perf_counter() - start
+    return replace(
+        answer,
+        advice=found,
+        unfinished=unfinished,
+        warnings=warnings,
+        time=changed_struct(answer.time, total=total),
+    )
+
+
+def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], bool]:
+    """Return what would make a question's stance hold, or hold more.
+
+    Parameters
+    ----------
+    question : Question
+    plans : int, optional
+        That may be made for it, in all.
+
+    Returns
+    -------
+    advice : tuple of Advice
+        As of `planner.result.Plan`, ten at most, each with less utilisation than the stance has.
+    whole : bool
+        Whether there was time to try all.
+    """
+    # what costs least effort is planned again for what is told
+    again = question.objective != "max_margin"
+    try:
+        trials = Trials(question, plans - MOST - 1 if again else plans)
+    except DeadlineError:
+        return (), False
+    whole, told = True, []
+    try:
+        _try_all(trials)
+    except DeadlineError:
+        whole = False
+    try:
+        known = trials.again(trials.question, question.objective) if again else trials.base
+        for tried in _ranked(trials)[:MOST]:
+            trial = trials.again(tried.question, question.objective) if again else tried.trial
+            # what costs least effort may use more than it has to, or have no plan that passes
+            if trial.utilisation < known.utilisation:
+                told.append(_told(trials, tried.change, trial))
+    except DeadlineError:
+        whole = False
+    return tuple(told), whole
+
+
+def _try_all(trials: Trials) -> None:
+    """Try single changes; a lighter body and stronger holds; then pairs if none of them holds."""
+    base, prepared = trials.base, trials.base.prepared
+    order = _order(trials)
+    near = base.utilisation <= NEAR
+    trials.of(lettings(prepared.question))
+    if can_move(prepared):
+        body = BodySearch(trials, prepared, base)
+        body.run()
+        trials.of(body.changes())
+        trials.of(body.tilts())
+    trials.of(grasps(prepared, order if near else order[:2]))
+    trials.of(closings(prepared))
+    for i in order[: 2 if near else 1]:
+        trials.of(placed(prepared, i, (*TURNS, *WAYS)))
+    try_new_holds(trials)
+    if trials.holds(base.utilisation):
+        return
+    lighter(trials, base.load_factor().factor, min(MASS, trials.left))
+    stronger(trials, order, min(STRENGTH if trials.helped else SPARE, trials.left))
+    if not trials.helped:
+        _pair(trials)
+
+
+def _order(trials: Trials) -> list[int]:
+    """Return the hands' indices, those first whose limits weigh most."""
+    duals, limbs = trials.base.found.outcome.limit_duals, trials.base.prepared.limbs
+    weights = [-round(float(np.sum(each)), 6) for each in duals] or [0.0] * len(limbs)
+    return sorted(range(len(limbs)), key=lambda i: (weights[i], limbs[i]))
+
+
+def _pair(trials: Trials) -> None:
+    """Try pairs of the changes that did most, until one holds."""
+    singles = sorted(_best_each(trials), key=lambda tried: tried.utilisation)
+    if not singles:
+        return
+    if can_move(trials.base.prepared):
+        for tried in [each for each in singles if each.change.kind != "body"][:2]:
+            _beside(trials, tried)
+            if trials.helped:
+                return
+    pairs = [joined(a.change, b.change) for a, b in combinations(singles[:PARTNERS], 2)]
+    for pair in [pair for pair in pairs if pair is not None][:PAIRS]:
+        trials.of([pair])
+        if trials.helped:
+            return
+    try_new_holds(trials, singles[0].change, 1)
+
+
+def _beside(trials: Trials, tried: Tried) -> None:
+    """Try a change with the shift of the body that goes with it."""
+    search = BodySearch(trials, tried.trial.prepared, tried.trial)
+    search.run(PAIR_ROUNDS, enough=True)
+    pairs = [joined(tried.change, shift) for shift in search.changes()]
+    trials.of([pair for pair in pairs if pair is not None][:1])
+
+
+def _best_each(trials: Trials) -> Iterator[Tried]:
+    """Yield the best change of each kind and of each hand, of those that may be part of a pair.
+
+    A lighter body or a stronger hold makes nearly any stance hold: in a pair it would hide that the
+    other change does little.
+    """
+    best: dict[tuple[str, tuple[str, ...]], Tried] = {}
+    for tried in sorted(trials.found, key=lambda each: each.utilisation):
+        if tried.change.kind not in WITHOUT:
+            best.setdefault((tried.change.kind, tried.change.limbs), tried)
+    yield from best.values()
+
+
+def _ranked(trials: Trials) -> list[Tried]:
+    """Return changes that help: first what holds, by its size; then by gain for the size."""
+    base = trials.base.utilisation
+    holds = trials.holds(base)
+
+    def rank(tried: Tried) -> tuple[bool, float]:
+        gain = 1.0 / max(tried.utilisation, SLACK) - 1.0 / max(base, SLACK)
+        does = not holds and trials.holds(tried.utilisation)
+        return not does, tried.change.size if does else -gain / max(tried.change.size, SLACK)
+
+    found, seen = [], set()
+    worth = [each for each in trials.found if each.utilisation < (1.0 - WORTH) * base]
+    for tried in sorted(worth, key=rank):
+        change = tried.change
+        alike = (
+            change.kind,
+            change.limbs,
+            round(tried.utilisation, 3) if change.kind == "body" else None,
+        )
+        if alike not in seen:
+            seen.add(alike)
+            found.append(tried)
+    return found
+
+
+def _told(trials: Trials, change: Change, trial: Trial) -> Advice:
+    """Return a change, and what came of it, as an advice."""
+    holds = trials.holds(trial.utilisation)
+    return Advice(
+        kind=change.kind,
+        limbs=list(change.limbs),
+        sentence=change.words,
+        changes=dict(change.changes),
+        size=change.size,
+        status="optimal" if holds else "overloaded",
+        utilisation=trial.utilisation,
+        load_factor=trial.load_factor().factor,
+        holds=holds,
+    )

@@ -1,0 +1,282 @@
+"""Where the body had better be: shifts of it while its hands stay, by cutting planes.
+
+The hands stay in W, and a shift d of the body, in B's axes, carries its centre of mass along: what
+is needed of the hands is the same force f and, about the point where B's origin was, the moment
+
+    m(d) = m₀ + d × f.
+
+The least utilisation u of hands that stay is a convex function of the body wrench, so of d, and the
+multipliers ν of the balance give a slope of it: u(d') ≥ u(d) + (f × ν_m)·(d' − d). So each plan for
+a shift is a cut (Kelley 1960), and a small linear program over all cuts says where to look next,
+and how low u can still be. A tilt about the centre of mass leaves force and moment as they are: it
+changes how far the limbs reach, and what their joints bear. With joints, whose angles follow the
+body, the slope is that of the joints as they are; what is told is planned with joints of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import Array, Pose
+from planner import programs
+from planner.advice.changes import Change, pose_message
+from planner.advice.trials import Trials
+from planner.prepare import PreparedStance
+from planner.programs import WRENCH_UNIT
+from planner.solving import Trial
+
+__all__ = ["ROUNDS", "BodySearch", "can_move", "slope"]
+
+ROUNDS: Final = 14
+"""Plans of a search for the best shift, at most."""
+
+CLOSE: Final = 2e-3
+"""How far, relatively, the best utilisation found may be above the least there can be."""
+
+LEAST: Final = 1e-3
+"""Shift that counts as one [m]."""
+
+CLEAR: Final = 0.15
+"""How near B's origin may come to the plane of a palm, where it is not nearer already [m]."""
+
+REACHED: Final = 1e-6
+"""How far beyond its reach a limb may be, relative."""
+
+TANGENTS: Final = 30
+"""Planes that stand for the limbs' reaches in one step, at most."""
+
+SHIFT_UNIT: Final = 0.1
+"""Shift of size 1 [m]."""
+
+TILT_UNIT: Final = 0.2
+"""Tilt of size 1 [rad]."""
+
+AXES: Final = "xyz"
+
+
+def can_move(prepared: PreparedStance) -> bool:
+    """Whether the body's place says what the hands are to give."""
+    question = prepared.question
+    return question.body_wrench is None and float(np.abs(prepared.wrench[:3]).max()) > 0.0
+
+
+def slope(trial: Trial) -> Array:
+    """Return how the least utilisation grows with a shift of the body, in B's axes (3,) [1/m]."""
+    dual = trial.found.outcome.balance_dual
+    assert dual is not None
+    nu = -dual[3:6] / WRENCH_UNIT[3:]
+    return np.cross(trial.prepared.wrench[:3], nu)
+
+
+class _Cut(NamedTuple):
+    """u ≥ value + slope · d; of one that is hard, nothing is known but 0 ≥ value + slope · d."""
+
+    slope: Array
+    value: float
+    hard: bool = False
+
+
+class _Tilt(NamedTuple):
+    """A turn of the body about its centre of mass: its angle about an axis of B."""
+
+    axis: int = 0
+    angle: float = 0.0
+
+    @property
+    def turn(self) -> Array:
+        return Rotation.from_rotvec(self.angle * np.eye(3)[self.axis]).as_matrix()
+
+
+class BodySearch:
+    """The search for the best shift of the body of one stance, whose body may be anywhere in reach.
+
+    Parameters
+    ----------
+    trials : Trials
+        That pays for its plans.
+    prepared : PreparedStance
+        Its body moves.
+    base : Trial, optional
+        What is known of it as it is.
+    """
+
+    def __init__(self, trials: Trials, prepared: PreparedStance, base: Trial | None = None) -> None:
+        self.trials, self.prepared = trials, prepared
+        self.range = prepared.question.body_range
+        self._cuts: list[_Cut] = []
+        self._known: list[tuple[Array, float]] = []
+        if base is not None:
+            self._keep(np.zeros(3), base)
+
+    def run(self, rounds: int = ROUNDS, *, enough: bool = False) -> None:
+        """Look for the best shift; with ``enough`` only for one that holds."""
+        for _ in range(rounds):
+            shift, bound = self._next(_Tilt())
+            best = self._best
+            if shift is None or self.trials.left <= 0:
+                return
+            if enough and self.trials.holds(best):
+                return
+            if self._known and best - bound <= CLOSE * max(best, CLOSE):
+                return
+            self._look(shift)
+
+    def changes(self) -> list[Change]:
+        """Return the best shift, the least of those that hold, and what a tilt adds in reach."""
+        best = self._best
+        if not math.isfinite(best):
+            return []
+        wanted = [(1.0 + CLOSE) * best]
+        cap = self.trials.question.limits.utilisation
+        if best < cap and not self.trials.holds(self.trials.base.utilisation):
+            wanted.insert(0, cap)
+        shifts = [least for level in wanted if (least := self._least(level)) is not None]
+        found = [self._change(shift, _Tilt()) for shift in shifts]
+        if len(found) > 1 and found[0].size > (1.0 - CLOSE) * found[1].size:
+            found.pop()
+        return [each for each in found if each.size > LEAST / SHIFT_UNIT]
+
+    def tilts(self) -> list[Change]:
+        """Return the best shift with tilts: all if joints count, else the one that reaches most."""
+        if not self._known or self.range.tilt == 0.0:
+            return []
+        tilts = [
+            _Tilt(axis, way * self.range.tilt)
+            for axis in range(3)
+            for way in (0.5, -0.5, 1.0, -1.0)
+        ]
+        if self.prepared.where is not None:
+            shift = min(self._known, key=lambda known: known[1])[0]
+            return [self._change(shift, tilt) for tilt in tilts]
+        reached = [(self._next(tilt), tilt) for tilt in tilts]
+        there = [
+            (bound, abs(tilt.angle), shift, tilt)
+            for (shift, bound), tilt in reached
+            if shift is not None
+        ]
+        if not there:
+            return []
+        bound, _, shift, tilt = min(there, key=lambda each: each[:2])
+        return [self._change(shift, tilt)] if bound < (1.0 - 5.0 * CLOSE) * self._best else []
+
+    @property
+    def _best(self) -> float:
+        return min((used for _, used in self._known), default=math.inf)
+
+    def _look(self, shift: Array) -> None:
+        """Plan for a shift, and keep what it says."""
+        wrench = self.prepared.wrench.copy()
+        wrench[3:] += np.cross(shift, wrench[:3])
+        self._keep(shift, self.trials.turned(self.prepared, wrench))
+
+    def _keep(self, shift: Array, trial: Trial) -> None:
+        outcome = trial.found.outcome
+        if outcome.solved and math.isfinite(trial.utilisation):
+            self._known.append((shift, trial.utilisation))
+            grows = slope(trial)
+            self._cuts.append(_Cut(grows, outcome.value - float(grows @ shift)))
+            return
+        data = trial.found.sets.data
+        nearest = programs.nearest(data)
+        if nearest.solved:
+            # w of the hands has n · (w − nearest) ≤ 0
+            there = programs.body_wrench(data, nearest.loads)
+            n = data.wrench - there
+            grows = np.cross(trial.prepared.wrench[:3], n[3:6] / WRENCH_UNIT[3:])
+            self._cuts.append(_Cut(grows, float(n @ n) - float(grows @ shift), hard=True))
+
+    def _next(self, tilt: _Tilt) -> tuple[Array | None, float]:
+        """Return where the cuts are lowest within reach, and how low."""
+        rows = [(*cut.slope, 0.0 if cut.hard else -1.0, -cut.value) for cut in self._cuts]
+        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0]), rows, tilt)
+        return (None, math.inf) if found is None else (found[:3], float(found[3]))
+
+    def _least(self, level: float) -> Array | None:
+        """Return the least shift, by the sum of its components, where no cut is above a level."""
+        rows = [
+            (*cut.slope, *np.zeros(3), (0.0 if cut.hard else level) - cut.value)
+            for cut in self._cuts
+        ]
+        for axis in np.eye(3):
+            rows += [(*axis, *-axis, 0.0), (*-axis, *-axis, 0.0)]
+        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), rows, _Tilt())
+        return None if found is None else found[:3]
+
+    def _solve(self, cost: Array, rows: Sequence[Sequence[float]], tilt: _Tilt) -> Array | None:
+        """Return the least of cost · x under A x ≤ b, x[:3] a shift within range and reach."""
+        centres, radii = self._reaches(tilt)
+        rows, most = [*rows, *self._clearances(len(cost) - 3)], self.range.shift
+        bounds = [(-most, most)] * 3 + [(0.0, None)] * (len(cost) - 3)
+        for _ in range(TANGENTS):
+            table = np.array(rows).reshape(-1, len(cost) + 1)
+            found = linprog(cost, table[:, :-1], table[:, -1], bounds=bounds, method="highs")
+            if found.x is None:
+                return None
+            away = found.x[:3] - centres
+            far = np.sqrt(np.einsum("nx,nx->n", away, away))
+            beyond = far > (1.0 + REACHED) * radii
+            if not beyond.any():
+                break
+            for u, centre, radius in zip(
+                away[beyond] / far[beyond, None], centres[beyond], radii[beyond], strict=True
+            ):
+                rows.append((*u, *np.zeros(len(cost) - 3), float(u @ centre) + radius))
+        return np.asarray(found.x)
+
+    def _clearances(self, further: int) -> Iterator[tuple[float, ...]]:
+        """Yield rows that keep the body off the planes of the palms, with columns of zeros."""
+        stance = self.prepared.question.stance
+        for hand in stance.hands:
+            into = hand.pose.rotation[:, 2]
+            off = float(into @ (hand.pose.position - stance.body.position))
+            # what is nearer today may stay so
+            yield (*(into @ stance.body.rotation), *np.zeros(further), off - min(off, CLEAR))
+
+    def _reaches(self, tilt: _Tilt) -> tuple[Array, Array]:
+        """Return balls in which a shift keeps hands in reach: centres (n, 3), radii (n,)."""
+        stance = self.prepared.question.stance
+        limbs, poses = [h.limb for h in stance.hands], [h.pose for h in stance.hands]
+        away, reach = stance.robot.limb_spans(self._body(np.zeros(3), tilt), limbs, poses)
+        now, _ = stance.robot.limb_spans(stance.body, limbs, poses)
+        # what is out of reach today may stay so
+        return away @ tilt.turn.T, np.maximum(reach, np.sqrt(np.einsum("nx,nx->n", now, now)))
+
+    def _body(self, shift: Array, tilt: _Tilt) -> Pose:
+        """Return B in W once it is tilted about its centre of mass, and shifted, in its axes."""
+        body, turn = self.prepared.question.stance.body, tilt.turn
+        centre = self._centre
+        return body @ Pose(shift + centre - turn @ centre, turn)
+
+    @property
+    def _centre(self) -> Array:
+        question, where = self.prepared.question, self.prepared.where
+        if question.load.com is not None:
+            return np.array(question.load.com)
+        robot = question.stance.robot
+        own = where is not None and question.load.own
+        return robot.com_at(where.angles) if own and where is not None else np.asarray(robot.com)
+
+    def _change(self, shift: Array, tilt: _Tilt) -> Change:
+        stance = self.prepared.question.stance
+        body = self._body(shift, tilt)
+        changes = {"stance.body": pose_message(body)}
+        if stance.joints is not None:
+            changes["stance.joints"] = "solve"  # type: ignore[assignment]
+        size = float(np.linalg.norm(shift)) / SHIFT_UNIT + abs(tilt.angle) / TILT_UNIT
+        return Change("body", (), ", and ".join(self._words(shift, tilt)), changes, size)
+
+    def _words(self, shift: Array, tilt: _Tilt) -> Iterator[str]:
+        along = self.prepared.question.stance.body.rotation @ shift
+        told = ", ".join(f"{value:z.3f}" for value in along)
+        yield f"shift the body by [{told}] m in W"
+        if tilt.angle:
+            yield (
+                f"tilt it by {math.degrees(tilt.angle):.1f}° about its {AXES[tilt.axis]} axis "
+                "through its centre of mass"
+            )

@@ -1,0 +1,162 @@
+"""Changes of a question, in the words of its message: what an advice says, and what it does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.tile import Surface
+from planner.question import HandOnHold, Question
+from planner.result import AdviceKind
+
+__all__ = ["Change", "changed", "hand_path", "joined", "pose_message"]
+
+HAND: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
+"""The path of a hand of a question, or of one of its fields."""
+
+BY_LIMB: Final = re.compile(r"(present|limits\.per_hand)\.(.+)")
+"""What a question says of hands beside its stance."""
+
+
+class Change(NamedTuple):
+    """Something to be done about a stance; see `planner.result.Advice`."""
+
+    kind: AdviceKind
+    limbs: tuple[str, ...]
+    words: str
+    changes: Mapping[str, Any]
+    size: float
+
+
+def joined(first: Change, second: Change) -> Change | None:
+    """Return both changes as a pair; None where they say different things of one field."""
+    whole = dict(first.changes)
+    for path, value in second.changes.items():
+        if whole.setdefault(path, value) != value:
+            return None
+    hands = {path for path in whole if path.endswith("]") and whole[path] is None}
+    if any(path.startswith(f"{hand}.") for hand in hands for path in whole):
+        # of a hand that is let go
+        return None
+    limbs = tuple(dict.fromkeys(first.limbs + second.limbs))
+    words = f"{first.words}; and {second.words}"
+    return Change("pair", limbs, words, whole, first.size + second.size)
+
+
+def pose_message(pose: Pose) -> dict[str, list[float]]:
+    """Return a pose as a message has it."""
+    return {"position": pose.position.tolist(), "orientation": pose.quaternion().tolist()}
+
+
+def hand_path(index: int, field: str | None = None) -> str:
+    """Return the path of a hand, or of one of its fields."""
+    path = f"stance.hands[{index}]"
+    return path if field is None else f"{path}.{field}"
+
+
+def changed(question: Question, changes: Mapping[str, Any]) -> Question:
+    """Return a question with some of its fields changed.
+
+    Parameters
+    ----------
+    question : Question
+    changes : mapping of str to any
+        Of `planner.result.Advice`.
+
+    Raises
+    ------
+    InvalidInputError
+        If that is no possible question, or a path leads to nothing that advice is about.
+    """
+    hands: dict[int, dict[str | None, Any]] = {}
+    stance: dict[str, Any] = {}
+    whole: dict[str, Any] = {}
+    for path, value in changes.items():
+        hand, named = HAND.fullmatch(path), BY_LIMB.fullmatch(path)
+        if hand is not None:
+            hands.setdefault(int(hand[1]), {})[hand[2]] = value
+        elif path == "stance.body":
+            stance["body"] = _pose(value)
+        elif path == "stance.joints":
+            stance["joints"] = value
+        elif path in ("load.mass", "load.com"):
+            part = value if path == "load.mass" else tuple(value)
+            whole["load"] = replace(
+                whole.get("load", question.load), **{path.removeprefix("load."): part}
+            )
+        elif named is not None and value is None:
+            _drop(question, whole, *named.groups())
+        else:
+            raise InvalidInputError("advice does not change this", field=path)
+    there = _hands(question.stance.hands, hands)
+    return replace(question, stance=replace(question.stance, hands=there, **stance), **whole)
+
+
+def _drop(question: Question, whole: dict[str, Any], what: str, limb: str) -> None:
+    """Leave out what is said of a limb: its present tensions, or its force's cap."""
+    if what == "present":
+        kept = whole.get("present", question.present)
+        whole["present"] = {name: each for name, each in kept.items() if name != limb}
+    else:
+        limits = whole.get("limits", question.limits)
+        caps = {name: each for name, each in limits.per_hand.items() if name != limb}
+        whole["limits"] = replace(limits, per_hand=caps)
+
+
+def _hands(
+    hands: tuple[HandOnHold, ...], changes: Mapping[int, Mapping[str | None, Any]]
+) -> tuple[HandOnHold, ...]:
+    """Return hands with new ones, and without those that are let go."""
+    found = dict(enumerate(hands))
+    for i in sorted(changes):
+        fields = dict(changes[i])
+        if None in fields and fields[None] is None:
+            del found[i]
+            continue
+        like = fields.pop(None, hand_path(i))
+        match = HAND.fullmatch(like)
+        assert match is not None
+        updates: dict[str, Any] = {}
+        original = hands[int(match[1])]
+        for field, value in fields.items():
+            assert field is not None
+            name, part = _field(original, updates, field, value)
+            updates[name] = part
+        found[i] = replace(original, **updates)
+    return tuple(found.values())
+
+
+def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any) -> tuple[str, Any]:
+    """Return what a field of a hand's message is called here, and its value."""
+    if field.startswith("grasp."):
+        grasp = updates.get("grasp", hand.grasp)
+        return "grasp", replace(grasp, **{field.removeprefix("grasp."): value})
+    if field not in FIELDS:
+        raise InvalidInputError("advice does not change this", field=f"stance.hands.{field}")
+    name, read = FIELDS[field]
+    if value is None:
+        return name, "rest" if name == "seat" else None
+    return name, read(value)
+
+
+def _pose(message: Mapping[str, Any]) -> Pose:
+    return Pose.from_quaternion(message["position"], message["orientation"])
+
+
+FIELDS: Final[Mapping[str, tuple[str, Callable[[Any], Any]]]] = {
+    "limb": ("limb", str),
+    "pose": ("pose", _pose),
+    "place": ("at", _pose),
+    "hold.pose": ("hold_pose", _pose),
+    "hold.pose_in_hand": ("hold_in_hand", _pose),
+    "surface": ("surface", Surface.from_values),
+    "seat": ("seat", str),
+    "seat_direction": ("seat_direction", np.array),
+    "wrench": ("wrench", tuple),
+}
+"""Fields of a hand's message, what they are called in `HandOnHold`, and how they are read."""

@@ -1,0 +1,191 @@
+"""What may be done about the hands of a stance, its rock staying where it is in W."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import InvalidInputError, Pose
+from hand_models.hand import Grasp
+from planner.advice.changes import Change, hand_path, joined, pose_message
+from planner.prepare import PreparedStance, settle_each
+from planner.question import HandOnHold, Question
+
+__all__ = [
+    "GRASPS",
+    "HAND",
+    "TURNS",
+    "WAYS",
+    "closings",
+    "fingers",
+    "grasps",
+    "lettings",
+    "placed",
+    "unseated",
+]
+
+GRASPS: Final = (0.0, math.pi / 2.0, math.pi)
+"""Turns of outer fingers that are tried [rad]."""
+
+CLOSINGS: Final = (20.0, 50.0)
+"""Closing tensions that are tried of all hands [N]."""
+
+CLOSING_UNIT: Final = 10.0
+"""Change of a closing tension of size 1 [N]."""
+
+ALIKE: Final = 0.05
+"""Turns of outer fingers that are the same grasp [rad]."""
+
+TURNS: Final = tuple((0.0, 0.0, math.radians(turn)) for turn in (30.0, -30.0, 60.0, -60.0))
+"""How far a hand is turned about z of its palm [m, m, rad]."""
+
+WAYS: Final = ((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
+"""How far it is moved along x and y of its palm [m, m, rad]."""
+
+WAY_UNIT: Final = 0.02
+"""Way of a hand of size 1 [m]."""
+
+TURN_UNIT: Final = 0.5
+"""Turn of a hand of size 1 [rad]."""
+
+GRASP_UNIT: Final = math.pi / 2.0
+"""Turn of outer fingers of size 1 [rad]."""
+
+HAND: Final = 2.0
+"""Size of a hand more or less."""
+
+MOVED: Final = 1e-3
+"""Way of a hand that is told [m]."""
+
+
+def lettings(question: Question) -> Iterator[Change]:
+    """Yield each hand in turn as let go; none of a single one."""
+    hands = question.stance.hands
+    for i, hand in enumerate(hands if len(hands) > 1 else ()):
+        changes: dict[str, Any] = {hand_path(i): None}
+        if hand.limb in question.present:
+            changes[f"present.{hand.limb}"] = None
+        if hand.limb in question.limits.per_hand:
+            changes[f"limits.per_hand.{hand.limb}"] = None
+        yield Change("let_go", (hand.limb,), f"let {hand.limb} go", changes, HAND)
+
+
+def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
+    """Yield other grasps of one hand, and of all; one that is seated goes where they seat it."""
+    hands = prepared.question.stance.hands
+    found: dict[float, list[Change]] = {turn: [] for turn in GRASPS}
+    for i in order:
+        for turn in GRASPS:
+            if abs(hands[i].grasp.outer_rotation - turn) > ALIKE and not hands[i].grasp.fingernail:
+                found[turn] += _grasped(prepared, i, turn)
+    for turn, each in found.items():
+        yield from each
+        if len(each) > 1:
+            whole: Change | None = each[0]
+            for further in each[1:]:
+                whole = whole and joined(whole, further)
+            if whole is not None:
+                words = f"take {', '.join(whole.limbs)} with {fingers(turn)}"
+                yield whole._replace(kind="grasp", words=words)
+
+
+def closings(prepared: PreparedStance) -> Iterator[Change]:
+    """Yield all hands closed with another tension."""
+    stance = prepared.question.stance
+    known = [hand.closing_tension for hand in prepared.batch.hands]
+    for tension in CLOSINGS:
+        changes = {hand_path(i, "grasp.closing_tension"): tension for i in range(len(known))}
+        size = sum(abs(tension - each) for each in known) / CLOSING_UNIT
+        limbs = tuple(hand.limb for hand in stance.hands)
+        yield Change("grasp", limbs, f"close all hands with {tension:g} N", changes, size)
+
+
+def fingers(turn: float) -> str:
+    """Say where the outer fingers are, turned so far [rad]."""
+    return f"the outer fingers at {math.degrees(turn):.0f}°"
+
+
+def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
+    """Return one hand with another grasp, if its rock can stay where it is."""
+    stance = prepared.question.stance
+    hand, rock = stance.hands[index], _rock(prepared, index)
+    grasp: Grasp = replace(hand.grasp, outer_rotation=turn)
+    size = abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT
+    changes: dict[str, Any] = {hand_path(index, "grasp.outer_rotation"): turn}
+    words = f"take the hold of {hand.limb} with {fingers(turn)}"
+    if hand.placed_hold() is None:
+        (there,) = settle_each(stance.robot.hand, [replace(hand, grasp=grasp)])
+        if isinstance(there, InvalidInputError):
+            return []
+        pose = rock @ there.seating.pose.inverse()
+        way = float(np.linalg.norm(pose.position - hand.pose.position))
+        if way > MOVED:
+            words += f", {1e3 * way:.0f} mm from where it is"
+        size += way / WAY_UNIT
+        moved = _moved(prepared, index, pose, seated=hand.at is None)
+        if moved is None:
+            return []
+        changes |= moved
+    return [Change("grasp", (hand.limb,), words, changes, size)]
+
+
+def placed(
+    prepared: PreparedStance, index: int, motions: Sequence[tuple[float, float, float]]
+) -> Iterator[Change]:
+    """Yield one hand moved along x and y of its palm [m], and turned about z [rad]."""
+    hand = prepared.question.stance.hands[index]
+    for x, y, turn in motions:
+        motion = Pose(np.array([x, y, 0.0]), Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix())
+        changes = _moved(prepared, index, hand.pose @ motion)
+        if changes is None:
+            return
+        told = []
+        if x or y:
+            told.append(f"move {hand.limb} by [{1e3 * x:z.0f}, {1e3 * y:z.0f}] mm along its palm")
+        if turn:
+            whom = "it" if told else hand.limb
+            told.append(f"turn {whom} by {math.degrees(turn):.0f}° about its palm's z")
+        size = math.hypot(x, y) / WAY_UNIT + abs(turn) / TURN_UNIT
+        yield Change("place", (hand.limb,), " and ".join(told), changes, size)
+
+
+def _moved(
+    prepared: PreparedStance, index: int, pose: Pose, *, seated: bool = False
+) -> dict[str, Any] | None:
+    """Return what a question says of a hand elsewhere, whose rock stays; or which is seated there.
+
+    None where its rock, a scan, has no frame of its own that can be placed.
+    """
+    stance = prepared.question.stance
+    hand, changes = stance.hands[index], {hand_path(index, "pose"): pose_message(pose)}
+    if not seated:
+        if hand.at is not None:
+            with suppress(InvalidInputError):
+                hand.hold.check_place()
+                changes[hand_path(index, "place")] = None  # type: ignore[assignment]
+            if len(changes) == 1:
+                return None
+        changes[hand_path(index, "hold.pose")] = pose_message(_rock(prepared, index))
+        if hand.hold_in_hand is not None:
+            changes[hand_path(index, "hold.pose_in_hand")] = None  # type: ignore[assignment]
+        changes |= unseated(hand, index)
+    if stance.joints is not None:
+        changes["stance.joints"] = "solve"  # type: ignore[assignment]
+    return changes
+
+
+def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
+    """Return that a hand is not seated any more."""
+    said = {"seat": hand.seat != "rest", "seat_direction": hand.seat_direction is not None}
+    return {hand_path(index, name): None for name, given in said.items() if given}
+
+
+def _rock(prepared: PreparedStance, index: int) -> Pose:
+    """Return where a hand's rock is in W."""
+    return prepared.question.stance.hands[index].pose @ prepared.batch.hands[index].seating.pose

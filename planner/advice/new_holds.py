@@ -1,0 +1,219 @@
+"""Where a limb had better take hold that holds nothing, or something else: if rock is there.
+
+The rock is like that under a hand of the stance, and lies in the hand alike. Places are on a plane
+through the hands, whose normal is the mean of their palms', on a grid in the limb's reach.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hand_models.base import Array, Pose
+from planner.advice.changes import Change, hand_path, joined, pose_message
+from planner.advice.hands import GRASPS, HAND, fingers, unseated
+from planner.advice.trials import Trials, Tried
+from planner.prepare import PreparedStance
+
+__all__ = ["NewHold", "try_new_holds"]
+
+NORMAL: Final = 0.3
+"""Least length of the mean of palms' axes for hands to have a plane."""
+
+IN_REACH: Final = 0.95
+"""Of a limb's reach, that a new hold may ask for."""
+
+APART: Final = 0.25
+"""Least distance of a new hold from other hands [m]."""
+
+GRID: Final = (0.0, -0.6, 0.6)
+"""Places along either axis, in shares of what the limb reaches on the plane."""
+
+QUARTERS: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
+"""How a new hand is turned first from the one that it is like [rad]."""
+
+BETWEEN: Final = math.pi / 4.0
+"""By how much more, after that [rad]."""
+
+
+class _Hold(NamedTuple):
+    """A hold that a limb may take.
+
+    Attributes
+    ----------
+    like : int
+        The hand that it is like.
+    place : ndarray, shape (3,)
+        Of H in W [m].
+    turn : float
+        About z of the palm, from that hand [rad].
+    grasp : float or None
+        The turn of outer fingers; that hand's by default [rad].
+    """
+
+    like: int
+    place: Array
+    turn: float
+    grasp: float | None = None
+
+
+class NewHold:
+    """The search for a hold of one limb.
+
+    Parameters
+    ----------
+    trials : Trials
+    limb : str
+    before : Change, optional
+        What is done besides; not about this limb.
+    """
+
+    def __init__(self, trials: Trials, limb: str, before: Change | None = None) -> None:
+        self.trials, self.limb, self.before = trials, limb, before
+        self.prepared = trials.base.prepared
+        limbs = self.prepared.limbs
+        self.index = limbs.index(limb) if limb in limbs else len(limbs)
+        self.best: tuple[Tried, _Hold] | None = None
+        self._places = [*_places(self.prepared, limb)]
+        self._seen: set[str] = set()
+
+    @property
+    def likes(self) -> list[int]:
+        """Hands that it may be like."""
+        return [i for i in range(len(self.prepared.limbs)) if i != self.index]
+
+    def probe(self, turns: Sequence[float]) -> None:
+        """Try it like each hand, turned from that, at the first place."""
+        if self._places:
+            self._try([_Hold(i, self._places[0], turn) for i in self.likes for turn in turns])
+
+    def refine(self) -> None:
+        """Try the best so far turned, with other grasps, then elsewhere."""
+        quarters = QUARTERS[1:] if self.best and self.best[1].turn == 0.0 else ()
+        for steps in (quarters, (BETWEEN, -BETWEEN)):
+            if self.best is not None:
+                now = self.best[1]
+                self._try([now._replace(turn=now.turn + step) for step in steps])
+        if self.best is not None:
+            now = self.best[1]
+            if self.prepared.question.stance.hands[now.like].placed_hold() is None:
+                self._try([now._replace(grasp=grasp) for grasp in GRASPS])
+        if self.best is not None:
+            now = self.best[1]
+            self._try([now._replace(place=place) for place in self._places])
+
+    def _try(self, wanted: Sequence[_Hold]) -> None:
+        changes: dict[str, tuple[Change, _Hold]] = {}
+        for hold in wanted:
+            change = self._change(hold)
+            if change is not None and (self.best is None or hold is not self.best[1]):
+                changes.setdefault(change.words, (change, hold))
+        for words in self._seen & set(changes):
+            del changes[words]
+        self._seen |= set(changes)
+        for tried in self.trials.of([change for change, _ in changes.values()]):
+            if self.best is None or tried.utilisation < self.best[0].utilisation:
+                self.best = tried, changes[tried.change.words][1]
+
+    def _change(self, hold: _Hold) -> Change | None:
+        """Return the limb holding at a place as another hand does, but for its turn and grasp."""
+        stance, new = self.prepared.question.stance, self.index
+        hand = stance.hands[hold.like]
+        motion = Rotation.from_rotvec([0.0, 0.0, hold.turn]).as_matrix()
+        changes: dict[str, Any] = {
+            hand_path(new): hand_path(hold.like),
+            hand_path(new, "limb"): self.limb,
+            hand_path(new, "pose"): pose_message(Pose(hold.place, hand.pose.rotation @ motion)),
+        }
+        if hand.placed_hold() is not None or hand.at is not None or hand.seat != "rest":
+            seat = self.prepared.batch.hands[hold.like].seating.pose
+            changes[hand_path(new, "hold.pose")] = None
+            changes[hand_path(new, "hold.pose_in_hand")] = pose_message(seat)
+            changes |= unseated(hand, new)
+        if hand.at is not None:
+            changes[hand_path(new, "place")] = None
+        if hand.wrench is not None:
+            changes[hand_path(new, "wrench")] = None
+        if hold.grasp is not None:
+            changes[hand_path(new, "grasp.outer_rotation")] = hold.grasp
+        if stance.joints is not None:
+            changes["stance.joints"] = "solve"
+        change = Change(
+            kind="new_hold" if new < len(stance.hands) else "free_hand",
+            limbs=(self.limb,),
+            words=self._words(hand.limb, hold),
+            changes=changes,
+            size=HAND,
+        )
+        return change if self.before is None else joined(self.before, change)
+
+    def _words(self, like: str, hold: _Hold) -> str:
+        told = ", ".join(f"{value:z.3f}" for value in hold.place)
+        degrees = round(math.degrees(math.remainder(hold.turn, 2.0 * math.pi)))
+        turned = f"{degrees}° about its palm's z from {like}" if degrees else f"as {like} is"
+        if hold.grasp is not None:
+            turned += f", with {fingers(hold.grasp)}"
+        return (
+            f"put {self.limb} at [{told}] m in W, turned {turned}, on condition that there is rock "
+            f"as under {like}"
+        )
+
+
+def try_new_holds(trials: Trials, before: Change | None = None, most: int = 2) -> None:
+    """Try where limbs that hold nothing had better take hold, and where others had better.
+
+    Parameters
+    ----------
+    trials : Trials
+    before : Change, optional
+        What is done besides.
+    most : int, optional
+        Limbs whose holds are searched for after a first look.
+    """
+    limbs = trials.base.prepared.limbs
+    taken = () if before is None else before.limbs
+    searches = []
+    for limb in trials.question.stance.robot.limbs:
+        if limb not in taken:
+            search = NewHold(trials, limb, before)
+            search.probe(QUARTERS[:1] if limb in limbs else QUARTERS)
+            searches += [] if search.best is None else [search]
+    searches.sort(key=lambda search: search.best[0].utilisation if search.best else math.inf)
+    for search in searches[:most]:
+        search.refine()
+
+
+def _places(prepared: PreparedStance, limb: str) -> Iterator[Array]:
+    """Yield where a limb may hold: where it does, or in the middle first."""
+    stance = prepared.question.stance
+    others = [hand.pose.position for hand in stance.hands if hand.limb != limb]
+    yield from (hand.pose.position for hand in stance.hands if hand.limb == limb)
+    normal = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
+    length = float(np.linalg.norm(normal))
+    if length < NORMAL:
+        return
+    normal /= length
+    chain = stance.robot.chains[limb]
+    shoulder = stance.body.apply(chain.shoulder)
+    off = float(np.mean([normal @ hand.pose.position for hand in stance.hands]) - normal @ shoulder)
+    if abs(off) >= IN_REACH * chain.reach:
+        return
+    wide = math.sqrt((IN_REACH * chain.reach) ** 2 - off**2)
+    x, y = _plane_axes(stance.body.rotation, normal)
+    for a in GRID:
+        for b in GRID:
+            place = shoulder + off * normal + wide * (a * x + b * y)
+            if all(np.linalg.norm(place - other) >= APART for other in others):
+                yield place
+
+
+def _plane_axes(body: Array, normal: Array) -> tuple[Array, Array]:
+    """Return axes in a plane (3,), the first nearest to an axis of the body."""
+    along = body - np.outer(normal, normal @ body)
+    x = along[:, int(np.argmax(np.linalg.norm(along, axis=0).round(6)))]
+    x = x / np.linalg.norm(x)
+    return x, np.cross(normal, x)

@@ -1,0 +1,124 @@
+"""How much stronger holds would have to be, and how much lighter the body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+from planner.advice.changes import Change, hand_path
+from planner.advice.trials import Trials, Tried
+from planner.question import HandOnHold
+
+__all__ = ["lighter", "stronger"]
+
+STRONGEST: Final = 4.0
+"""How many times as strong holds become at most."""
+
+STEP: Final = 0.01
+"""To which that is told."""
+
+ROUNDS: Final = 4
+"""Plans with which it is found, at most."""
+
+UNIT: Final = math.log(1.1)
+"""Logarithm of size 1."""
+
+LIGHTEST: Final = 1e-2
+"""Least share of the mass that is worth telling."""
+
+WITHIN: Final = 1e-4
+"""By how much the mass that is told is less than the largest, relative."""
+
+
+def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
+    """Try all holds stronger, then each in order, with so many plans at most."""
+    hands, last = trials.question.stance.hands, trials.left - most
+    single = [(i,) for i in order] if len(hands) > 1 else []
+    for which in [tuple(range(len(hands))), *single]:
+        if trials.left - last < ROUNDS:
+            return
+        enough = _enough(trials, which)
+        if not enough and len(which) == len(hands):
+            # what all holds together do not do, none does
+            return
+
+
+def _enough(trials: Trials, which: Sequence[int]) -> bool:
+    """Find how much stronger some holds have to be, if that is enough, to `STEP` if it can be."""
+    most = trials.of([_strengthened(trials, which, STRONGEST)])
+    if not most or not trials.holds(most[0].utilisation):
+        return False
+    cap = trials.question.limits.utilisation
+    # over 1 / k the utilisation is nearly straight
+    low, high = (1.0, trials.base.utilisation), (1.0 / STRONGEST, most[0].utilisation)
+    for _ in range(ROUNDS - 1):
+        share = 0.5 if math.isinf(low[1]) else (cap - high[1]) / (low[1] - high[1])
+        inverse = high[0] + min(max(share, 0.02), 0.98) * (low[0] - high[0])
+        factor = math.ceil((1.0 / inverse) / STEP) * STEP
+        if not 1.0 / low[0] < factor < 1.0 / high[0]:
+            break
+        found = trials.of([_strengthened(trials, which, factor)])
+        used = found[0].utilisation if found else math.inf
+        if trials.holds(used):
+            high = 1.0 / factor, used
+        else:
+            low = 1.0 / factor, used
+    return True
+
+
+def _strengthened(trials: Trials, which: Sequence[int], factor: float) -> Change:
+    """Return some hands' holds so many times as strong."""
+    hands = [trials.question.stance.hands[i] for i in which]
+    changes = {
+        hand_path(i, "surface"): _surface(hand, factor)
+        for i, hand in zip(which, hands, strict=True)
+    }
+    limbs = tuple(hand.limb for hand in hands)
+    whose = "all hands" if len(which) == len(trials.question.stance.hands) else limbs[0]
+    words = f"have rock {factor:.2f} times as strong under {whose}"
+    return Change("strength", limbs, words, changes, len(which) * math.log(factor) / UNIT)
+
+
+def _surface(hand: HandOnHold, factor: float) -> dict[str, Any]:
+    """Return the numbers of a hand's surface, as strong."""
+    numbers = {name: value for name, value in asdict(hand.surface).items() if name != "name"}
+    for name in ("shear_limit", "pull_off_limit", "lateral_limit"):
+        numbers[name] = float(numbers[name] * factor)
+    return numbers
+
+
+def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
+    """Try the largest mass that holds, with so many plans at most.
+
+    ``factor``: the load factor, if there is one.
+    """
+    question = trials.question
+    load, where = question.load, trials.base.prepared.where
+    if question.body_wrench is not None or factor is None or any(load.angular_acceleration):
+        return []
+    mass = question.stance.robot.mass if load.mass is None else load.mass
+    com = load.com
+    if where is not None and load.own:
+        com = tuple(question.stance.robot.com_at(where.angles).tolist())
+    found: list[Tried] = []
+    low, high = 0.0, min(factor, 1.0)
+    share = high * (1.0 - WITHIN)
+    for _ in range(most):
+        if share < LIGHTEST:
+            break
+        changes: dict[str, Any] = {"load.mass": share * mass}
+        if com is not None:
+            changes["load.com"] = list(com)
+        words = f"let the body weigh {share * mass:.1f} kg, not {mass:.1f} kg"
+        size = -math.log(share) / UNIT
+        tried = trials.of([Change("mass", (), words, changes, size)])
+        if tried and trials.holds(tried[0].utilisation):
+            low, found = share, tried
+        else:
+            high = share
+        if low >= (1.0 - STEP) * high:
+            break
+        share = 0.5 * (low + high)
+    return found

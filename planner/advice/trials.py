@@ -1,0 +1,128 @@
+"""Changes tried: each is planned and verified as its question would be, within a count of plans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+from hand_models.base import Array, InvalidInputError
+from planner import deadline
+from planner.advice.changes import Change, changed
+from planner.prepare import PreparedStance, prepare_stance, settle_each
+from planner.programs import SLACK
+from planner.question import Objective, Question
+from planner.solving import Trial, try_stance
+
+__all__ = ["PLANS", "WITHOUT", "Trials", "Tried"]
+
+PLANS: Final = 100
+"""That are made for the advice about a question."""
+
+WITHOUT: Final = ("mass", "strength")
+"""Kinds that do not count as help, nor as part of a pair: the task becomes another."""
+
+TRIED: Final = "all changes were tried"
+
+
+class Tried(NamedTuple):
+    """A change, and what came of it."""
+
+    change: Change
+    question: Question
+    trial: Trial
+
+    @property
+    def utilisation(self) -> float:
+        """The largest; infinite without a plan."""
+        return self.trial.utilisation
+
+
+class Trials:
+    """A count of plans, and the changes that were tried with them.
+
+    Parameters
+    ----------
+    question : Question
+    plans : int, optional
+        How many may be made.
+
+    Attributes
+    ----------
+    question : Question
+        As it is tried: for the least utilisation, without extras.
+    base : Trial
+        The question as it is.
+    left : int
+        Plans that may still be made.
+    found : list of Tried
+        All changes with which there is a plan.
+
+    Raises
+    ------
+    DeadlineError
+        By all that plans, if the time is over.
+    """
+
+    def __init__(self, question: Question, plans: int = PLANS) -> None:
+        self.left = plans
+        self.found: list[Tried] = []
+        self.question = replace(
+            question, want=frozenset(), draws=None, deadline=None, objective="max_margin"
+        )
+        self.base = self._try(prepare_stance(self.question))
+
+    def holds(self, utilisation: float) -> bool:
+        """Whether that is within the cap that was asked for."""
+        return utilisation <= self.question.limits.utilisation + SLACK
+
+    @property
+    def helped(self) -> bool:
+        """Whether some change makes it hold, not counting lighter bodies and stronger holds."""
+        return any(
+            self.holds(each.utilisation) for each in self.found if each.change.kind not in WITHOUT
+        )
+
+    def of(self, candidates: Iterable[Change]) -> list[Tried]:
+        """Try changes as far as plans are left; return those with which there is a plan."""
+        asked = self._asked(list(candidates)[: max(self.left, 0)])
+        self._settle([question for _, question in asked])
+        found = []
+        for change, question in asked:
+            # what cannot be, or out of reach, is no advice
+            with suppress(InvalidInputError):
+                trial = self._try(prepare_stance(question))
+                if math.isfinite(trial.utilisation):
+                    found.append(Tried(change, question, trial))
+        self.found += found
+        return found
+
+    def turned(self, prepared: PreparedStance, wrench: Array) -> Trial:
+        """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
+        return self._try(prepared.turned(wrench))
+
+    def again(self, question: Question, objective: Objective) -> Trial:
+        """Plan what was tried for another objective."""
+        return self._try(prepare_stance(replace(question, objective=objective)))
+
+    def _asked(self, candidates: Sequence[Change]) -> list[tuple[Change, Question]]:
+        found = []
+        for change in candidates:
+            with suppress(InvalidInputError):
+                found.append((change, changed(self.question, change.changes)))
+        return found
+
+    def _settle(self, questions: Sequence[Question]) -> None:
+        """Close all hands of some questions at once, which are found closed from then on."""
+        hands = [hand for question in questions for hand in question.stance.hands]
+        if hands:
+            settle_each(self.question.stance.robot.hand, hands)
+
+    def _try(self, prepared: PreparedStance) -> Trial:
+        deadline.check(TRIED)
+        self.left -= 1
+        trial = try_stance(prepared)
+        deadline.check(TRIED)
+        return trial
