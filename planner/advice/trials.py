@@ -14,6 +14,7 @@ from planner.advice.changes import Change, changed
 from planner.prepare import PreparedStance, prepare_stance, settle_each
 from planner.programs import SLACK
 from planner.question import Objective, Question
+from planner.scene import findings, scene_of
 from planner.solving import Trial, try_stance
 
 __all__ = ["PLANS", "WITHOUT", "Trials", "Tried"]
@@ -73,6 +74,7 @@ class Trials:
             question, want=frozenset(), draws=None, deadline=None, objective="max_margin"
         )
         self.base = self._try(prepare_stance(self.question))
+        self._odd = _odd(self.base.prepared)
 
     def holds(self, utilisation: float) -> bool:
         """Whether that is within the cap that was asked for."""
@@ -93,7 +95,11 @@ class Trials:
         for change, question in asked:
             # what cannot be, or out of reach, is no advice
             with suppress(InvalidInputError):
-                trial = self._try(prepare_stance(question))
+                prepared = prepare_stance(question)
+                if _odd(prepared) - self._odd:
+                    # what would be warned of is no advice either
+                    continue
+                trial = self._try(prepared)
                 if math.isfinite(trial.utilisation):
                     found.append(Tried(change, question, trial))
         self.found += found
@@ -126,3 +132,9 @@ class Trials:
         trial = try_stance(prepared)
         deadline.check(TRIED)
         return trial
+
+
+def _odd(prepared: PreparedStance) -> frozenset[str]:
+    """Return the kinds of what is odd about a stance."""
+    scene = scene_of(prepared.question.stance, prepared.batch.hands)
+    return frozenset(each.kind for each in findings(scene))

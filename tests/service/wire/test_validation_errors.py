@@ -107,7 +107,7 @@ INVALID = [
     (("body_wrench",), [0.0] * 6, "body_wrench", "give body_wrench or load, not both"),
     (("objective",), "fun", "objective", "valid: max_margin, max_reliability, min_effort"),
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
-    (("want",), ["model", "price"], "want[1]", "valid: clearance, load_factor, model, prices"),
+    (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
     (("id",), "x" * 257, "id", "length <= 256"),
     (("stance", "joints"), "guess", "stance.joints", "'guess' is not known; valid: solve"),
     (("stance", "joints"), 3, "stance.joints", "a string or an object or null"),
