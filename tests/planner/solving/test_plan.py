@@ -142,6 +142,9 @@ def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
             for finger in hand.fingers:
                 mine.append(finger.tendon_tension / robot_hand.maximum_tension)
                 mine += _parts(finger).values()
+                whole = place.surface.lateral_limit * sum(shares[finger.name])
+                aside = abs(sum(tile.lateral for tile in finger.tiles))
+                mine.append(aside / whole if aside else 0.0)
                 for tile, share in zip(finger.tiles, shares[finger.name], strict=True):
                     law = np.column_stack([tile.load_at_zero, tile.load_per_newton])
                     load = law @ [1.0, finger.tendon_tension]
