@@ -100,7 +100,7 @@ def test_on_rough_rock_fingers_close():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(10_000, 12_000, 500))
+@pytest.mark.parametrize("first", range(10_000, 11_000, 500))
 def test_on_rough_rock_fingers_close_slow(first):
     on_rough_rock(first, 500)
 
@@ -187,7 +187,7 @@ def openings_of(seeds):
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_fingers_end_where_a_plain_simulation_does(part):
-    apart, count = compared(list(openings_of(range(15 * part, 15 * part + 15))))
+    apart, count = compared(list(openings_of(range(10 * part, 10 * part + 10))))
     assert len(apart) <= 0.1 * count, apart
 
 
