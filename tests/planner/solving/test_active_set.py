@@ -52,7 +52,7 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
             continue
         for mine, theirs in zip(exact.loads, other.loads, strict=True):
             np.testing.assert_allclose(mine[:4], theirs[:4], atol=0.02)
-    assert count >= 0.8 * len(data_of_all)
+    assert count >= 0.7 * len(data_of_all)
 
 
 def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
