@@ -188,7 +188,7 @@ def openings_of(seeds):
 @pytest.mark.parametrize("part", range(4))
 def test_fingers_end_where_a_plain_simulation_does(part):
     apart, count = compared(list(openings_of(range(10 * part, 10 * part + 10))))
-    assert len(apart) <= 0.1 * count, apart
+    assert len(apart) <= 0.2 * count, apart
 
 
 # Closed forms -------------------------------------------------------------------------------------
