@@ -180,4 +180,4 @@ def test_a_short_run_tells_residuals_numbers_sets_and_variants(monkeypatch):
 
 def bundled_ranges() -> str:
     lines = DRAWS.read_text(encoding="utf-8")
-    return lines[lines.index("[ranges]") + len("[ranges]\n") :]
+    return lines.split("\n[ranges]\n")[1]
