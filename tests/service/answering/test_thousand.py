@@ -141,6 +141,11 @@ def wrong_certificate(question: Question, answer: Plan) -> str | None:
         # the direction has a part for each wrench that is given: HiGHS has confirmed it above
         return None
     sets, wrench = gathered(question)
+    if not proof.direction.any():
+        # no loads keep to the hard rows, whatever the body needs
+        hard = peer.rows(question, sets)
+        found = peer.solve(np.zeros(hard.H.shape[1]), hard.H, hard.h)
+        return None if found.status == 2 else f"HiGHS has loads: {found.message}"
     best = peer.farthest(question, proof.direction, sets)
     if not best <= proof.supremum + 1e-6 * max(1.0, abs(best)):
         return f"loads reach {best}, more than {proof.supremum}"
