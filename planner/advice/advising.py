@@ -35,14 +35,11 @@ WORTH: Final = 0.01
 STRENGTH: Final = 14
 """Plans for stronger holds, at most."""
 
+SPARE: Final = 5
+"""The same where pairs are tried, too."""
+
 MASS: Final = 5
 """Plans for a lighter body, at most."""
-
-FINER: Final = 3
-"""Hands whose place is looked for more finely."""
-
-SPARE: Final = 5
-"""Of these where pairs are tried, too."""
 
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import linprog
@@ -265,9 +265,9 @@ class BodySearch:
     def _change(self, shift: Array, tilt: _Tilt) -> Change:
         stance = self.prepared.question.stance
         body = self._body(shift, tilt)
-        changes = {"stance.body": pose_message(body)}
+        changes: dict[str, Any] = {"stance.body": pose_message(body)}
         if stance.joints is not None:
-            changes["stance.joints"] = "solve"  # type: ignore[assignment]
+            changes["stance.joints"] = "solve"
         size = float(np.linalg.norm(shift)) / SHIFT_UNIT + abs(tilt.angle) / TILT_UNIT
         return Change("body", (), ", and ".join(self._words(shift, tilt)), changes, size)
 

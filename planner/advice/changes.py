@@ -14,9 +14,9 @@ from hand_models.tile import Surface
 from planner.question import HandOnHold, Question
 from planner.result import AdviceKind
 
-__all__ = ["Change", "changed", "hand_path", "joined", "pose_message"]
+__all__ = ["HAND_PATH", "Change", "changed", "hand_path", "joined", "pose_message"]
 
-HAND: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
+HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
 """The path of a hand of a question, or of one of its fields."""
 
 BY_LIMB: Final = re.compile(r"(present|limits\.per_hand)\.(.+)")
@@ -77,7 +77,7 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
     stance: dict[str, Any] = {}
     whole: dict[str, Any] = {}
     for path, value in changes.items():
-        hand, named = HAND.fullmatch(path), BY_LIMB.fullmatch(path)
+        hand, named = HAND_PATH.fullmatch(path), BY_LIMB.fullmatch(path)
         if hand is not None:
             hands.setdefault(int(hand[1]), {})[hand[2]] = value
         elif path == "stance.body":
@@ -119,7 +119,7 @@ def _hands(
             del found[i]
             continue
         like = fields.pop(None, hand_path(i))
-        match = HAND.fullmatch(like)
+        match = HAND_PATH.fullmatch(like)
         assert match is not None
         updates: dict[str, Any] = {}
         original = hands[int(match[1])]

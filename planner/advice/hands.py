@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
@@ -163,20 +162,21 @@ def _moved(
     None where its rock, a scan, has no frame of its own that can be placed.
     """
     stance = prepared.question.stance
-    hand, changes = stance.hands[index], {hand_path(index, "pose"): pose_message(pose)}
+    hand = stance.hands[index]
+    changes: dict[str, Any] = {hand_path(index, "pose"): pose_message(pose)}
     if not seated:
         if hand.at is not None:
-            with suppress(InvalidInputError):
+            try:
                 hand.hold.check_place()
-                changes[hand_path(index, "place")] = None  # type: ignore[assignment]
-            if len(changes) == 1:
+            except InvalidInputError:
                 return None
+            changes[hand_path(index, "place")] = None
         changes[hand_path(index, "hold.pose")] = pose_message(_rock(prepared, index))
         if hand.hold_in_hand is not None:
-            changes[hand_path(index, "hold.pose_in_hand")] = None  # type: ignore[assignment]
+            changes[hand_path(index, "hold.pose_in_hand")] = None
         changes |= unseated(hand, index)
     if stance.joints is not None:
-        changes["stance.joints"] = "solve"  # type: ignore[assignment]
+        changes["stance.joints"] = "solve"
     return changes
 
 

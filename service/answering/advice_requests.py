@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from copy import deepcopy
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 from msgspec.structs import replace
 
+from planner.advice import HAND_PATH, hand_path
 from planner.result import Advice
 from service.requests import PlanRequest
 
 __all__ = ["advised"]
-
-HAND: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
-"""The path of a hand, or of one of its fields."""
 
 
 def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
@@ -34,18 +31,18 @@ def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
     hands: dict[int, Any] = dict(enumerate(map(deepcopy, given)))
     # a hand that is a copy comes before what else is told of it, one that is let go after all
     for path, value in sorted(advice.changes.items(), key=lambda change: change[0].count(".")):
-        hand = HAND.fullmatch(path)
+        hand = HAND_PATH.fullmatch(path)
         if hand is None:
             _put(message, path, value)
         elif hand[2] is not None:
             _put(hands[int(hand[1])], hand[2], value)
         elif value is not None:
-            like = HAND.fullmatch(value)
+            like = HAND_PATH.fullmatch(value)
             assert like is not None  # by what an advice is
             hands[int(hand[1])] = deepcopy(given[int(like[1])])
     gone = {path for path, value in advice.changes.items() if value is None}
     message["stance"]["hands"] = [
-        each for i, each in sorted(hands.items()) if f"stance.hands[{i}]" not in gone
+        each for i, each in sorted(hands.items()) if hand_path(i) not in gone
     ]
     return msgspec.convert(message, PlanRequest)
 

@@ -134,17 +134,11 @@ def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
         for hand, place in zip(answer.hands, question.stance.hands, strict=True):
             mine = [hand.palm.utilisation]
             mine.append((HELD @ hand.wrench[:3]).max() / robot_hand.structure.hand_load)
-            settled = settle_hand(place, question.stance)
-            shares = {
-                name: settled.engagement[settled.finger_of == i].tolist()
-                for i, name in enumerate(FINGERS)
-            }
+            shares = _shares(place, question.stance)
             for finger in hand.fingers:
                 mine.append(finger.tendon_tension / robot_hand.maximum_tension)
                 mine += _parts(finger).values()
-                whole = place.surface.lateral_limit * sum(shares[finger.name])
-                aside = abs(sum(tile.lateral for tile in finger.tiles))
-                mine.append(aside / whole if aside else 0.0)
+                mine.append(_sideways(place, shares[finger.name], finger))
                 for tile, share in zip(finger.tiles, shares[finger.name], strict=True):
                     law = np.column_stack([tile.load_at_zero, tile.load_per_newton])
                     load = law @ [1.0, finger.tendon_tension]
@@ -180,15 +174,32 @@ def _parts(finger) -> dict[str, float]:
     }
 
 
+def _shares(place, stance) -> dict[str, list[float]]:
+    """How much of its spines each tile has on rock, by finger."""
+    settled = settle_hand(place, stance)
+    return {
+        name: settled.engagement[settled.finger_of == i].tolist() for i, name in enumerate(FINGERS)
+    }
+
+
+def _sideways(place, shares: list[float], finger) -> float:
+    """Utilisation of what a finger's tiles hold sideways together."""
+    aside = abs(sum(tile.lateral for tile in finger.tiles))
+    return aside / (place.surface.lateral_limit * sum(shares)) if aside else 0.0
+
+
 @many
 def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
-    for _, answer in feasible(seeds):
+    for question, answer in feasible(seeds):
         name = answer.limiting
         hand = next(hand for hand in answer.hands if hand.limb == name.limb)
         if name.limit == "hand_load":
             part = (HELD @ hand.wrench[:3]).max() / (50.0 * 9.80665)
         elif name.limit == "finger_lateral":
-            continue
+            place = next(each for each in question.stance.hands if each.limb == name.limb)
+            shares = _shares(place, question.stance)[name.finger]
+            finger = next(f for f in hand.fingers if f.name == name.finger)
+            part = _sideways(place, shares, finger)
         elif name.limit in ("motor_torque", "motor_current", "finger_shear", "fingertip_force"):
             part = _parts(next(f for f in hand.fingers if f.name == name.finger))[name.limit]
         elif name.phalanx is not None:
