@@ -27,6 +27,7 @@ from .solvers import (
     reach as reach,
     tie_break as tie_break,
     unique as unique,
+    vertex as vertex,
 )
 from .stance_data import (
     WRENCH_UNIT as WRENCH_UNIT,

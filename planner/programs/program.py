@@ -39,7 +39,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import ConicProgram, Outcome, Reached
 from planner.programs.stance_data import Columns, StanceData
-from planner.programs.stance_program import REFINED, SHARP, Definition, StanceProgram
+from planner.programs.stance_program import REFINED, SHARP, VERTEX, Definition, StanceProgram
 
 __all__ = [
     "TIE",
@@ -76,6 +76,14 @@ class Margin(StanceProgram):
         P, q = np.zeros((2, 1 + self.size))
         q[0] = 1.0
         return ConicProgram(P, q, (Columns.of(u), loads), b, len(self.G))
+
+    def vertex(self) -> Outcome:
+        """Return a plan where as many rows meet as there are loads, by the simplex method.
+
+        An interior point has as many digits of all loads as of the largest; here each row has its
+        own.
+        """
+        return self.by_definition(VERTEX)[0]
 
 
 class Unique(StanceProgram):

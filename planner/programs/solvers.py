@@ -35,6 +35,7 @@ __all__ = [
     "reach",
     "tie_break",
     "unique",
+    "vertex",
 ]
 
 SLACK: Final = 1e-6
@@ -47,6 +48,11 @@ SHARP_SLACK: Final = 1e-9
 def margin(data: StanceData) -> Outcome:
     """Solve `Margin`."""
     return Margin(data).solve()
+
+
+def vertex(data: StanceData) -> Outcome:
+    """Solve `Margin` by the simplex method."""
+    return Margin(data).vertex()
 
 
 def unique(data: StanceData, share: float = 1.0) -> Outcome:

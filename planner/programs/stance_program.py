@@ -32,7 +32,7 @@ from planner.programs.conic import (
 )
 from planner.programs.stance_data import Columns, StanceData, parted
 
-__all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "Definition", "StanceProgram"]
+__all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "VERTEX", "Definition", "StanceProgram"]
 
 SOLVER: Final = "CLARABEL"
 
@@ -54,8 +54,18 @@ SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel":
 REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
 """For a second try."""
 
-CAREFUL: Final[dict[str, Any]] = {"max_threads": 1}
+CAREFUL: Final[dict[str, Any]] = {"solver": cp.CLARABEL, "max_threads": 1}
 """The solver's own defaults, for a third."""
+
+VERTEX: Final[dict[str, Any]] = {
+    "solver": cp.SCIPY,
+    "scipy_options": {
+        "method": "highs-ds",
+        "primal_feasibility_tolerance": 1e-10,
+        "dual_feasibility_tolerance": 1e-10,
+    },
+}
+"""Of linear programs, where every row needs its own digits: the dual simplex method."""
 
 _cvxpy = threading.Lock()
 """CVXPY counts its variables for all threads, and loses count where two define at a time."""
@@ -192,7 +202,7 @@ class StanceProgram(ABC):
             np.isfinite(part).all()
             for part in (program.P, program.q, program.b, self.data.rows.whole)
         ):
-            return self._by_definition()
+            return self.by_definition()
         duals: tuple[Array, ...] = ()
         if found.multipliers is not None:
             balance = found.multipliers[program.above : program.above + len(self.G)]
@@ -200,15 +210,17 @@ class StanceProgram(ABC):
             duals = balance, *parted(others, [len(self.L), len(self.H)])
         return self._read(found.status, found.iterations, found.value, found.x, duals)
 
-    def _by_definition(self) -> tuple[Outcome, Array | None]:
-        """Let CVXPY solve it."""
+    def by_definition(self, careful: Mapping[str, Any] = CAREFUL) -> tuple[Outcome, Array | None]:
+        """Let CVXPY solve it, with these options."""
         left = deadline.left()
-        options = CAREFUL if left is None else {**CAREFUL, "time_limit": left}
+        options = dict(careful)
+        if left is not None and careful is CAREFUL:
+            options["time_limit"] = left
         with _cvxpy, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             problem, variables, rows = self.define()
             try:
-                problem.solve(solver=cp.CLARABEL, **options)
+                problem.solve(**options)
             except cp.SolverError:
                 return self._read(FAILED, 0, math.nan, None, ())
         status, stats = problem.status, problem.solver_stats

@@ -48,7 +48,7 @@ LIES = {
 @pytest.mark.parametrize("lie", LIES.values(), ids=LIES.keys())
 def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
     outcome = lie(honest_outcome())
-    for name in ("unique", "margin"):
+    for name in ("unique", "margin", "vertex"):
         monkeypatch.setattr(programs, name, lambda *_: outcome)
     answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
     assert answer.status == "failed"
@@ -90,7 +90,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
         limit_duals=tuple(np.zeros(len(hand.l0)) for hand in hands),
         hard_duals=tuple(np.zeros(len(hand.h)) for hand in hands),
     )
-    for name in ("unique", "margin"):
+    for name in ("unique", "margin", "vertex"):
         monkeypatch.setattr(programs, name, lambda *_: lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is
     truth = plan(question)
@@ -106,7 +106,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 @pytest.mark.parametrize("word", ["infeasible", "user_limit", "solver_error"])
 def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
     nothing = Outcome(False, word, 0, float("nan"))
-    for name in ("unique", "margin"):
+    for name in ("unique", "margin", "vertex"):
         monkeypatch.setattr(programs, name, lambda *_: nothing)
     answer = plan(QUESTION)
     assert answer.status == "failed"
@@ -128,7 +128,7 @@ def test_a_distance_that_is_made_up_gets_no_certificate(monkeypatch):
     """Both programs lie that a stance that can be balanced is infeasible."""
     loads = tuple(0.0 * y for y in honest_outcome().loads)
     far = Outcome(True, "optimal", 1, 3.0, loads=loads)
-    for name in ("unique", "margin"):
+    for name in ("unique", "margin", "vertex"):
         monkeypatch.setattr(programs, name, lambda d: Outcome(False, "infeasible", 0, float("nan")))
     monkeypatch.setattr(programs, "nearest", lambda data: far)
     answer = plan(QUESTION)

@@ -176,15 +176,16 @@ def test_a_symmetric_stance_has_a_symmetric_plan(hold, lateral):
             )
 
 
+@pytest.mark.parametrize("solve", [solvers.margin, solvers.vertex])
 @many
-def test_dual_bound_of_the_margin_proves_its_optimum(seeds):
+def test_dual_bound_of_the_margin_proves_its_optimum(seeds, solve):
     """The multipliers of a linear program bound its optimum from below; the gap is nothing."""
     for seed in seeds[:60]:
         question, answer = random_answer(seed)
         if answer.utilisation is None:
             continue
         data = program_data(question)
-        outcome = solvers.margin(data)
+        outcome = solve(data)
         weight = sum(duals.sum() for duals in outcome.limit_duals)
         assert weight == pytest.approx(1.0, abs=1e-6)
         stationary = [
