@@ -1,11 +1,9 @@
-"""What would make a stance hold: changes of one thing, of two if none does, in their order."""
+"""What would make a stance hold: changes of one thing, of more if none does, in their order."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -13,11 +11,12 @@ from msgspec.structs import replace as changed_struct
 
 from planner import deadline, solving
 from planner.advice.body import BodySearch, can_move
-from planner.advice.changes import Change, joined
+from planner.advice.changes import Change
+from planner.advice.combinations import CombinationSearch
 from planner.advice.hands import TURNS, WAYS, closings, grasps, lettings, placed
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
-from planner.advice.trials import PLANS, WITHOUT, Trials, Tried
+from planner.advice.trials import PLANS, Trials, Tried
 from planner.deadline import DeadlineError, late_sentence
 from planner.programs import SLACK
 from planner.question import Question
@@ -36,22 +35,13 @@ STRENGTH: Final = 14
 """Plans for stronger holds, at most."""
 
 SPARE: Final = 5
-"""The same where pairs are tried, too."""
+"""The same where combinations are tried, too."""
 
 MASS: Final = 5
 """Plans for a lighter body, at most."""
 
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""
-
-PARTNERS: Final = 5
-"""Single changes of which pairs are made."""
-
-PAIRS: Final = 8
-"""Pairs that are made of them."""
-
-PAIR_ROUNDS: Final = 5
-"""Plans of a search for the body's shift beside another change."""
 
 
 def plan(question: Question) -> Plan:
@@ -128,7 +118,7 @@ def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], 
 
 
 def _try_all(trials: Trials) -> None:
-    """Try single changes; a lighter body and stronger holds; then pairs if none of them holds."""
+    """Try single changes; a lighter body and stronger holds; then combinations if none holds."""
     base, prepared = trials.base, trials.base.prepared
     order = _order(trials)
     near = base.utilisation <= NEAR
@@ -148,7 +138,7 @@ def _try_all(trials: Trials) -> None:
     lighter(trials, base.load_factor().factor, min(MASS, trials.left))
     stronger(trials, order, min(STRENGTH if trials.helped else SPARE, trials.left))
     if not trials.helped:
-        _pair(trials)
+        CombinationSearch(trials).run()
 
 
 def _order(trials: Trials) -> list[int]:
@@ -156,45 +146,6 @@ def _order(trials: Trials) -> list[int]:
     duals, limbs = trials.base.found.outcome.limit_duals, trials.base.prepared.limbs
     weights = [-round(float(np.sum(each)), 6) for each in duals] or [0.0] * len(limbs)
     return sorted(range(len(limbs)), key=lambda i: (weights[i], limbs[i]))
-
-
-def _pair(trials: Trials) -> None:
-    """Try pairs of the changes that did most, until one holds."""
-    singles = sorted(_best_each(trials), key=lambda tried: tried.utilisation)
-    if not singles:
-        return
-    if can_move(trials.base.prepared):
-        for tried in [each for each in singles if each.change.kind != "body"][:2]:
-            _beside(trials, tried)
-            if trials.helped:
-                return
-    pairs = [joined(a.change, b.change) for a, b in combinations(singles[:PARTNERS], 2)]
-    for pair in [pair for pair in pairs if pair is not None][:PAIRS]:
-        trials.of([pair])
-        if trials.helped:
-            return
-    try_new_holds(trials, singles[0].change, 1)
-
-
-def _beside(trials: Trials, tried: Tried) -> None:
-    """Try a change with the shift of the body that goes with it."""
-    search = BodySearch(trials, tried.trial.prepared, tried.trial)
-    search.run(PAIR_ROUNDS, enough=True)
-    pairs = [joined(tried.change, shift) for shift in search.changes()]
-    trials.of([pair for pair in pairs if pair is not None][:1])
-
-
-def _best_each(trials: Trials) -> Iterator[Tried]:
-    """Yield the best change of each kind and of each hand, of those that may be part of a pair.
-
-    A lighter body or a stronger hold makes nearly any stance hold: in a pair it would hide that the
-    other change does little.
-    """
-    best: dict[tuple[str, tuple[str, ...]], Tried] = {}
-    for tried in sorted(trials.found, key=lambda each: each.utilisation):
-        if tried.change.kind not in WITHOUT:
-            best.setdefault((tried.change.kind, tried.change.limbs), tried)
-    yield from best.values()
 
 
 def _ranked(trials: Trials) -> list[Tried]:

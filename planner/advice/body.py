@@ -26,12 +26,12 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Array, Pose
 from planner import programs
 from planner.advice.changes import Change, pose_message
-from planner.advice.trials import Trials
+from planner.advice.trials import Trials, direction
 from planner.prepare import PreparedStance
 from planner.programs import WRENCH_UNIT
 from planner.solving import Trial
 
-__all__ = ["ROUNDS", "BodySearch", "can_move", "slope"]
+__all__ = ["SHIFT_UNIT", "BodySearch", "can_move", "slope"]
 
 ROUNDS: Final = 14
 """Plans of a search for the best shift, at most."""
@@ -59,6 +59,9 @@ TILT_UNIT: Final = 0.2
 
 AXES: Final = "xyz"
 
+STEPS: Final = 7
+"""Of a grid of shifts, along each axis."""
+
 
 def can_move(prepared: PreparedStance) -> bool:
     """Whether the body's place says what the hands are to give."""
@@ -68,10 +71,9 @@ def can_move(prepared: PreparedStance) -> bool:
 
 def slope(trial: Trial) -> Array:
     """Return how the least utilisation grows with a shift of the body, in B's axes (3,) [1/m]."""
-    dual = trial.found.outcome.balance_dual
-    assert dual is not None
-    nu = -dual[3:6] / WRENCH_UNIT[3:]
-    return np.cross(trial.prepared.wrench[:3], nu)
+    lacking = direction(trial)
+    assert lacking is not None
+    return np.cross(trial.prepared.wrench[:3], lacking[3:])
 
 
 class _Cut(NamedTuple):
@@ -114,14 +116,12 @@ class BodySearch:
         if base is not None:
             self._keep(np.zeros(3), base)
 
-    def run(self, rounds: int = ROUNDS, *, enough: bool = False) -> None:
-        """Look for the best shift; with ``enough`` only for one that holds."""
-        for _ in range(rounds):
+    def run(self) -> None:
+        """Look for the best shift."""
+        for _ in range(ROUNDS):
             shift, bound = self._next(_Tilt())
             best = self._best
             if shift is None or self.trials.left <= 0:
-                return
-            if enough and self.trials.holds(best):
                 return
             if self._known and best - bound <= CLOSE * max(best, CLOSE):
                 return
@@ -164,6 +164,20 @@ class BodySearch:
             return []
         bound, _, shift, tilt = min(there, key=lambda each: each[:2])
         return [self._change(shift, tilt)] if bound < (1.0 - 5.0 * CLOSE) * self._best else []
+
+    def shifted(self, shift: Array) -> Change:
+        """Return a shift of the body, in its axes."""
+        return self._change(shift, _Tilt())
+
+    def grid(self) -> Array:
+        """Return shifts in reach, the body clear of the palms, shape (s, 3); none comes first."""
+        steps = np.linspace(-self.range.shift, self.range.shift, STEPS)
+        shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
+        centres, radii = self._reaches(_Tilt())
+        far = np.linalg.norm(shifts[:, None] - centres, axis=2)
+        clear = np.array(list(self._clearances(0)))
+        fine = (far <= radii).all(axis=1) & (shifts @ clear[:, :3].T <= clear[:, 3]).all(axis=1)
+        return np.vstack([np.zeros(3), shifts[fine & shifts.any(axis=1)]])
 
     @property
     def _best(self) -> float:

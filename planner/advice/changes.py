@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -14,7 +14,7 @@ from hand_models.tile import Surface
 from planner.question import HandOnHold, Question
 from planner.result import AdviceKind
 
-__all__ = ["HAND_PATH", "Change", "changed", "hand_path", "joined", "pose_message"]
+__all__ = ["HAND_PATH", "Change", "changed", "combined", "hand_path", "joined", "pose_message"]
 
 HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
 """The path of a hand of a question, or of one of its fields."""
@@ -46,6 +46,16 @@ def joined(first: Change, second: Change) -> Change | None:
     limbs = tuple(dict.fromkeys(first.limbs + second.limbs))
     words = f"{first.words}; and {second.words}"
     return Change("pair", limbs, words, whole, first.size + second.size)
+
+
+def combined(changes: Sequence[Change]) -> Change | None:
+    """Return several changes as one; None of none, or where they say different things."""
+    if not changes:
+        return None
+    whole: Change | None = changes[0]
+    for each in changes[1:]:
+        whole = None if whole is None else joined(whole, each)
+    return whole if whole is None or len(changes) < 3 else whole._replace(kind="combination")
 
 
 def pose_message(pose: Pose) -> dict[str, list[float]]:

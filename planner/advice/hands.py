@@ -27,6 +27,7 @@ __all__ = [
     "lettings",
     "placed",
     "unseated",
+    "variants",
 ]
 
 GRASPS: Final = (0.0, math.pi / 2.0, math.pi)
@@ -43,6 +44,12 @@ ALIKE: Final = 0.05
 
 TURNS: Final = tuple((0.0, 0.0, math.radians(turn)) for turn in (30.0, -30.0, 60.0, -60.0))
 """How far a hand is turned about z of its palm [m, m, rad]."""
+
+AROUND: Final = tuple(
+    (0.0, 0.0, math.radians(turn))
+    for turn in (30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)
+)
+"""The same all around."""
 
 WAYS: Final = ((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
 """How far it is moved along x and y of its palm [m, m, rad]."""
@@ -92,6 +99,24 @@ def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
             if whole is not None:
                 words = f"take {', '.join(whole.limbs)} with {fingers(turn)}"
                 yield whole._replace(kind="grasp", words=words)
+
+
+def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
+    """Yield one hand moved, turned all around and with other grasps, its rock staying."""
+    hand = prepared.question.stance.hands[index]
+    yield from grasps(prepared, [index])
+    yield from placed(prepared, index, WAYS)
+    for turned in placed(prepared, index, AROUND):
+        yield turned
+        for turn in GRASPS:
+            if abs(hand.grasp.outer_rotation - turn) > ALIKE and not hand.grasp.fingernail:
+                yield Change(
+                    "place",
+                    turned.limbs,
+                    f"{turned.words} and take it with {fingers(turn)}",
+                    {**turned.changes, hand_path(index, "grasp.outer_rotation"): turn},
+                    turned.size + abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT,
+                )
 
 
 def closings(prepared: PreparedStance) -> Iterator[Change]:

@@ -14,12 +14,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Array, Pose
-from planner.advice.changes import Change, hand_path, joined, pose_message
+from planner.advice.changes import Change, hand_path, pose_message
 from planner.advice.hands import GRASPS, HAND, fingers, unseated
 from planner.advice.trials import Trials, Tried
 from planner.prepare import PreparedStance
 
-__all__ = ["NewHold", "try_new_holds"]
+__all__ = ["APART", "NewHold", "every_hold", "try_new_holds"]
 
 NORMAL: Final = 0.3
 """Least length of the mean of palms' axes for hands to have a plane."""
@@ -35,6 +35,9 @@ GRID: Final = (0.0, -0.6, 0.6)
 
 QUARTERS: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
 """How a new hand is turned first from the one that it is like [rad]."""
+
+AROUND: Final = tuple(math.radians(turn) for turn in range(-135, 181, 45))
+"""All around [rad]."""
 
 BETWEEN: Final = math.pi / 4.0
 """By how much more, after that [rad]."""
@@ -68,17 +71,15 @@ class NewHold:
     ----------
     trials : Trials
     limb : str
-    before : Change, optional
-        What is done besides; not about this limb.
     """
 
-    def __init__(self, trials: Trials, limb: str, before: Change | None = None) -> None:
-        self.trials, self.limb, self.before = trials, limb, before
+    def __init__(self, trials: Trials, limb: str) -> None:
+        self.trials, self.limb = trials, limb
         self.prepared = trials.base.prepared
         limbs = self.prepared.limbs
         self.index = limbs.index(limb) if limb in limbs else len(limbs)
         self.best: tuple[Tried, _Hold] | None = None
-        self._places = [*_places(self.prepared, limb)]
+        self.places = [*_places(self.prepared, limb)]
         self._seen: set[str] = set()
 
     @property
@@ -88,8 +89,8 @@ class NewHold:
 
     def probe(self, turns: Sequence[float]) -> None:
         """Try it like each hand, turned from that, at the first place."""
-        if self._places:
-            self._try([_Hold(i, self._places[0], turn) for i in self.likes for turn in turns])
+        if self.places:
+            self._try([_Hold(i, self.places[0], turn) for i in self.likes for turn in turns])
 
     def refine(self) -> None:
         """Try the best so far turned, with other grasps, then elsewhere."""
@@ -104,13 +105,13 @@ class NewHold:
                 self._try([now._replace(grasp=grasp) for grasp in GRASPS])
         if self.best is not None:
             now = self.best[1]
-            self._try([now._replace(place=place) for place in self._places])
+            self._try([now._replace(place=place) for place in self.places])
 
     def _try(self, wanted: Sequence[_Hold]) -> None:
         changes: dict[str, tuple[Change, _Hold]] = {}
         for hold in wanted:
-            change = self._change(hold)
-            if change is not None and (self.best is None or hold is not self.best[1]):
+            change = self.change(hold)
+            if self.best is None or hold is not self.best[1]:
                 changes.setdefault(change.words, (change, hold))
         for words in self._seen & set(changes):
             del changes[words]
@@ -119,7 +120,7 @@ class NewHold:
             if self.best is None or tried.utilisation < self.best[0].utilisation:
                 self.best = tried, changes[tried.change.words][1]
 
-    def _change(self, hold: _Hold) -> Change | None:
+    def change(self, hold: _Hold) -> Change:
         """Return the limb holding at a place as another hand does, but for its turn and grasp."""
         stance, new = self.prepared.question.stance, self.index
         hand = stance.hands[hold.like]
@@ -142,14 +143,13 @@ class NewHold:
             changes[hand_path(new, "grasp.outer_rotation")] = hold.grasp
         if stance.joints is not None:
             changes["stance.joints"] = "solve"
-        change = Change(
+        return Change(
             kind="new_hold" if new < len(stance.hands) else "free_hand",
             limbs=(self.limb,),
             words=self._words(hand.limb, hold),
             changes=changes,
             size=HAND,
         )
-        return change if self.before is None else joined(self.before, change)
 
     def _words(self, like: str, hold: _Hold) -> str:
         told = ", ".join(f"{value:z.3f}" for value in hold.place)
@@ -163,25 +163,30 @@ class NewHold:
         )
 
 
-def try_new_holds(trials: Trials, before: Change | None = None, most: int = 2) -> None:
+def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
+    """Yield a limb at all places, like each other hand, turned all around from it."""
+    search = NewHold(trials, limb)
+    for place in search.places:
+        for like in search.likes:
+            for turn in AROUND:
+                yield search.change(_Hold(like, place, turn))
+
+
+def try_new_holds(trials: Trials, most: int = 1) -> None:
     """Try where limbs that hold nothing had better take hold, and where others had better.
 
     Parameters
     ----------
     trials : Trials
-    before : Change, optional
-        What is done besides.
     most : int, optional
         Limbs whose holds are searched for after a first look.
     """
     limbs = trials.base.prepared.limbs
-    taken = () if before is None else before.limbs
     searches = []
     for limb in trials.question.stance.robot.limbs:
-        if limb not in taken:
-            search = NewHold(trials, limb, before)
-            search.probe(QUARTERS[:1] if limb in limbs else QUARTERS)
-            searches += [] if search.best is None else [search]
+        search = NewHold(trials, limb)
+        search.probe(QUARTERS[:1] if limb in limbs else QUARTERS)
+        searches += [] if search.best is None else [search]
     searches.sort(key=lambda search: search.best[0].utilisation if search.best else math.inf)
     for search in searches[:most]:
         search.refine()

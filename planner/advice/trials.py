@@ -8,16 +8,18 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from hand_models.base import Array, InvalidInputError
-from planner import deadline
+from planner import deadline, programs
 from planner.advice.changes import Change, changed
 from planner.prepare import PreparedStance, prepare_stance, settle_each
-from planner.programs import SLACK
+from planner.programs import SLACK, WRENCH_UNIT
 from planner.question import Objective, Question
 from planner.scene import findings, scene_of
 from planner.solving import Trial, try_stance
 
-__all__ = ["PLANS", "WITHOUT", "Trials", "Tried"]
+__all__ = ["PLANS", "WITHOUT", "Trials", "Tried", "direction"]
 
 PLANS: Final = 100
 """That are made for the advice about a question."""
@@ -91,19 +93,40 @@ class Trials:
         """Try changes as far as plans are left; return those with which there is a plan."""
         asked = self._asked(list(candidates)[: max(self.left, 0)])
         self._settle([question for _, question in asked])
-        found = []
+        before = len(self.found)
         for change, question in asked:
-            # what cannot be, or out of reach, is no advice
-            with suppress(InvalidInputError):
-                prepared = prepare_stance(question)
-                if _odd(prepared) - self._odd:
-                    # what would be warned of is no advice either
-                    continue
-                trial = self._try(prepared)
-                if math.isfinite(trial.utilisation):
-                    found.append(Tried(change, question, trial))
-        self.found += found
-        return found
+            self._tried(change, question)
+        return self.found[before:]
+
+    def one(self, change: Change) -> Trial | None:
+        """Try a change; return what came of it, with a plan or without; None if it cannot be."""
+        for each, question in self._asked([change]):
+            return self._tried(each, question)
+        return None
+
+    def possible(self, change: Change) -> bool:
+        """Whether a change can be planned with; no plan is made."""
+        return any(self._prepared(question) for _, question in self._asked([change]))
+
+    def _tried(self, change: Change, question: Question) -> Trial | None:
+        prepared = self._prepared(question)
+        if prepared is None:
+            return None
+        try:
+            trial = self._try(prepared)
+        except InvalidInputError:
+            return None
+        if math.isfinite(trial.utilisation):
+            self.found.append(Tried(change, question, trial))
+        return trial
+
+    def _prepared(self, question: Question) -> PreparedStance | None:
+        """Return a question's stance; None if it cannot be, or would be warned of."""
+        try:
+            prepared = prepare_stance(question)
+        except InvalidInputError:
+            return None
+        return None if _odd(prepared) - self._odd else prepared
 
     def turned(self, prepared: PreparedStance, wrench: Array) -> Trial:
         """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
@@ -132,6 +155,17 @@ class Trials:
         trial = try_stance(prepared)
         deadline.check(TRIED)
         return trial
+
+
+def direction(trial: Trial) -> Array | None:
+    """Return the body wrenches' direction in which a stance lacks most, shape (6,), if known."""
+    outcome, data = trial.found.outcome, trial.found.sets.data
+    if outcome.solved and outcome.balance_dual is not None:
+        return np.asarray(-outcome.balance_dual[:6] / WRENCH_UNIT)
+    nearest = programs.nearest(data)
+    if not nearest.solved:
+        return None
+    return np.asarray((data.wrench - programs.body_wrench(data, nearest.loads))[:6] / WRENCH_UNIT)
 
 
 def _odd(prepared: PreparedStance) -> frozenset[str]:

@@ -14,13 +14,12 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-import highspy
 import numpy as np
 import numpy.typing as npt
 
 from hand_models.base import Array
 from planner import deadline
-from planner.programs import UNLIMITED
+from planner.programs import UNLIMITED, SilentHighs
 
 __all__ = ["FarkasProgram", "Multipliers"]
 
@@ -163,45 +162,9 @@ class FarkasProgram:
         self._costs, self._most, self._parts = costs, most, parts
 
 
-class _Silent(highspy.Highs):
-    """A solver that says nothing, not even its name when it begins."""
-
-    def __init__(self) -> None:
-        highspy.Highs.__init__(self)
-        self.callbacks = []  # none is called, and they would hold it in a circle
-        for name, value in OPTIONS.items():
-            self.setOptionValue(name, value)
-
-    def optimal(self) -> bool:
-        """Solve the program, and return whether it says that it has."""
-        self.run()
-        return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
-
-    def enableCallbacks(self) -> None:
-        """Be silent instead: it is here that it would tell its name."""
-        self.silent()
-
-
-def _solver_of(A: Array) -> _Silent:
+def _solver_of(A: Array) -> SilentHighs:
     """Return a solver of programs with rows A, all of whose columns are above zero."""
-    (rows, columns), entries = A.shape, A.T != 0.0
-    starts = np.append(0, entries.sum(axis=1).cumsum())
-    solver, zeros = _Silent(), np.zeros(max(A.shape))
-    solver.passModel(
-        columns,
-        rows,
-        int(starts[-1]),
-        int(highspy.MatrixFormat.kColwise),
-        int(highspy.ObjSense.kMinimize),
-        0.0,  # the costs begin at this
-        zeros[:columns],
-        zeros[:columns],
-        np.full(columns, np.inf),
-        zeros[:rows],
-        zeros[:rows],
-        starts.astype(np.int32),
-        entries.nonzero()[1].astype(np.int32),
-        A.T[entries],
-        zeros[:columns].astype(np.int32),  # no column is an integer
-    )
+    solver, zeros = SilentHighs(OPTIONS), np.zeros(max(A.shape))
+    rows, columns = zeros[: len(A)], zeros[: A.shape[1]]
+    solver.load(A, (columns, np.full(A.shape[1], np.inf)), (rows, rows))
     return solver

@@ -41,3 +41,4 @@ from .stance_data import (
     used_effort as used_effort,
 )
 from .stance_program import SOLVER as SOLVER
+from .supports import SilentHighs as SilentHighs, Support as Support

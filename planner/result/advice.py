@@ -9,7 +9,16 @@ from msgspec import Struct
 __all__ = ["Advice", "AdviceKind"]
 
 AdviceKind = Literal[
-    "body", "place", "grasp", "let_go", "free_hand", "new_hold", "strength", "mass", "pair"
+    "body",
+    "place",
+    "grasp",
+    "let_go",
+    "free_hand",
+    "new_hold",
+    "strength",
+    "mass",
+    "pair",
+    "combination",
 ]
 
 
@@ -23,7 +32,7 @@ class Advice(Struct, frozen=True):
         ``grasp``: take a hold, or all, with outer fingers or closing tension otherwise;
         ``let_go``: without a hand; ``free_hand``: with one more, if rock is there; ``new_hold``:
         with a hand elsewhere, if rock is there; ``strength``: a stronger hold, or all;
-        ``mass``: a lighter body; ``pair``: two of these.
+        ``mass``: a lighter body; ``pair``: two of these; ``combination``: more of them.
     limbs : list of str
         Whose hands it is about; none for the body.
     sentence : str
@@ -38,7 +47,8 @@ class Advice(Struct, frozen=True):
         way over 0.02 m plus its turn over 0.5 rad; the turn of outer fingers over π/2 and the
         change of closing tension over 10 N, summed over hands; 2 for a hand more, less or
         elsewhere; ln of how many times as strong holds become over ln 1.1, summed over hands; ln of
-        how many times lighter the body becomes over ln 1.1. Of a pair the sum.
+        how many times lighter the body becomes over ln 1.1. Of several changes the
+        sum.
     status : str
         ``optimal`` or ``overloaded``, with the change.
     utilisation : float

@@ -1,0 +1,372 @@
+"""Which changes of several hands and of the body together would make a stance hold.
+
+With the hands' sets at the utilisation that is asked for, a stance holds where its hands can give
+as much as is needed in all directions d of body wrenches (Farkas):
+
+    Σ_h s_h(d) ≥ d·W,   s_h(d) = max { d·w : w of hand h }.
+
+A plan that does not hold tells a direction in which most is missing, by the multipliers of its
+balance. What a changed hand can give there is known before anything is planned, and so is what a
+shift of the body needs; so by the directions found so far one variant of each hand, and a shift, is
+chosen that may hold, and what their plan says is one direction more (as Benders' cuts, 1962).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hand_models.base import Array, Indices, Pose, wrench_transport
+from hand_models.fixed_wrist import wrench_spaces
+from hand_models.hand import SettledHand
+from planner.advice.body import SHIFT_UNIT, BodySearch, can_move
+from planner.advice.changes import Change, changed, combined
+from planner.advice.hands import lettings, variants
+from planner.advice.new_holds import APART, every_hold
+from planner.advice.trials import Trials, direction
+from planner.prepare import settle_each
+from planner.programs import Support
+from planner.question import HandOnHold
+from planner.solving import Trial
+
+__all__ = ["Choice", "CombinationSearch", "Known"]
+
+Mask = npt.NDArray[np.bool_]
+
+CLOSE: Final = 1e-9
+"""Less than that is no better."""
+
+ENOUGH: Final = 1.5
+"""Part of what is needed beyond which a choice is no better."""
+
+SIZE: Final = 0.02
+"""Part of what is needed that is worth a change of size 1."""
+
+FAR: Final = 1e3
+"""Stands for more than any direction needs, in parts of that."""
+
+HOPELESS: Final = 0.97
+"""Part of what is needed below which no choice is planned with."""
+
+NEW: Final = ("free_hand", "new_hold")
+"""Kinds with a hand elsewhere."""
+
+SMALLER: Final = 12
+"""Plans for smaller changes, once some hold."""
+
+
+FEW: Final = 48
+"""Variants of a limb that are put together with those of another."""
+
+STARTS: Final = 8
+"""Choices that are begun at besides what is near."""
+
+SEED: Final = 0
+"""Of these."""
+
+
+class _Variant(NamedTuple):
+    """A hand as it may be.
+
+    Attributes
+    ----------
+    limb : str
+    change : Change or None
+        None for the hand as it is.
+    pose : Pose or None
+        Of H in W; None for no hand.
+    support : Support or None
+        Of its wrenches; None for no hand.
+    transport : ndarray, shape (6, 6)
+        Ad(B←H).
+    """
+
+    limb: str
+    change: Change | None
+    pose: Pose | None
+    support: Support | None
+    transport: Array
+
+    def gives(self, direction: Array) -> float:
+        """Return the most of direction · w, of body wrenches w that it gives."""
+        if self.support is None:
+            return 0.0
+        return min(max(self.support(-(direction @ self.transport)), -FAR), FAR)
+
+
+class Choice(NamedTuple):
+    """A variant of each limb, and a shift of the body, by their indices."""
+
+    hands: tuple[int, ...]
+    shift: int
+
+
+class Known(NamedTuple):
+    """What is known of all choices, in k directions.
+
+    Attributes
+    ----------
+    gives : ndarray, shape (k, v)
+        Of what is needed, the part that each variant gives at most.
+    needs : ndarray, shape (k, s)
+        The part that is needed with each shift, less one.
+    sizes, shift_sizes : ndarray, shapes (v,), (s,)
+    reached : ndarray of bool, shape (v, s)
+        Whether a variant is in its limb's reach with a shift.
+    together : ndarray of bool, shape (v, v)
+        Whether two variants go together.
+    slots : tuple of ndarray
+        Variants of each limb.
+    smallest : bool
+        Whether the smallest choice that gives enough is wanted, not the one that gives most.
+    """
+
+    gives: Array
+    needs: Array
+    sizes: Array
+    shift_sizes: Array
+    reached: Mask
+    together: Mask
+    slots: tuple[Indices, ...]
+    smallest: bool
+
+    def part(self, choice: Choice) -> float:
+        """Return the part of what is needed that a choice gives at most."""
+        given = self.gives[:, list(choice.hands)].sum(axis=1)
+        return float((given - self.needs[:, choice.shift]).min())
+
+    def worth(self, given: Array, sizes: Array) -> Array:
+        """Return what choices are worth, by what they give in all directions (k, …), and size."""
+        part = given.min(axis=0)
+        if self.smallest:
+            return np.where(part >= 1.0, -SIZE * sizes, part - FAR)
+        return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes)
+
+    def _best(self, slot: Indices, given: Array) -> Indices:
+        """Return the variants of a limb that are worth most by themselves, `FEW` at most."""
+        if len(slot) <= FEW:
+            return slot
+        worth = self.worth(given[:, None] + self.gives[:, slot], self.sizes[slot])
+        return slot[np.argsort(-worth, kind="stable")[:FEW]]
+
+    def climbed(self, start: Choice) -> tuple[float, Choice]:
+        """Return the best that is reached by changing two limbs, or the shift, at a time."""
+        hands, shift, best = list(start.hands), start.shift, -np.inf
+        while True:
+            before = best
+            given = self.gives[:, hands].sum(axis=1)
+            size = float(self.sizes[hands].sum())
+            worth = self.worth(given[:, None] - self.needs, size + self.shift_sizes)
+            worth[~self.reached[hands].all(axis=0)] = -np.inf
+            if np.isfinite(worth.max()):
+                shift = int(worth.argmax())
+            for i, j in combinations(range(len(hands)), 2):
+                others = [each for k, each in enumerate(hands) if k not in (i, j)]
+                given = self.gives[:, others].sum(axis=1) - self.needs[:, shift]
+                size = float(self.sizes[others].sum() + self.shift_sizes[shift])
+                fits = self.reached[:, shift] & self.together[others].all(axis=0)
+                first, second = (
+                    self._best(each[fits[each]], given) for each in (self.slots[i], self.slots[j])
+                )
+                if not (len(first) and len(second)):
+                    continue
+                both = self.gives[:, first, None] + self.gives[:, None, second]
+                sizes = self.sizes[first, None] + self.sizes[second]
+                worth = self.worth(given[:, None, None] + both, size + sizes)
+                worth[~self.together[np.ix_(first, second)]] = -np.inf
+                a, b = np.unravel_index(int(worth.argmax()), worth.shape)
+                if worth[a, b] > best:
+                    hands[i], hands[j], best = int(first[a]), int(second[b]), float(worth[a, b])
+            if best <= before + CLOSE:
+                return best, Choice(tuple(hands), shift)
+
+
+class CombinationSearch:
+    """The search for changes of one stance that together make it hold.
+
+    Parameters
+    ----------
+    trials : Trials
+        That pays for its plans. Of floating wrists hands are chosen as if they were fixed.
+    """
+
+    def __init__(self, trials: Trials) -> None:
+        prepared = trials.base.prepared
+        self.trials, self._variants = trials, list(_variants(trials))
+        self._sizes = np.array([0.0 if v.change is None else v.change.size for v in self._variants])
+        limbs = np.array([each.limb for each in self._variants])
+        self._slots = [np.flatnonzero(limbs == limb) for limb in dict.fromkeys(limbs.tolist())]
+        self._body = BodySearch(trials, prepared) if can_move(prepared) else None
+        self._shifts = np.zeros((1, 3)) if self._body is None else self._body.grid()
+        self._reached, self._together = (
+            _reached(trials, self._variants, self._shifts),
+            _together(self._variants),
+        )
+        self._needed = prepared.wrench
+        self._random = np.random.default_rng(SEED)
+        self._rows: list[tuple[Array, Array]] = []
+        self.learn(trials.base, 0)
+
+    def run(self) -> None:
+        """Look for changes that hold, then for smaller ones, with the plans that are left."""
+        if self.find(0, smallest=False) is not None:
+            self.find(self.trials.left - SMALLER, smallest=True)
+
+    def find(self, last: int, *, smallest: bool) -> Choice | None:
+        """Plan for one choice after the other, until one holds or so many plans are left.
+
+        Parameters
+        ----------
+        last : int
+        smallest : bool
+            Whether to begin with the smallest choices that may hold, not with those that give most.
+
+        Returns
+        -------
+        Choice or None
+            What holds.
+        """
+        as_it_is = Choice(tuple(int(slot[self._sizes[slot].argmin()]) for slot in self._slots), 0)
+        seen = [as_it_is]
+        while self._rows and self.trials.left > last:
+            known = self.known(smallest=smallest)
+            starts = {as_it_is, seen[-1], *self.anywhere(known)}
+            choices = {known.climbed(start) for start in starts}
+            new = [each for each in choices if each[1] not in seen]
+            if not new:
+                return None
+            _, choice = max(new)
+            if known.part(choice) < HOPELESS:
+                return None
+            seen.append(choice)
+            change = self.change(choice)
+            trial = None if change is None else self.trials.one(change)
+            if trial is None:
+                self._forbid(choice)
+            elif self.trials.holds(trial.utilisation):
+                return choice
+            else:
+                self.learn(trial, choice.shift)
+        return None
+
+    def anywhere(self, known: Known) -> Iterator[Choice]:
+        """Yield choices to begin at."""
+        for _ in range(STARTS):
+            hands = tuple(int(self._random.choice(slot)) for slot in known.slots)
+            yield Choice(hands, int(self._random.integers(len(known.shift_sizes))))
+
+    def known(self, *, smallest: bool = False) -> Known:
+        """Return what is known of all choices."""
+        return Known(
+            gives=np.array([gives for gives, _ in self._rows]),
+            needs=np.array([needs for _, needs in self._rows]),
+            sizes=self._sizes,
+            shift_sizes=np.linalg.norm(self._shifts, axis=1) / SHIFT_UNIT,
+            reached=self._reached,
+            together=self._together,
+            slots=tuple(self._slots),
+            smallest=smallest,
+        )
+
+    def learn(self, trial: Trial, shift: int) -> None:
+        """Keep the direction in which a plan tells that most is missing, if it does."""
+        found = direction(trial)
+        needs = 0.0 if found is None else float(found @ trial.prepared.wrench)
+        if found is None or not needs > 0.0:
+            return
+        d = found / needs
+        # about where B's origin was
+        d[:3] -= np.cross(d[3:], self._shifts[shift])
+        gives = np.array([each.gives(d) for each in self._variants])
+        moves = self._shifts @ np.cross(self._needed[:3], d[3:])
+        self._rows.append((gives, float(d @ self._needed) + moves - 1.0))
+
+    def _forbid(self, choice: Choice) -> None:
+        """Leave out variants that cannot be, or pairs that do not go together; else the largest."""
+        alone = {i: each for i in choice.hands if (each := self._variants[i].change) is not None}
+        gone = [i for i, each in alone.items() if not self.trials.possible(each)]
+        apart = []
+        if not gone:
+            for i, j in combinations(alone, 2):
+                both = combined([alone[i], alone[j]])
+                if both is None or not self.trials.possible(both):
+                    apart.append((i, j))
+        if not gone and not apart:
+            gone = [max(alone, key=lambda i: self._sizes[i])] if alone else []
+        for i in gone:
+            self._slots = [slot[slot != i] for slot in self._slots]
+        for i, j in apart:
+            self._together[[i, j], [j, i]] = False
+
+    def change(self, choice: Choice) -> Change | None:
+        """Return all that is changed, as one."""
+        changes = [each for i in choice.hands if (each := self._variants[i].change) is not None]
+        if self._body is not None and choice.shift:
+            changes.append(self._body.shifted(self._shifts[choice.shift]))
+        return combined(changes)
+
+
+def _variants(trials: Trials) -> Iterator[_Variant]:
+    """Yield each hand as it is, changed, let go and elsewhere, and each free limb so, too."""
+    prepared = trials.base.prepared
+    stance, limits = trials.question.stance, trials.question.limits
+    wanted: list[tuple[str, Change | None, HandOnHold]] = []
+    for i, hand in enumerate(stance.hands):
+        wanted.append((hand.limb, None, hand))
+        for change in variants(prepared, i):
+            wanted.append((hand.limb, change, _hand(trials, change, i)))
+    for limb in stance.robot.limbs:
+        index = prepared.limbs.index(limb) if limb in prepared.limbs else len(stance.hands)
+        for change in every_hold(trials, limb):
+            wanted.append((limb, change, _hand(trials, change, index)))
+    settled = settle_each(stance.robot.hand, [hand for _, _, hand in wanted])
+    supports: dict[SettledHand, Support] = {}
+    closed = [each for each in settled if isinstance(each, SettledHand)]
+    for one, space in zip(closed, wrench_spaces(closed, limits.tendon_tension), strict=True):
+        if one not in supports:
+            supports[one] = Support(space, limits.utilisation)
+    body = stance.body.inverse()
+    for (limb, said, hand), each in zip(wanted, settled, strict=True):
+        if isinstance(each, SettledHand):
+            yield _Variant(
+                limb, said, hand.pose, supports[each], wrench_transport(body @ hand.pose)
+            )
+    nothing = np.zeros((6, 6))
+    for change in lettings(trials.question):
+        yield _Variant(change.limbs[0], change, None, None, nothing)
+    for limb in stance.robot.limbs:
+        if limb not in prepared.limbs:
+            yield _Variant(limb, None, None, None, nothing)
+
+
+def _reached(trials: Trials, variants: Sequence[_Variant], shifts: Array) -> Mask:
+    """Return whether limbs reach their hands (v,) with shifts of the body (s, 3), shape (v, s)."""
+    stance = trials.question.stance
+    there = [(i, each.limb, each.pose) for i, each in enumerate(variants) if each.pose is not None]
+    away, reach = stance.robot.limb_spans(
+        stance.body, [limb for _, limb, _ in there], [pose for _, _, pose in there]
+    )
+    far = np.linalg.norm(away[:, None] - shifts, axis=2)
+    found = np.ones((len(variants), len(shifts)), dtype=bool)
+    # what is out of reach today may stay so
+    found[[i for i, _, _ in there]] = far <= np.maximum(reach[:, None], far[:, :1])
+    return found
+
+
+def _together(variants: Sequence[_Variant]) -> Mask:
+    """Return which hands are not where another one is, shape (v, v)."""
+    nowhere = np.full(3, np.inf)
+    places = np.array([nowhere if v.pose is None else v.pose.position for v in variants])
+    with np.errstate(invalid="ignore"):
+        near = np.linalg.norm(places[:, None] - places, axis=2) < APART
+    new = np.array([v.change is not None and v.change.kind in NEW for v in variants])
+    return np.asarray(~(near & (new | new[:, None])))
+
+
+def _hand(trials: Trials, change: Change, index: int) -> HandOnHold:
+    """Return a hand as a change has it."""
+    return changed(trials.question, change.changes).stance.hands[index]

@@ -1,0 +1,100 @@
+"""How far a hand's wrenches go in a direction, as one linear program that is kept for many."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import highspy
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.wrench_spaces import WrenchSpace
+from planner.programs.row_scaling import scaled_rows
+
+__all__ = ["SilentHighs", "Support"]
+
+OPTIONS: Final[dict[str, Any]] = {
+    "presolve": "off",
+    "parallel": "off",
+    "solver": "simplex",
+}
+"""Of HiGHS. To presolve would be to forget where it was."""
+
+
+class SilentHighs(highspy.Highs):
+    """A solver that says nothing, not even its name when it begins.
+
+    Parameters
+    ----------
+    options : dict of str to any
+        Of HiGHS.
+    """
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        highspy.Highs.__init__(self)
+        self.callbacks = []  # none is called, and they would hold it in a circle
+        for name, value in options.items():
+            self.setOptionValue(name, value)
+
+    def optimal(self) -> bool:
+        """Solve the program, and return whether it says that it has."""
+        self.run()
+        return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
+
+    def enableCallbacks(self) -> None:
+        """Be silent instead: it is here that it would tell its name."""
+        self.silent()
+
+    def load(self, A: Array, columns: tuple[Array, Array], rows: tuple[Array, Array]) -> None:
+        """Take rows A x without costs, and the bounds of x and of A x."""
+        (count, size), entries = A.shape, A.T != 0.0
+        starts = np.append(0, entries.sum(axis=1).cumsum())
+        self.passModel(
+            size,
+            count,
+            int(starts[-1]),
+            int(highspy.MatrixFormat.kColwise),
+            int(highspy.ObjSense.kMinimize),
+            0.0,  # the costs begin at this
+            np.zeros(size),
+            *columns,
+            *rows,
+            starts.astype(np.int32),
+            entries.nonzero()[1].astype(np.int32),
+            A.T[entries],
+            np.zeros(size, dtype=np.int32),  # no column is an integer
+        )
+
+
+class Support:
+    """The support function of a hand's wrenches at a utilisation. For one caller at a time.
+
+    Parameters
+    ----------
+    space : WrenchSpace
+    cap : float
+        The utilisation.
+    """
+
+    def __init__(self, space: WrenchSpace, cap: float) -> None:
+        rows = scaled_rows(space)
+        self._generators, self._origin = rows.generators, rows.origin
+        A, most = np.vstack([rows.L, rows.H]), np.concatenate([cap - rows.l0, rows.h])
+        free = np.full(A.shape[1], np.inf)
+        self._solver = SilentHighs(OPTIONS)
+        self._solver.load(A, (-free, free), (np.full(len(A), -np.inf), most))
+        self._columns = np.arange(A.shape[1], dtype=np.int32)
+
+    def __call__(self, direction: Array) -> float:
+        """Return the most of direction · w, shape (6,), of wrenches w on the rock in H.
+
+        Infinite where there is no end to it, −∞ where there is no wrench, and where the solver does
+        not say.
+        """
+        solver = self._solver
+        solver.changeColsCost(len(self._columns), self._columns, -(direction @ self._generators))
+        if solver.optimal():
+            return float(direction @ self._origin) - solver.getObjectiveValue()
+        unbounded = solver.getModelStatus() == highspy.HighsModelStatus.kUnbounded
+        return math.inf if unbounded else -math.inf

@@ -1,0 +1,58 @@
+"""Which changes together make a stance hold: directions leave out what does not hold, only that."""
+
+from __future__ import annotations
+
+import pytest
+
+from planner.advice import advise, changed
+from planner.advice.combinations import CombinationSearch
+from planner.advice.trials import Trials
+from planner.solving import plan as planned
+from tests.suite.helpers.stances import random_question
+
+GIVEN, OWN = 119, 154
+"""Seeds of a stance under a wrench that is given, and of one that is far overloaded by itself."""
+
+
+@pytest.mark.parametrize("seed", [GIVEN, OWN])
+def test_the_direction_of_a_plan_leaves_it_out_exactly_where_it_does_not_hold(seed):
+    trials = Trials(random_question(seed))
+    search, seen = CombinationSearch(trials), 0
+    while seen < 6:
+        for choice in search.anywhere(search.known()):
+            change = search.change(choice)
+            trial = None if change is None else trials.one(change)
+            if trial is None:
+                continue
+            seen += 1
+            search.learn(trial, choice.shift)
+            holds = trials.holds(trial.utilisation)
+            assert (search.known().part(choice) < 1.0 - 1e-6) == (not holds)
+
+
+@pytest.mark.parametrize("seed", [GIVEN, OWN])
+def test_no_direction_leaves_out_what_holds(seed):
+    trials = Trials(random_question(seed))
+    search = CombinationSearch(trials)
+    found = search.find(0, smallest=False)
+    assert found is not None
+    known = search.known()
+    assert len(known.gives) > 3
+    assert known.part(found) >= 1.0 - 1e-6
+    # nor is anything put where limbs do not reach, or another hand is
+    assert known.reached[list(found.hands), found.shift].all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [GIVEN, OWN])
+def test_a_stance_that_no_single_change_helps_is_told_some_that_hold_together(seed):
+    asked = random_question(seed)
+    told, whole = advise(asked)
+    assert whole
+    first = told[0]
+    assert first.kind in ("pair", "combination")
+    assert first.holds
+    assert first.sentence.count("; and ") >= 1 + (first.kind == "combination")
+    there = planned(changed(asked, first.changes))
+    assert there.utilisation == pytest.approx(first.utilisation, abs=1e-6)
+    assert all(each.size >= first.size for each in told if each.holds)
