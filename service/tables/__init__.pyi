@@ -6,3 +6,4 @@ from .plans import (
     print_wrench_space as print_wrench_space,
 )
 from .routes import print_route as print_route
+from .sweeps import print_sweep as print_sweep
