@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from service.commands.interruption import Interrupted
 from service.commands.options import (
@@ -20,6 +20,7 @@ from service.commands.options import (
 )
 from service.commands.stances import read_request
 from service.commands.terminal import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
+from service.sweeping import TOLERANCE
 from service.tables import console, print_sweep
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ __all__ = ["sweep"]
 
 TABLE: Final = "sweep.csv"
 PICTURE: Final = "sweep.png"
-TOLERANCE: Final = 1e-3
 
 
 @click.command()
@@ -97,9 +97,12 @@ def sweep(
     if seed is not None and samples is None:
         raise InvalidInputError("is of samples: give --samples, too", field="--seed")
     request = asked(read_request(stance), hand, robot)
-    with within("--vary"):
+    try:
         chosen = [Variation.parse(each, sampled=samples is not None) for each in variations]
         design = Design.of(request, chosen, samples, seed or 0, robots_of(robot))
+    except InvalidInputError as error:
+        where = "--vary" if error.field is None else f"--vary {error.field}"
+        raise InvalidInputError(error.message, field=where) from None
     pair = _pair(over, design)
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
@@ -107,7 +110,7 @@ def sweep(
     files = {"table": folder / TABLE, "picture": folder / PICTURE}
     with filling_folder():
         result.write_table(files["table"])
-        plot_sweep(result, files["picture"], stance, pair)
+        plot_sweep(result, files["picture"], Path(stance).stem, pair)
     if as_json:
         say(result.summary() | {"files": {name: str(file) for name, file in files.items()}})
     else:

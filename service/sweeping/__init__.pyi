@@ -1,4 +1,10 @@
-from .border import Border as Border, Held as Held, border_in_words as border_in_words, held as held
+from .border import (
+    TOLERANCE as TOLERANCE,
+    Border as Border,
+    Held as Held,
+    border_in_words as border_in_words,
+    held as held,
+)
 from .design import Design as Design
 from .evaluation import Row as Row
 from .figures import plot_sweep as plot_sweep

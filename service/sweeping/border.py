@@ -11,7 +11,7 @@ import msgspec
 
 from service.sweeping.evaluation import Row
 
-__all__ = ["TOLERANCE", "Border", "Held", "border_in_words", "borders", "held"]
+__all__ = ["TOLERANCE", "Along", "Border", "Held", "border_in_words", "borders", "held"]
 
 TOLERANCE: Final = 1e-3
 """Of a border, over the range that varies."""
@@ -27,7 +27,8 @@ class Border(msgspec.Struct, frozen=True):
     holds, fails : float
         No farther apart than the tolerance.
     tolerance : float
-        In the unit.
+        In the unit; what it was asked for, but where whole numbers or a point without an answer
+        leave more.
     plans : int
         That were needed to find it, beside the points.
     """
@@ -38,6 +39,15 @@ class Border(msgspec.Struct, frozen=True):
     fails: float
     tolerance: float
     plans: int
+
+
+class Along(NamedTuple):
+    """A number that varies: its place in points, its path, its unit, and if it is a whole one."""
+
+    place: int
+    path: str
+    unit: str | None
+    whole: bool
 
 
 class Held(NamedTuple):
@@ -51,12 +61,7 @@ class Held(NamedTuple):
 
 
 def borders(
-    rows: Sequence[Row],
-    axis: tuple[str, str | None],
-    tolerance: float,
-    plan: Callable[[float], Row],
-    *,
-    whole: bool = False,
+    rows: Sequence[Row], along: Along, tolerance: float, plan: Callable[[float], Row]
 ) -> list[Border]:
     """Return every border over one variable that two neighbouring points show.
 
@@ -64,50 +69,46 @@ def borders(
     ----------
     rows : sequence of Row
         In the order of the variable.
-    axis : tuple of str
-        Its path and its unit.
+    along : Along
+        What varies.
     tolerance : float
-        In the unit.
+        In its unit.
     plan : callable
         Plans at one more value.
-    whole : bool, optional
-        Whether it takes whole numbers only.
     """
     found = []
     for before, after in itertools.pairwise(rows):
         if "error" in (before.state, after.state) or before.holds == after.holds:
             continue
         first, last = (before, after) if before.holds else (after, before)
-        found.append(_narrowed(first, last, axis, tolerance, plan, whole))
+        found.append(_narrowed(first, last, along, tolerance, plan))
     return found
 
 
 def _narrowed(
-    held: Row,
-    failed: Row,
-    axis: tuple[str, str | None],
-    tolerance: float,
-    plan: Callable[[float], Row],
-    whole: bool,
+    held: Row, failed: Row, along: Along, tolerance: float, plan: Callable[[float], Row]
 ) -> Border:
     """Return a border between two points: by interpolation, and every third time bisection."""
-    plans = 0
-    while (gap := abs(_at(failed) - _at(held))) > (max(tolerance, 1.0) if whole else tolerance):
-        low, high = sorted((_at(held), _at(failed)))
+    plans, place = 0, along.place
+    enough = max(tolerance, 1.0) if along.whole else tolerance
+    while (gap := abs(_at(failed, place) - _at(held, place))) > enough:
+        low, high = sorted((_at(held, place), _at(failed, place)))
         value = 0.5 * (low + high)
-        estimate = crossing(held, failed) if plans % 3 < 2 else None
+        estimate = crossing(held, failed, place) if plans % 3 < 2 else None
         if estimate is not None:
             # a little beyond it, so that the next plan is likely to be on the other side
             step = math.copysign(0.45 * tolerance, value - estimate)
             value = min(max(estimate + step, low + 0.05 * gap), high - 0.05 * gap)
-        if whole:
+        if along.whole:
             value = min(max(round(value), low + 1), high - 1)
         row = plan(value)
         plans += 1
         if row.state == "error":
             break
         held, failed = (row, failed) if row.holds else (held, row)
-    return Border(*axis, _at(held), _at(failed), tolerance, plans)
+    ends = _at(held, place), _at(failed, place)
+    reached = max(tolerance, abs(ends[1] - ends[0]))
+    return Border(along.path, along.unit, *ends, reached, plans)
 
 
 def held(rows: Sequence[Row], place: int) -> list[Held]:
@@ -138,7 +139,7 @@ def between(held: Row, failed: Row, place: int) -> float:
     return 0.5 * (_at(held, place) + _at(failed, place)) if estimate is None else estimate
 
 
-def crossing(held: Row, failed: Row, place: int = 0) -> float | None:
+def crossing(held: Row, failed: Row, place: int) -> float | None:
     """Return where utilisation over its cap passes 1 by linear interpolation; None if unknown."""
     if held.margin is None or failed.margin is None or not failed.margin > held.margin:
         return None
@@ -147,7 +148,7 @@ def crossing(held: Row, failed: Row, place: int = 0) -> float | None:
     return start + min(max(share, 0.0), 1.0) * (_at(failed, place) - start)
 
 
-def _at(row: Row, place: int = 0) -> float:
+def _at(row: Row, place: int) -> float:
     value = row.point[place]
     assert isinstance(value, (int, float))
     return float(value)
@@ -157,7 +158,8 @@ def border_in_words(border: Border) -> str:
     """Return a border in one sentence; the value told is on the side that holds."""
     towards = "up to" if border.fails > border.holds else "from"
     unit = "" if border.unit is None else f" {border.unit}"
-    digits = max(0, 1 - math.floor(math.log10(border.tolerance)))
+    whole = border.tolerance >= 1.0 and border.holds.is_integer() and border.fails.is_integer()
+    digits = 0 if whole else max(0, 1 - math.floor(math.log10(border.tolerance)))
     values = [f"{value:.{digits}f}" for value in (border.holds, border.fails)]
     return (
         f"holds {towards} {border.path} = {values[0]}{unit}; at {values[1]} it does not "

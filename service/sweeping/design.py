@@ -112,6 +112,11 @@ class Design:
             for each, target in zip(self.variations, self.targets, strict=True)
         )
 
+    @property
+    def varying(self) -> list[int]:
+        """The places of the variations with more than one value; the first if there is none."""
+        return [i for i, each in enumerate(self.variations) if len(each.values) > 1] or [0]
+
     def payload(self, point: Point, form: Format = Format.MSGPACK) -> bytes:
         """Return the encoded request at a point."""
         document = self._paths.document

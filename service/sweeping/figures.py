@@ -63,7 +63,7 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: tuple[str, str] | Non
         If ``over`` does not name two of them.
     """
     chosen = chosen_pair(sweep, over)
-    varying = [i for i, each in enumerate(sweep.design.variations) if len(each.values) > 1] or [0]
+    varying = sweep.design.varying
     if chosen is None and len(varying) == 1:
         figure = _curves(sweep, varying[0], None)
     elif sweep.design.sampled:

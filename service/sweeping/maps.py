@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from matplotlib.colors import Normalize, TwoSlopeNorm
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -28,10 +29,14 @@ __all__ = [
 SCALE: Final = "RdBu_r"
 """Colours: blue where it holds, white at the cap, red beyond."""
 
-MOST: Final = 2.0
-"""Of the scale, over the cap: what is beyond is as red as that."""
+LEAST, LESS_RED, MOST = 0.5, 1.5, 2.0
+"""Of the scale, over the cap: it goes at least from the first to the second, and at most to the
+last; what is beyond is as red as that."""
 
 BORDER: Final = "black"
+WIDTH: Final = 1.8
+"""Of the border [pt]."""
+
 HATCHES: Final[dict[State, tuple[str, str, str]]] = {
     "infeasible": ("0.75", "////", "infeasible: nothing balances the body"),
     "error": ("white", "xx", "no answer: see the column error"),
@@ -58,6 +63,11 @@ class Side(NamedTuple):
     label: str
     values: tuple[Value, ...]
     words: tuple[str, ...] = ()
+
+    @property
+    def numeric(self) -> bool:
+        """Whether it has numbers, and not words."""
+        return not self.words
 
     def place(self, value: Value) -> float:
         """Return where a value is along the axis."""
@@ -100,9 +110,7 @@ def colours_of(rows: Sequence[Row]) -> Normalize:
     caps = {row.cap for row in rows}
     cap = caps.pop() if len(caps) == 1 else 1.0
     low, high = (float(used.min()), float(used.max())) if used.size else (0.0, cap)
-    least = low if low < 0.98 * cap else 0.0
-    most = min(high, MOST * cap)
-    return TwoSlopeNorm(cap, least, most if most > 1.02 * cap else 1.25 * cap)
+    return TwoSlopeNorm(cap, min(low, LEAST * cap), max(min(high, MOST * cap), LESS_RED * cap))
 
 
 def draw_map(axes: Any, x: Side, y: Side, rows: Sequence[Sequence[Row]], colours: Normalize) -> Any:
@@ -123,17 +131,52 @@ def draw_map(axes: Any, x: Side, y: Side, rows: Sequence[Sequence[Row]], colours
         there = np.array([[row.state == state for row in line] for line in rows])
         if there.any():
             shown = np.ma.masked_where(~there, np.ones(there.shape))
+            colour_only = ListedColormap([colour])
             axes.pcolor(
-                across, up, shown, hatch=hatch, facecolor=colour, edgecolor="0.4", linewidth=0.0
+                across, up, shown, hatch=hatch, cmap=colour_only, edgecolor="0.4", linewidth=0.0
             )
     margins = _numbers(rows, lambda row: row.margin)
-    known = margins.compressed()
-    if min(margins.shape) > 1 and known.size and known.min() < 1.0 < known.max():
-        axes.contour(x.places, y.places, margins, levels=[1.0], colors=BORDER, linewidths=1.8)
+    if x.numeric and y.numeric and _crossed(margins.compressed()):
+        axes.contour(x.places, y.places, margins, levels=[1.0], colors=BORDER, linewidths=WIDTH)
+    else:
+        margins = np.ma.masked_invalid(np.full(margins.shape, np.nan))
+    segments = _edges_of_holding(rows, margins, across, up)
+    axes.add_collection(LineCollection(segments, colors=BORDER, linewidths=WIDTH))
     axes.set(xlabel=x.label, ylabel=y.label, xlim=x.span(), ylim=y.span())
     x.tick(axes.xaxis)
     y.tick(axes.yaxis)
     return mesh
+
+
+def _crossed(margins: Array) -> bool:
+    """Whether utilisations over their caps are on both sides of 1."""
+    return bool(margins.size) and bool(margins.min() < 1.0 < margins.max())
+
+
+def _edges_of_holding(
+    rows: Sequence[Sequence[Row]], margins: Any, across: Array, up: Array
+) -> list[list[tuple[float, float]]]:
+    """Return the edges between cells that hold and others, where no contour tells the border.
+
+    A contour needs four neighbouring cells that all have a utilisation.
+    """
+    known = ~np.ma.getmaskarray(margins)
+    squares = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+    squares = np.pad(squares, 1)
+    segments = []
+    for i, line in enumerate(rows):
+        for j, row in enumerate(line):
+            beside = line[j + 1] if j + 1 < len(line) else row
+            if _parted(row, beside) and not (squares[i, j + 1] or squares[i + 1, j + 1]):
+                segments.append([(across[j + 1], up[i]), (across[j + 1], up[i + 1])])
+            above = rows[i + 1][j] if i + 1 < len(rows) else row
+            if _parted(row, above) and not (squares[i + 1, j] or squares[i + 1, j + 1]):
+                segments.append([(across[j], up[i + 1]), (across[j + 1], up[i + 1])])
+    return segments
+
+
+def _parted(first: Row, second: Row) -> bool:
+    return first.holds != second.holds and "error" not in (first.state, second.state)
 
 
 def _numbers(rows: Sequence[Sequence[Row]], number: Any) -> Any:
@@ -176,10 +219,9 @@ def draw_samples(axes: Any, x: Side, y: Side, points: Any, colours: Normalize) -
 
 def map_legend(rows: Sequence[Row]) -> list[Any]:
     """Return the legend of a map: its border, and cells without a utilisation."""
-    margins = [row.margin for row in rows if row.margin is not None]
     handles: list[Any] = []
-    if margins and min(margins) < 1.0 < max(margins):
-        handles.append(Line2D([], [], color=BORDER, linewidth=1.8, label=_cap_words(rows)))
+    if len({row.holds for row in rows if row.state != "error"}) > 1:
+        handles.append(Line2D([], [], color=BORDER, linewidth=WIDTH, label=_cap_words(rows)))
     handles += [
         Patch(facecolor=colour, edgecolor="0.4", hatch=hatch, label=words)
         for state, (colour, hatch, words) in HATCHES.items()

@@ -27,7 +27,9 @@ Steps = tuple[str | int, ...]
 EVERY: Final = "*"
 """All entries of a list or an object."""
 
-FIXED: Final = frozenset({"v", "id", "confidence", "detail", "want", "draws", "explain"})
+FIXED: Final = frozenset(
+    {"v", "id", "deadline", "confidence", "detail", "want", "draws", "explain"}
+)
 """Fields of a request that are no part of what is asked about."""
 
 SURFACE: Final = "surface"

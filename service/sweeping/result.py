@@ -14,7 +14,7 @@ import msgspec
 from hand_models.base import InvalidInputError, whole_file
 from hand_models.parameters import ParameterTable
 from service.requests import PlanRequest
-from service.sweeping.border import TOLERANCE, Border, border_in_words, borders
+from service.sweeping.border import TOLERANCE, Along, Border, border_in_words, borders
 from service.sweeping.design import Design
 from service.sweeping.evaluation import Ask, Row, asking, rows_at
 from service.sweeping.variation import Value, Variation
@@ -169,21 +169,24 @@ def answered(
 
 
 def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Iterator[Border]:
-    """Yield the borders over a single number."""
-    if len(design.variations) > 1 or not design.variations[0].numbers:
+    """Yield the borders over a number that alone varies."""
+    place, *others = design.varying
+    variation, target = design.variations[place], design.targets[place]
+    if others or not variation.numbers:
         return
-    unique: Mapping[Any, Row] = {row.point: row for row in rows}
-    ordered = [unique[point] for point in sorted(unique)]
-    low, high = (float(end.point[0]) for end in (ordered[0], ordered[-1]))  # type: ignore[arg-type]
-    if not high > low:
+    unique: Mapping[Any, Row] = {row.point[place]: row for row in rows}
+    ordered = [unique[value] for value in sorted(unique)]
+    range_ = float(max(unique)) - float(min(unique))
+    if not range_ > 0.0:
         return
-    (target,) = design.targets
 
     def plan(value: float) -> Row:
-        return next(rows_at(design, [(int(value) if target.whole else value,)], ask))[1]
+        point = list(ordered[0].point)
+        point[place] = int(value) if target.whole else value
+        return next(rows_at(design, [tuple(point)], ask))[1]
 
-    axis = design.variations[0].path, target.unit
-    yield from borders(ordered, axis, tolerance * (high - low), plan, whole=target.whole)
+    along = Along(place, variation.path, target.unit, target.whole)
+    yield from borders(ordered, along, tolerance * range_, plan)
 
 
 def sweep(

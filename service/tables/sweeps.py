@@ -24,7 +24,7 @@ LARGEST: Final = 30
 def print_sweep(sweep: Sweep, out: Console) -> None:
     """Print a table of a sweep: of its points over one variable, of its border over two."""
     design = sweep.design
-    varying = [i for i, each in enumerate(design.variations) if len(each.values) > 1] or [0]
+    varying = sweep.design.varying
     numbers = [i for i in varying if design.variations[i].numbers]
     if len(varying) == 1:
         _print_points(sweep, varying[0], out)
@@ -51,10 +51,11 @@ def _everywhere(sweep: Sweep, x: int) -> str:
     if not rows:
         return "no point has an answer"
     values = sorted(row.point[x] for row in rows)  # type: ignore[type-var]
-    ends = f"from {word_of(values[0])} to {word_of(values[-1])} of {sweep.design.labels[x]}"
+    low, high = word_of(values[0]), word_of(values[-1])
+    ends = f"{f'at {low}' if low == high else f'from {low} to {high}'} of {sweep.design.labels[x]}"
     holding = sum(row.holds for row in rows)
-    words = "everywhere" if holding == len(rows) else "nowhere" if not holding else "in part"
-    return f"holds {words} {ends}"
+    words = "holds" if holding == len(rows) else "holds nowhere" if not holding else "holds in part"
+    return f"{words} {ends}"
 
 
 def _print_points(sweep: Sweep, x: int, out: Console) -> None:
@@ -102,7 +103,7 @@ def _print_held(sweep: Sweep, x: int, y: int, out: Console) -> None:
             words += f" ({len(rows) - len(known)} without an answer)"
         table.add_row(escape(word_of(value)), words)
     out.print(table)
-    out.print("between points by linear interpolation of the utilisation")
+    out.print("between points by interpolation of the utilisation, halfway where there is none")
 
 
 def _interval(held: Held) -> str:
