@@ -118,8 +118,8 @@ class Paths:
         places = _meant(places, value)
         where = ".".join(map(str, self._told(done))) or "a request"
         if not isinstance(value, (dict, list)):
-            told = f"is {value!r}" if places else "is no list or object"
-            raise InvalidInputError(f"{where} {told}, of which no entry can vary", field=path)
+            told = f"is {value!r} in the request" if places else "is a number or a word"
+            raise InvalidInputError(f"{where} {told}, without entries", field=path)
         entries = self._entries(value, places, done)
         if isinstance(value, list):
             known = {str(i): i for i in range(len(value))} | {
@@ -214,6 +214,9 @@ class Paths:
         if any(isinstance(place.kind, inspect.StructType) for place in places):
             names = field_names(place.kind for place in places)
             return [name for name in names if steps or name not in FIXED]
+        for place in places:
+            if isinstance(place.kind, inspect.TupleType):
+                return [str(i) for i in range(len(place.kind.item_types))]
         keys = list(value or ())
         return list(dict.fromkeys([*limbs, *keys])) if steps in BY_LIMB else keys
 
@@ -297,7 +300,11 @@ def _default(places: list[Place], step: str | int) -> Any:
         if isinstance(place.kind, inspect.StructType):
             for each in place.kind.fields:
                 if each.encode_name == step and each.default_factory is not msgspec.NODEFAULT:
-                    return msgspec.to_builtins(each.default_factory())
+                    return _plain(each.default_factory())
                 if each.encode_name == step and each.default is not msgspec.NODEFAULT:
-                    return msgspec.to_builtins(each.default)
+                    return _plain(each.default)
     return None
+
+
+def _plain(value: Any) -> Any:
+    return msgspec.json.decode(msgspec.json.encode(value))
