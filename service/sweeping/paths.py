@@ -93,7 +93,7 @@ class Paths:
             self._check_end(path, steps, places)
         places = found[0][1]
         units = {place.units for place in places if isinstance(place.kind, NUMBERS)}
-        unit = next(iter(units)) if len(units) == 1 else ()
+        unit = next(iter(units)) if len(units) == 1 else self._own_unit(found[0][0])
         kinds = [type(place.kind) for place in places]
         whole = inspect.IntType in kinds and inspect.FloatType not in kinds
         return Target(
@@ -156,6 +156,12 @@ class Paths:
         put(self.document, steps, numbers)
         self.presets[steps] = name
         return numbers
+
+    def _own_unit(self, steps: Steps) -> tuple[str, ...]:
+        """Return the unit that an entry of a hand names itself."""
+        entry = _at(self.document, steps[:4]) if steps[:2] == HAND else None
+        unit = entry.get("unit") if isinstance(entry, dict) else None
+        return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
 
     def follow(self, document: dict[str, Any], varied: Iterable[Steps]) -> None:
         """Let a preset's other forces follow its shear limit, as in its parameter file."""
@@ -229,6 +235,7 @@ class Paths:
         return told[1:] if len(told) > 1 and told[0] == "stance" else told
 
 
+HAND: Final[Steps] = ("stance", "hand")
 HANDS: Final[Steps] = ("stance", "hands")
 BY_LIMB: Final[tuple[Steps, ...]] = (
     ("stance", "joints"),

@@ -80,6 +80,17 @@ def test_two_components_of_a_wrench_have_their_own_units() -> None:
     assert [target.unit for target in found.targets] == ["N", "N·m"]
 
 
+def test_an_entry_of_a_hand_has_the_unit_that_it_names() -> None:
+    entry = {"value": 60.0, "unit": "N", "source": "assumed"}
+    request = wall_request()
+    request["stance"]["hand"] = {"tendon": {"maximum_tension": entry}}
+    path = "hand.tendon.maximum_tension.value"
+    found = design(f"{path}=50,70", request=request)
+    assert found.labels == (f"{path} [N]",)
+    given = asked_at(found, (70,))["stance"]["hand"]["tendon"]["maximum_tension"]
+    assert given == entry | {"value": 70}
+
+
 def test_what_is_left_out_has_its_default_beside_what_varies() -> None:
     found = design("gravity.0=1,2")
     assert asked_at(found, (2.0,))["stance"]["gravity"] == [2.0, 0.0, -9.81]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from pathlib import Path
 
 import msgspec
@@ -13,8 +14,10 @@ import pytest
 import service
 from hand_models.base import InvalidInputError
 from service.answering import plan
+from service.commands.stances import read_request
 from service.requests import PlanRequest
 from service.sweeping import Design, Held, Row, Sweep, border_in_words, held, plot_sweep
+from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.requests import wall_request
 
 SHEAR = "hands.front_left.surface.shear_limit"
@@ -197,3 +200,17 @@ def test_a_sweep_that_is_broken_off_has_a_table(tmp_path: Path) -> None:
     done.write_table(tmp_path / "sweep.csv")
     lines = list(csv.reader(io.StringIO((tmp_path / "sweep.csv").read_text("utf-8"))))
     assert lines[1][:4] == ["50.0", "optimal", "0.5", "2.0"]
+
+
+def test_the_example_of_the_documents_prints_what_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "sweeps.md", "exec"), {})
+    assert capsys.readouterr().out == "6 115\n"
+    (told,) = re.findall(r"^holds up to load\.mass = .*$", text, re.MULTILINE)
+    (border,) = service.sweep(read_request("wall-300"), ["load.mass=60:120:7"]).borders
+    assert border_in_words(border) == told
+    assert (tmp_path / "sweep.csv").exists()
