@@ -258,6 +258,7 @@ def _each_alone(sweep: Sweep, varying: Sequence[int]) -> Figure:
     lines = math.ceil(len(varying) / columns)
     figure = Figure(figsize=(0.8 + 4.0 * columns, 1.6 + 3.4 * lines), layout="constrained")
     every = figure.subplots(lines, columns, squeeze=False, sharey=True).ravel()
+    caps = {row.cap for row in sweep.rows}
     for axes, place in zip(every, varying, strict=False):
         side = side_of(sweep, place)
         for state, marker in MARKERS.items():
@@ -267,7 +268,8 @@ def _each_alone(sweep: Sweep, varying: Sequence[int]) -> Figure:
             heights = [row.utilisation for row in rows] if known else np.full(len(rows), TOP)
             drawn = {} if known else {"transform": axes.get_xaxis_transform()}
             axes.plot(places, heights, marker, color=COLOURS[state], markersize=4, **drawn)
-        axes.axhline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
+        for cap in caps if len(caps) == 1 else ():
+            axes.axhline(cap, color="tab:red", linestyle="--", linewidth=1.0)
         axes.set(xlabel=side.label, ylabel="utilisation [1]")
         axes.xaxis.label.set_size(9)
         axes.yaxis.set_tick_params(labelleft=True)

@@ -98,13 +98,14 @@ def test_there_is_no_border_against_points_without_an_answer() -> None:
 
 
 def test_a_whole_number_has_its_border_between_neighbours() -> None:
-    found = service.sweep(asked(wall_request(116.0)), ["hands.*.surface.half_planes=1:16:2"])
-    statuses = [row.status for row in found.rows]
-    if statuses == ["overloaded", "optimal"]:
-        (border,) = found.borders
-        assert border.holds - border.fails == 1.0
-    else:
-        assert found.borders == ()
+    found = service.sweep(asked(wall_request(120.0)), ["hands.*.surface.half_planes=1:16:2"])
+    (border,) = found.borders
+    assert border.holds - border.fails == 1.0
+    for count, status in ((border.holds, "optimal"), (border.fails, "overloaded")):
+        (row,) = service.sweep(
+            asked(wall_request(120.0)), [f"hands.*.surface.half_planes={count:.0f}"]
+        ).rows
+        assert row.status == status
 
 
 def row_at(value: float, status: str, used: float | None) -> Row:
