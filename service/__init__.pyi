@@ -7,6 +7,7 @@ from .requests import (
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .serving import CruxClient as CruxClient
+from .sweeping import Sweep as Sweep, Variation as Variation, sweep as sweep
 from .wire import (
     NoServiceError as NoServiceError,
     ServiceError as ServiceError,

@@ -41,6 +41,7 @@ from service.commands.studies import (
     print_study,
     sweep_options,
 )
+from service.commands.sweep import sweep
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
@@ -312,7 +313,7 @@ def schema(as_json: bool) -> None:
     click.echo(text if as_json else msgspec.json.format(text))
 
 
-for command in (batch, stream, rock, holds, wrench_space, body_space, serve, query, demo):
+for command in (batch, sweep, stream, rock, holds, wrench_space, body_space, serve, query, demo):
     crux.add_command(command)
 
 

@@ -68,8 +68,7 @@ def wrench_space(
     from planner.capability import survey
     from service import answering
     from service.answering import robots_of
-    from service.commands.surveys import print_survey, survey_json
-    from service.tables import print_robust
+    from service.tables import print_robust, print_survey, survey_json
 
     limb, hand = limb_and_hand
     robots = robots_of(robot)

@@ -6,3 +6,5 @@ from .plans import (
     print_wrench_space as print_wrench_space,
 )
 from .routes import print_route as print_route
+from .surveys import print_survey as print_survey, survey_json as survey_json
+from .sweeps import print_sweep as print_sweep

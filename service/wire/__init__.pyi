@@ -32,3 +32,10 @@ from .keys import (
     WRENCH_SPACE as WRENCH_SPACE,
     service_key as service_key,
 )
+from .places import (
+    Place as Place,
+    Step as Step,
+    entered as entered,
+    field_names as field_names,
+    places_at as places_at,
+)

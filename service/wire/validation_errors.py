@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import msgspec
 from msgspec import inspect
+
+from service.wire.places import Place, Step, field_names, places_at
 
 __all__ = ["validation_error"]
 
@@ -32,13 +33,6 @@ WORDS: Final = {
     "None": "null",
 }
 OUT_OF_RANGE: Final = re.compile(r"^Expected `(?:float|int)[^`]*` [<>]")
-SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
-UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
-"""Where a description says its units: one, or two of a wrench, forces first."""
-
-Step = str | int | None
-"""Of a path; None for a key that the caller chose."""
-
 Decoder = Callable[[Any], object]
 
 LONGEST: Final = 400
@@ -64,13 +58,13 @@ def validation_error(
     """
     complaint, path = _parts(error)
     steps = _steps(path)
-    places = list(_places_at(_known(kind), steps))
+    places = places_at(kind, steps)
     types = [place.kind for place in places]
     field = _with_keys(path, steps, document, decode)
     if of_field := OF_FIELD.fullmatch(complaint):
         unknown, name = of_field.groups()
         field = f"{field}.{name}"
-        known = ", ".join(_field_names(types))
+        known = ", ".join(field_names(types))
         message = f"unknown field; known are {known}" if unknown else "missing"
     elif complaint.startswith(("Invalid value ", "Invalid enum value ")):
         value = complaint.partition("value ")[2]
@@ -92,12 +86,6 @@ def _parts(error: msgspec.ValidationError) -> tuple[str, str]:
 
 def _steps(path: str) -> list[Step]:
     return [name or (int(index) if index else None) for name, index in STEP.findall(path)]
-
-
-@cache
-def _known(kind: type) -> inspect.Type:
-    """Return what is known of a message, which takes milliseconds to find out."""
-    return inspect.type_info(kind)
 
 
 def _clip(text: str) -> str:
@@ -156,72 +144,12 @@ def _plain(match: re.Match[str]) -> str:
     return " or ".join(WORDS.get(word, word) for word in match[1].split(" | "))
 
 
-class _Place(NamedTuple):
-    """What may stand at a place: a type without its metadata, and the units of its numbers."""
-
-    kind: inspect.Type
-    units: tuple[str, ...]
-
-
-def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[_Place]:
-    """Yield a type without its metadata, and each member of a union."""
-    if isinstance(kind, inspect.Metadata):
-        found = UNITS.findall((kind.extra_json_schema or {}).get("description", ""))
-        yield from _bare(kind.type, tuple(found[-1].split(", ")) if found else units)
-    elif isinstance(kind, inspect.UnionType):
-        for member in kind.types:
-            yield from _bare(member, units)
-    else:
-        yield _Place(kind, units)
-
-
-def _places_at(kind: inspect.Type, steps: Iterable[Step]) -> Iterable[_Place]:
-    """Return what may stand at the end of a path."""
-    places = list(_bare(kind))
-    for step in steps:
-        found: list[_Place] = []
-        for place in places:
-            parent = place.kind
-            if isinstance(parent, inspect.StructType) and isinstance(step, str):
-                fields = [f.type for f in parent.fields if f.encode_name == step]
-                if not fields and parent.tag_field == step:
-                    fields = [inspect.LiteralType((parent.tag,))]
-                found += [bare for field in fields for bare in _bare(field)]
-            elif isinstance(parent, inspect.ListType):
-                found += _bare(parent.item_type, place.units)
-            elif isinstance(parent, inspect.DictType) and step is None:
-                found += _bare(parent.value_type, place.units)
-            elif isinstance(parent, inspect.TupleType) and isinstance(step, int):
-                items = parent.item_types
-                for item in items[step : step + 1]:
-                    found += _bare(item, _units_of(place.units, step, len(items)))
-        places = found
-    return places
-
-
-def _units_of(units: tuple[str, ...], entry: int, length: int) -> tuple[str, ...]:
-    """Return the units of one entry of a whole that has one unit, or two of equal halves."""
-    which = entry * len(units) // length
-    return units[which : which + 1]
-
-
-def _in_units(places: Iterable[_Place]) -> str:
+def _in_units(places: Iterable[Place]) -> str:
     """Say what unit a number at these places has, if they agree on one."""
     numbers = (inspect.FloatType, inspect.IntType)
     units = {place.units for place in places if isinstance(place.kind, numbers)}
     (first, *others) = units or {()}
     return f", in {first[0]}" if len(first) == 1 and not others else ""
-
-
-def _field_names(types: Iterable[inspect.Type]) -> list[str]:
-    """Return the fields of the structs that may be meant, each once."""
-    names = [
-        name
-        for kind in types
-        if isinstance(kind, inspect.StructType)
-        for name in (*([kind.tag_field] if kind.tag_field else []), *(f.name for f in kind.fields))
-    ]
-    return list(dict.fromkeys(names))
 
 
 def _values(types: Iterable[inspect.Type]) -> list[str]:

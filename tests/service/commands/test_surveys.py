@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from hand_models.fixed_wrist import named_row
 from hand_models.wrench_spaces import Row
 from service.commands.cli import crux, run
-from service.commands.surveys import failures_table
+from service.tables.surveys import failures_table
 
 STANCE = "wall-300-floating"
 

@@ -14,7 +14,7 @@ from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
 from planner.capability import Survey
 from service.replies import AXES
-from service.tables import table_of, unit_of
+from service.tables.layout import table_of, unit_of
 
 __all__ = ["print_survey", "survey_json"]
 

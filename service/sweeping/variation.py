@@ -1,0 +1,155 @@
+"""What varies: a field of a request by its path, and the values that it takes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NoReturn, Self
+
+import numpy as np
+
+from hand_models.base import InvalidInputError
+
+__all__ = ["Value", "Variation", "word_of"]
+
+Value = float | bool | str | None
+"""Of a field: a number, a word, or what JSON has besides."""
+
+WORDS: Final[dict[str, Value]] = {"true": True, "false": False, "null": None}
+
+FORM: Final = "must be PATH=LOW:HIGH:COUNT or PATH=VALUE,VALUE,..."
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A field of a request, and the values that it takes.
+
+    Attributes
+    ----------
+    path : str
+        Of the field, with dots, as ``load.mass`` or ``hands.front_left.surface.shear_limit``:
+        hands by limb, entries of lists by index, ``*`` for all of either.
+    values : tuple of float, bool, str or None
+        In the order in which they are shown, each once; of a range for samples its two ends will
+        do.
+    ranged : bool
+        Whether samples may be anywhere between the first value and the last.
+    """
+
+    path: str
+    values: tuple[Value, ...]
+    ranged: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.values:
+            raise InvalidInputError("needs a value", field=self.path)
+        for i, value in enumerate(self.values):
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InvalidInputError(f"must be finite numbers, got {value}", field=self.path)
+            if value in self.values[:i]:
+                raise InvalidInputError(f"has the value {value} twice", field=self.path)
+        if self.ranged and not (self.numbers and _number(self.values[0]) < _number(self.last)):
+            raise InvalidInputError("LOW must be below HIGH", field=self.path)
+
+    @property
+    def last(self) -> Value:
+        """The last value."""
+        return self.values[-1]
+
+    @property
+    def numbers(self) -> bool:
+        """Whether all values are numbers."""
+        return all(
+            isinstance(value, (int, float)) and not isinstance(value, bool) for value in self.values
+        )
+
+    @classmethod
+    def over(cls, path: str, low: float, high: float, count: int = 2) -> Self:
+        """Return a range, of so many values at equal distances.
+
+        Raises
+        ------
+        InvalidInputError
+            If LOW is not below HIGH, or there are fewer than two values.
+        """
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise InvalidInputError(f"must be finite numbers, got {low:g}:{high:g}", field=path)
+        if not low < high:
+            raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=path)
+        if not 2 <= count <= MOST_VALUES:
+            raise InvalidInputError(
+                f"COUNT must be from 2 to {MOST_VALUES}, got {count}; one value alone is "
+                f"{path}={low:g}",
+                field=path,
+            )
+        values = [float(f"{value:.12g}") for value in np.linspace(low, high, count)]
+        return cls(path, tuple(values), ranged=True)
+
+    @classmethod
+    def parse(cls, text: str, *, sampled: bool = False) -> Self:
+        """Read ``PATH=LOW:HIGH:COUNT`` or ``PATH=VALUE,VALUE,...``.
+
+        Parameters
+        ----------
+        text : str
+            Numbers in SI units.
+        sampled : bool, optional
+            Whether the range may be without its COUNT, which samples do not need.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not of this form, or there cannot be such values.
+        """
+        path, equals, given = text.partition("=")
+        path = path.strip()
+        if not equals or not path or not given.strip():
+            raise InvalidInputError(f"{FORM}, got {text!r}")
+        ends = given.split(":")
+        if len(ends) == 1:
+            return cls(path, tuple(_value(each.strip(), path) for each in given.split(",")))
+        try:
+            low, high = float(ends[0]), float(ends[1])
+            count = int(ends[2]) if len(ends) > 2 else None
+        except ValueError:
+            _misread(text, path)
+        if len(ends) > 3 or (count is None and not sampled):
+            _misread(text, path)
+        return cls.over(path, low, high, 2 if count is None else count)
+
+
+MOST_VALUES: Final = 10_000
+"""Of one range."""
+
+
+def word_of(value: Value) -> str:
+    """Return a value as a caller writes it."""
+    if value is None:
+        return "null"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _number(value: Value) -> float:
+    assert isinstance(value, (int, float))
+    return value
+
+
+def _misread(text: str, path: str) -> NoReturn:
+    raise InvalidInputError(
+        f"{FORM} (with --samples also PATH=LOW:HIGH), got {text!r}", field=path
+    ) from None
+
+
+def _value(text: str, path: str) -> Value:
+    if not text:
+        raise InvalidInputError("has an empty value between its commas", field=path)
+    if text in WORDS:
+        return WORDS[text]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

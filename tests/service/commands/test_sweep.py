@@ -1,0 +1,175 @@
+"""`crux sweep`: what it writes and prints, its exit status, and what is left when it is ended."""
+
+from __future__ import annotations
+
+import csv
+import signal
+from pathlib import Path
+
+import pytest
+
+from service.commands.cli import run
+from service.commands.interruption import Interrupted
+from service.processes import Planners
+from service.wire import LostError, encode_error
+from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
+from tests.suite.helpers.processes import begun, ended, until, watched, workers
+
+MASS = "load.mass=60:120:4"
+
+
+def test_a_sweep_writes_a_table_and_a_picture(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "new" / "there"
+    for _ in range(2):
+        # a folder that is there is written again
+        assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(folder), "--json"]) == DONE
+        told = result(capfd)
+        assert told["points"] == told["answered"] == 4
+        assert told["statuses"]["optimal"] == 3
+        assert told["variations"][0]["unit"] == "kg"
+        (border,) = told["borders"]
+        assert 100.0 < border["holds"] < border["fails"] < 120.0
+        assert told["files"] == {
+            "table": str(folder / "sweep.csv"),
+            "picture": str(folder / "sweep.png"),
+        }
+    with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
+        assert [float(line["load.mass [kg]"]) for line in csv.DictReader(file)] == [
+            60.0,
+            80.0,
+            100.0,
+            120.0,
+        ]
+    assert (folder / "sweep.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--vary", MASS], ["load.mass [kg]", "3 optimal", "holds up to load.mass = 115"]),
+        (
+            ["--vary", MASS, "--vary", "hands.front_left.surface.shear_limit=20:80:13"],
+            ["holds for load.mass [kg]", "up to 90.0"],
+        ),
+        (["--vary", MASS, "--samples", "5", "--seed", "1"], ["5 points"]),
+        (["--vary", "hands.*.surface=rock,sandpaper-36"], ["sandpaper-36", "overloaded"]),
+        (
+            ["--vary", "hands.front_left.grasp.closing_tension=1,40"],
+            ["invalid", "no answer at some points", "must be at least"],
+        ),
+    ],
+)
+def test_what_is_printed_fits_a_terminal(
+    arguments: list[str],
+    words: list[str],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(["sweep", "wall-300", *arguments, "-o", str(tmp_path)]) == DONE
+    out, err = capfd.readouterr()
+    assert err == ""
+    for each in words:
+        assert each in out
+    sentences = ("no answer", "table:", "picture:", "holds")
+    table = [line for line in out.splitlines() if not line.startswith(sentences)]
+    assert max(map(len, table)) <= 80
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--vary", "load.mas=1:2:3"], "--vary load.mas: load has no 'mas'; known are mass, com"),
+        (["--vary", "load.mass=2:1:3"], "--vary load.mass: LOW must be below HIGH"),
+        (["--vary", "load.mass=1:2:1"], "COUNT must be from 2"),
+        (["--vary", MASS, "--seed", "1"], "--seed: is of samples"),
+        (["--vary", MASS, "--samples", "0"], "--samples"),
+        (["--vary", MASS, "--tolerance", "nan"], "--tolerance"),
+        (["--vary", MASS, "--over", "load.mass,x"], "--over: two different ones of load.mass"),
+        ([], "--vary"),
+        (["--vary", "hands.*.grasp.closing_tension=1,2"], "no point can be answered: invalid: "),
+    ],
+)
+def test_bad_input_is_a_line(
+    arguments: list[str], words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given = ["sweep", "wall-300", *arguments, "-o", str(tmp_path / "out"), "--json"]
+    assert run(given) == BAD_INPUT
+    err = capfd.readouterr().err
+    assert err.count("\n") == 1
+    assert words in err
+
+
+def test_a_file_is_no_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine", encoding="utf-8")
+    assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(file)]) == BAD_INPUT
+    assert "is a file" in complaint(capfd)
+    assert file.read_text(encoding="utf-8") == "mine"
+
+
+def test_numbers_of_a_hand_of_ones_own_count(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    weak = tmp_path / "weak.toml"
+    weak.write_text(
+        '[tendon]\nmaximum_tension = { value = 60.0, unit = "N", source = "assumed" }\n',
+        encoding="utf-8",
+    )
+    used = []
+    for more in ([], ["--hand", str(weak)]):
+        given = ["sweep", "wall-300", "--vary", "load.mass=100,110", "-o", str(tmp_path / "out")]
+        assert run([*given, "--json", *more]) == DONE
+        used.append(result(capfd)["most_utilisation"]["utilisation"])
+    assert used[1] > used[0]
+
+
+def test_a_point_that_is_lost_is_a_failure(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = Planners.answers
+
+    def losing(self, payloads, form):
+        for i, answer in true(self, payloads, form):
+            yield i, encode_error(LostError("its process died"), form) if i == 1 else answer
+
+    monkeypatch.setattr(Planners, "answers", losing)
+    values = "load.mass=60,80,100"
+    assert run(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"]) == FAILED
+    told = result(capfd)
+    assert told["errors"] == {"lost": 1}
+    assert (told["points"], told["answered"]) == (3, 2)
+
+
+def test_what_is_answered_is_kept(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = Planners.answers
+
+    def interrupted(self, payloads, form):
+        answers = true(self, payloads, form)
+        yield next(answers)
+        raise Interrupted
+
+    monkeypatch.setattr(Planners, "answers", interrupted)
+    with pytest.raises(Interrupted) as caught:
+        run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
+    table = tmp_path / "sweep.csv"
+    assert str(caught.value) == f"1 of 4 points are answered in {table}"
+    assert table.read_bytes().count(b"\n") == 2
+    assert not (tmp_path / "sweep.png").exists()
+
+
+@watched
+def test_a_sweep_ends_with_its_processes(tmp_path: Path) -> None:
+    varied = ["--vary", "load.mass=60:120:100", "--vary", "body.position.0=-1:0:100"]
+    process = begun("sweep", "wall-300", *varied, "-o", str(tmp_path), "--workers", "2")
+    until(lambda: workers(process), process)
+    process.send_signal(signal.SIGINT)
+    status, error = ended(process)
+    assert status == FAILED
+    assert error.startswith("crux: interrupted")
+    assert error.count("\n") == 1
