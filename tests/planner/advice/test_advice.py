@@ -274,5 +274,5 @@ def test_random_overloaded_stances_are_helped_by_what_was_promised():
             there = planned(changed(asked, each.changes))
             assert there.utilisation == pytest.approx(each.utilisation, abs=1e-6)
             assert math.isfinite(there.utilisation)
-    # 125 of the first 200 are; the first 30 stand for them here
-    assert helped >= 15
+    # 167 of the first 200 are; the first 30 stand for them here
+    assert helped >= 22
