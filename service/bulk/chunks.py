@@ -25,7 +25,15 @@ from service.wire import PLAN, Answer, Format
 if TYPE_CHECKING:
     from planner.robots import RobotFile
 
-__all__ = ["Setting", "answer_chunk", "decode_answers", "encode_chunk", "own_version"]
+__all__ = [
+    "Setting",
+    "answer_chunk",
+    "decode_answers",
+    "decode_chunk",
+    "encode_answers",
+    "encode_chunk",
+    "own_version",
+]
 
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
@@ -76,6 +84,16 @@ def encode_chunk(payloads: list[bytes]) -> bytes:
     return msgspec.msgpack.encode(payloads)
 
 
+def decode_chunk(chunk: bytes) -> list[bytes]:
+    """Return the encoded questions of a chunk."""
+    return msgspec.msgpack.decode(chunk, type=list[bytes])
+
+
+def encode_answers(answers: list[Answer]) -> bytes:
+    """Return the answers to a chunk, in the order of its questions."""
+    return msgspec.msgpack.encode(answers)
+
+
 def decode_answers(answers: bytes) -> list[Answer]:
     """Return the answers of a chunk, in the order of its questions."""
     return [Answer(*each) for each in msgspec.msgpack.decode(answers)]
@@ -102,8 +120,7 @@ def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
         If the version that asks is not the one that is to answer.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
-    payloads = msgspec.msgpack.decode(chunk, type=list[bytes])
-    return msgspec.msgpack.encode([answer(payload) for payload in payloads])
+    return encode_answers([answer(payload) for payload in decode_chunk(chunk)])
 
 
 _answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTINGS)

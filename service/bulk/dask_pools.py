@@ -113,7 +113,9 @@ class DaskPool:
         if not self._own:
             return nullcontext(self._on)
         # what it loses is told in the answers, or in one line
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        for name in logging.root.manager.loggerDict:
+            if name.split(".")[0] == "distributed":
+                logging.getLogger(name).setLevel(logging.CRITICAL)
         where: Any = self._on
         if where == LOCAL:
             where = self._stack.enter_context(
