@@ -10,11 +10,12 @@ import logging
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Final, Generic, Self, TypeVar, cast
 
+from hand_models.base import CruxError
 from planner.processes.stations import Lane, Make, Station
 
 __all__ = ["Lost", "Workers", "cores"]
@@ -36,6 +37,12 @@ waits long for the last one."""
 
 PATIENCE: Final = 1.0
 """Longest time between the end of a process's pipe and its own [s]."""
+
+NEXT: Final = 1
+"""Items of those that were put which a process has in hand beside one."""
+
+KNOWN: Final = 256
+"""Things that items are about of which it is kept which process had them last."""
 
 STARTS: Final = 2
 """Processes in a row that may die before they are ready; after that no more are started."""
@@ -80,9 +87,9 @@ class Workers(Generic[T, R]):
 
     Attributes
     ----------
-    hands : dict of Lane to set of int
-        Indices of the items that each process has in hand; of those processes that have been
-        started and are not known to have died.
+    hands : dict of Lane to dict
+        Items that each process has in hand by their numbers, the one in work first; of those
+        processes that have been started and are not known to have died.
     stillborn : int
         Processes in a row that have died before they were ready.
     """
@@ -90,8 +97,10 @@ class Workers(Generic[T, R]):
     def __init__(self, make: Make[T, R], count: int) -> None:
         self._make = partial(_numbered, make)
         self._count = count
-        self.hands: dict[Numbered[T, R], set[int]] = {}
+        self.hands: dict[Numbered[T, R], dict[int, T]] = {}
         self.stillborn = 0
+        self._line: deque[tuple[int, T, Hashable]] = deque()
+        self._knows: dict[Hashable, Numbered[T, R]] = {}
         self._unborn = ""
         """Why."""
 
@@ -138,10 +147,12 @@ class Workers(Generic[T, R]):
                     if not lane.ready:
                         continue
                     if again and not todo and not hand:
-                        self._give(lane, again.popleft(), items)
+                        i = again.popleft()
+                        self._give(lane, i, items[i])
                     share = math.ceil(len(todo) / (SHARE * self._count))
                     while todo and len(hand) <= min(AHEAD, share):
-                        self._give(lane, todo.popleft(), items)
+                        i = todo.popleft()
+                        self._give(lane, i, items[i])
                 if here is not None and todo:
                     i = todo.popleft()
                     yield i, here(items[i])
@@ -166,20 +177,83 @@ class Workers(Generic[T, R]):
                                 again.append(i)
                         continue
                     if done is not None:
-                        self.hands[lane].remove(done[0])
+                        del self.hands[lane][done[0]]
                         yield done
         finally:
             # what nobody waits for any more
             for lane in [lane for lane, hand in self.hands.items() if hand]:
                 self._dismiss(lane)
 
+    def put(self, number: int, item: T, about: Hashable = None) -> None:
+        """Let an item be worked on; `collect` returns its result.
+
+        Parameters
+        ----------
+        number : int
+            Its own.
+        item : object
+        about : hashable, optional
+            What it is about: a process that has had something about it before is the first to get
+            it, if it has room.
+        """
+        self._line.append((number, item, about))
+
+    def collect(self) -> list[tuple[int, R | Lost]]:
+        """Wait until something that was put has its result, and return all that have.
+
+        A process that dies is replaced: what it was at work on is lost, once, and what else it had
+        in hand goes to another.
+
+        Raises
+        ------
+        CruxError
+            If processes do not start.
+        """
+        found: list[tuple[int, R | Lost]] = []
+        while not found and (self._line or any(self.hands.values())):
+            self._hire()
+            if not self.hands:
+                raise CruxError(self._unborn)
+            for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
+                while self._line and lane.ready and len(self.hands[lane]) <= NEXT:
+                    number, item, about = self._chosen(lane)
+                    self._knows.pop(about, None)
+                    self._knows[about] = lane
+                    if len(self._knows) > KNOWN:
+                        del self._knows[next(iter(self._knows))]
+                    self._give(lane, number, item)
+            lanes = {lane.pipe: lane for lane in self.hands}
+            for pipe in wait(list(lanes)):
+                lane = lanes[cast(Connection, pipe)]
+                try:
+                    done = lane.take()
+                    self.stillborn = 0
+                except EOFError:
+                    hand = list(self.hands[lane].items())
+                    lost = Lost(f"its process died; {self._bury(lane)}")
+                    found += [(number, lost) for number, _ in hand[:1]]
+                    self._line.extendleft((number, item, None) for number, item in hand[:0:-1])
+                    continue
+                if done is not None:
+                    del self.hands[lane][done[0]]
+                    found.append(done)
+        return found
+
+    def _chosen(self, lane: Numbered[T, R]) -> tuple[int, T, Hashable]:
+        """Take what a process gets next: what it knows, or else nobody, or else what is first."""
+        knows = [self._knows.get(about) for _, _, about in self._line]
+        i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
+        chosen = self._line[i]
+        del self._line[i]
+        return chosen
+
     def _hire(self) -> None:
         while len(self.hands) < self._count and self.stillborn < STARTS:
-            self.hands[Station(self._make, ahead=True).lanes[0]] = set()
+            self.hands[Station(self._make, ahead=True).lanes[0]] = {}
 
-    def _give(self, lane: Numbered[T, R], i: int, items: Sequence[T]) -> None:
-        self.hands[lane].add(i)
-        lane.give((i, items[i]))
+    def _give(self, lane: Numbered[T, R], i: int, item: T) -> None:
+        self.hands[lane][i] = item
+        lane.give((i, item))
 
     def _bury(self, lane: Numbered[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
@@ -196,6 +270,7 @@ class Workers(Generic[T, R]):
 
     def _dismiss(self, lane: Numbered[T, R], patience: float = 0.0) -> int | None:
         del self.hands[lane]
+        self._knows = {about: one for about, one in self._knows.items() if one is not lane}
         return lane.station.kill(patience)
 
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cache, cached_property, lru_cache
-from importlib import resources
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -267,7 +266,7 @@ def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
     InvalidInputError
         If a number of the hand is missing or impossible.
     """
-    return robot_of(_bundled(), hand_numbers)
+    return robot_of(RobotFile.bundled(), hand_numbers)
 
 
 @lru_cache(maxsize=32)
@@ -291,9 +290,3 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
         return Robot(RobotDescription.read(file.toml), file.urdf, hand)
     except InvalidInputError as error:
         raise InvalidInputError(str(error), field=file.origin) from None
-
-
-@cache
-def _bundled() -> RobotFile:
-    with resources.as_file(resources.files("planner.parameters")) as folder:
-        return RobotFile.load(folder / "robosimian.toml")

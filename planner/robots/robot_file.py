@@ -14,6 +14,8 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from textwrap import shorten
 from typing import Any, Final
@@ -99,6 +101,18 @@ class RobotFile:
         except InvalidInputError as error:
             raise InvalidInputError(str(error), field=str(path)) from None
         return cls(described.name, toml, urdf, str(path))
+
+    @classmethod
+    @cache
+    def bundled(cls) -> RobotFile:
+        """Return RoboSimian's file, read once."""
+        with resources.as_file(resources.files("planner.parameters")) as folder:
+            return cls.load(folder / "robosimian.toml")
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Names of its limbs."""
+        return tuple(RobotDescription.read(self.toml).mounts)
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,6 +146,7 @@ def handle(
     started: float | None = None,
     streams: Streams = STREAMS,
     files: MeshFiles | None = None,
+    revised: Callable[[Any], Any] | None = None,
 ) -> Answer:
     """Answer a query.
 
@@ -167,6 +168,8 @@ def handle(
         Those that may be asked; by default those of this process that belong to no service.
     files : MeshFiles, optional
         Those that a plan request may name; none by default.
+    revised : callable, optional
+        Returns what is answered in place of a request that has been understood.
 
     Returns
     -------
@@ -181,6 +184,8 @@ def handle(
         request: Any = decode_request(payload, kind, form)
         if files is not None:
             request = files.whole(request)
+        if revised is not None:
+            request = revised(request)
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
         with deadline.within(request.deadline, started=started):

@@ -3,39 +3,49 @@
 from __future__ import annotations
 
 import os
-import statistics
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections import deque
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from itertools import islice
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
 import click
-import msgspec
 
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.result import Time
+from service.bulk import (
+    LOCAL,
+    Column,
+    Lines,
+    ReplyLines,
+    Sink,
+    Table,
+    Tally,
+    chosen_columns,
+    evaluate,
+    new_manifest,
+    rows_at,
+    table_at,
+)
 from service.commands.interruption import Interrupted
-from service.commands.options import explain_option, hand_option, json_option, robot_option
+from service.commands.options import hand_option, json_option, robot_option
 from service.commands.terminal import (
     BAD_INPUT,
     DONE,
     EXIT_STATUS,
     FAILED,
     OVERLOADED,
+    bulk_progress,
     note,
-    progress,
     say,
     writing,
 )
-from service.processes import Planners, worth
-from service.replies import ErrorDetail
-from service.requests import PlanRequest
+from service.processes import worth
 from service.tables import console, table_of
-from service.wire import REQUEST_KINDS, Answer, Format, decode_request, identifier
+from service.wire import REQUEST_KINDS
 
 if TYPE_CHECKING:
     from planner.robots import RobotFile
@@ -46,71 +56,19 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
 
 
-REPLY: Final = b'{"v":1,'
-"""How each line of a batch begins."""
-
-
-class _Told(msgspec.Struct):
-    """What the summary needs to know of an answer."""
-
-    id: str | None = None
-    status: str | None = None
-    time: Time | None = None
-    error: ErrorDetail | None = None
-
-    @property
-    def exit_status(self) -> int:
-        """As that of the request alone would be."""
-        if self.error is not None:
-            return BAD_INPUT if self.error.kind in REQUEST_KINDS else FAILED
-        return EXIT_STATUS.get(str(self.status), FAILED)
-
-
-@contextmanager
-def _writing_replies(
-    file: Path | None, as_json: bool, resume: bool
-) -> Iterator[Callable[[bytes], None]]:
-    """Yield what writes a reply, one a line: to a file, standard output, or nowhere.
-
-    A file has whole lines at any time but while one of them is being written.
-    """
-
-    def say_line(payload: bytes) -> None:
-        if as_json:
-            sys.stdout.buffer.write(payload + b"\n")
-            sys.stdout.buffer.flush()
-
-    if file is None:
-        yield say_line
-        return
-    with writing(file, "-o"):
-        out = file.open("ab" if resume else "wb", buffering=0)
-
-    def write(payload: bytes) -> None:
-        line, written = payload + b"\n", 0
-        try:
-            with writing(file, "-o"):
-                while written < len(line):
-                    written += out.write(line[written:])
-        except BaseException:
-            # a line that is cut off would be read by nobody
-            with suppress(OSError):
-                out.truncate(file.stat().st_size - written)
-            raise
-
-    with out:
-        yield write
-
-
 @click.command()
 @click.argument("requests")
 @click.option(
     "-o",
     "--output",
     "file",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Where the replies go, one a line.",
+    help="Where the answers go: FILE.csv and FILE.parquet (a folder) are tables, any other file "
+    "has the replies, one a line.",
+)
+@click.option(
+    "--columns", metavar="NAMES", help="Of a table: names with commas between, * in them."
 )
 @click.option(
     "--resume",
@@ -120,21 +78,34 @@ def _writing_replies(
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
-@explain_option
+@click.option(
+    "--dask",
+    metavar="ADDRESS",
+    help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
+    "machine's own.",
+)
+@click.option(
+    "--explain/--no-explain",
+    default=None,
+    help="Whether it is proven and named what is in the way where a stance is overloaded or "
+    "infeasible. By default replies do as their requests say, and tables leave it out.",
+)
 @hand_option
 @robot_option
 @json_option
 def batch(
     requests: str,
     file: Path | None,
+    columns: str | None,
     resume: bool,
     workers: int | None,
-    unexplained: bool,
+    dask: str | None,
+    explain: bool | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
 ) -> int:
-    """Answer many plan requests: one a line in, one reply or error a line out, in order.
+    """Answer many plan requests: one a line in, one reply, row or error out, in order.
 
     REQUESTS is the path of a file of JSON lines, or - for standard input; blank lines are skipped.
     Lines are as the service takes them: extras are those that a request wants itself, and the
@@ -147,65 +118,86 @@ def batch(
     """
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
+    kind = None if file is None else table_at(file)
+    if columns is not None and kind is None:
+        raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
     if file is not None:
-        _check_output(file, requests, resume)
-    numbers, lines = _lines(requests)
-    folder = Path() if requests == "-" else Path(requests).parent
-    if unexplained:
-        lines = [_unexplained(line) for line in lines]
-    told = _answered(file, lines) if resume and file is not None else []
-    before, begun = len(told), perf_counter()
-    try:
-        with (
-            _writing_replies(file, as_json, resume) as write,
-            Planners(
-                worth(len(lines) - before, workers), robot=robot, hand=hand, folder=folder
-            ) as many,
-            progress(f"planning {requests}") as tell,
-        ):
-            tell(before, len(lines))
-            for answer in _in_order(many.answers(lines[before:])):
-                write(answer.payload)
-                told.append(msgspec.json.decode(answer.payload, type=_Told))
-                tell(len(told), len(lines))
-    except Interrupted:
-        raise Interrupted(_kept(told, lines, file)) from None
-    except InvalidInputError:
-        raise
-    except CruxError as error:
-        raise CruxError(f"{error.message}; {_kept(told, lines, file)}") from None
-    elapsed = perf_counter() - begun
-    _complain(numbers, told)
+        _check_output(file, requests, resume, kind)
+    begun = perf_counter()
+    with closing(Lines(requests)) as lines:
+        if kind is None:
+            with _writing(file):
+                sink: Sink = ReplyLines(file, as_json, resume, lines)
+        else:
+            assert file is not None
+            explain = bool(explain)
+            chosen = _columns(columns, robot, explain)
+            now = new_manifest([each.name for each in chosen], explain, hand, robot)
+            with _writing(file):
+                sink = rows_at(kind, file, chosen, now, resume, lines)
+        before = sink.tally.count
+        left = lines.count - before
+        if dask is not None:
+            on, count = LOCAL if dask == "local" else dask, workers
+        else:
+            count = worth(left, workers)
+            on = "here" if count == 1 else "processes"
+        asked: deque[bytes] = deque()
+
+        def ask() -> Iterator[bytes]:
+            for line in islice(lines, before, None):
+                asked.append(line)
+                yield line
+
+        answers = evaluate(
+            ask(),
+            on,
+            workers=None if on == "here" else count,
+            hand=hand,
+            robot=robot,
+            folder=Path() if requests == "-" else Path(requests).parent,
+            explain=explain,
+            columns=sink.columns,
+        )
+        try:
+            with ExitStack() as stack:
+                tell = stack.enter_context(bulk_progress(f"planning {requests}"))
+                stack.enter_context(_writing(file))
+                stack.enter_context(sink.open())
+                stack.enter_context(closing(answers))
+                tell(before, lines.count, "")
+                for answer in answers if left else ():
+                    sink.write(asked.popleft(), answer.payload, answer.seconds)
+                    done = sink.tally.count
+                    rate = (done - before) / (perf_counter() - begun)
+                    words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
+                    tell(done, lines.count, words)
+        except Interrupted:
+            raise Interrupted(_kept(sink.whole, lines.count, file)) from None
+        except InvalidInputError:
+            raise
+        except CruxError as error:
+            raise CruxError(f"{error.message}; {_kept(sink.whole, lines.count, file)}") from None
+        elapsed = perf_counter() - begun
+        _complain(lines, sink.tally)
     if not as_json:
-        _print(told, before, elapsed, file)
+        _print(sink.tally, before, elapsed, file)
     elif file is not None:
-        say(_summary(told, elapsed) | {"file": str(file)})
-    return min((one.exit_status for one in told), key=WORST_FIRST.index, default=DONE)
+        say(_summary(sink.tally, elapsed) | {"file": str(file)})
+    return _exit_status(sink.tally)
 
 
-def _lines(source: str) -> tuple[list[int], list[bytes]]:
-    """Return the lines of a file, or of standard input, that are not blank, and their numbers."""
+def _writing(file: Path | None) -> AbstractContextManager[None]:
+    return nullcontext() if file is None else writing(file, "-o")
+
+
+def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | None) -> None:
+    """Refuse a file for answers that is the requests' own, or that nothing can be resumed in."""
     try:
-        data = sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes()
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {source}", field="REQUESTS") from None
-    kept = [(i, line) for i, line in enumerate(data.split(b"\n"), start=1) if line.strip()]
-    return [i for i, _ in kept], [line for _, line in kept]
-
-
-def _unexplained(line: bytes) -> bytes:
-    """Return a request that is not to be explained; one that is none stays as it is."""
-    try:
-        request = decode_request(line, PlanRequest, Format.JSON)
-    except CruxError:
-        return line
-    return Format.JSON.encode(msgspec.structs.replace(request, explain=False))
-
-
-def _check_output(file: Path, requests: str, resume: bool) -> None:
-    """Refuse a file for replies that is the requests' own, or that nothing can be resumed in."""
-    try:
-        if resume and file.exists() and not file.is_file():
+        if kind is None and file.is_dir():
+            field = "--resume" if resume else "-o"
+            raise InvalidInputError(f"{file}: no file that a batch has written", field=field)
+        if resume and kind is None and file.exists() and not file.is_file():
             raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):
@@ -215,108 +207,61 @@ def _check_output(file: Path, requests: str, resume: bool) -> None:
         return
 
 
-def _answered(file: Path, lines: Sequence[bytes]) -> list[_Told]:
-    """Return what the whole lines of a file tell, and drop a last one that is cut off."""
-    with writing(file, "-o"):
-        data = file.read_bytes() if file.exists() else b""
-    whole = data.rfind(b"\n") + 1
-    replies = data[:whole].split(b"\n")[:-1]
-    if len(replies) > len(lines):
-        raise InvalidInputError(
-            f"{file} has {len(replies)} replies, and there are {len(lines)} requests; "
-            "is it of another batch?",
-            field="--resume",
-        )
-    told = []
-    for number, (reply, line) in enumerate(zip(replies, lines, strict=False), start=1):
-        try:
-            one = msgspec.json.decode(reply, type=_Told)
-        except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(f"{file}, line {number}: no reply", field="--resume") from None
-        asked = identifier(line, Format.JSON)
-        if one.id != asked:
-            raise InvalidInputError(
-                f"{file}, line {number}: answers {one.id!r}, and the request is {asked!r}; "
-                "is it of another batch?",
-                field="--resume",
-            )
-        if one.status is None and one.error is None:
-            raise InvalidInputError(f"{file}, line {number}: no reply", field="--resume")
-        told.append(one)
-    if whole < len(data):
-        if not data[whole:].startswith(REPLY[: len(data) - whole]):
-            raise InvalidInputError(f"{file}: its end is of no reply", field="--resume")
-        with writing(file, "-o"), file.open("r+b") as stream:
-            stream.truncate(whole)
-    return told
+def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tuple[Column, ...]:
+    """Return the columns of a table about a robot."""
+    from planner.robots import RobotFile
+
+    limbs = (RobotFile.bundled() if robot is None else robot).limbs
+    try:
+        return chosen_columns(wanted, limbs, explained)
+    except InvalidInputError as error:
+        raise InvalidInputError(error.message, field="--columns") from None
 
 
-def _kept(told: Sequence[_Told], lines: Sequence[bytes], file: Path | None) -> str:
+def _kept(done: int, count: int, file: Path | None) -> str:
     """Say how much of a batch that is broken off is done."""
-    done = f"{len(told)} of {len(lines)} requests are answered"
-    return done if file is None else f"{done} in {file}; --resume goes on"
+    told = f"{done} of {count} requests are answered"
+    return told if file is None else f"{told} in {file}; --resume goes on"
 
 
-def _in_order(answers: Iterator[tuple[int, Answer]]) -> Iterator[Answer]:
-    """Yield answers in the order of their requests, each as soon as those before it are there."""
-    early: dict[int, Answer] = {}
-    following = 0
-    for i, answer in answers:
-        early[i] = answer
-        while following in early:
-            yield early.pop(following)
-            following += 1
-
-
-def _complain(numbers: Sequence[int], told: Sequence[_Told]) -> None:
+def _complain(lines: Lines, tally: Tally) -> None:
     """Name the first line that is bad input, and how many more are."""
-    bad = [
-        (number, one.error)
-        for number, one in zip(numbers, told, strict=True)
-        if one.error is not None and one.exit_status == BAD_INPUT
-    ]
-    if bad:
-        number, error = bad[0]
+    if tally.first_bad is not None:
+        index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
-        more = f"; {len(bad) - 1} more lines are bad input" if len(bad) > 1 else ""
-        note(f"line {number}: {field}{error.message}{more}")
+        more = f"; {tally.bad - 1} more lines are bad input" if tally.bad > 1 else ""
+        note(f"line {lines.number(index)}: {field}{error.message}{more}")
 
 
-def _counts(told: Sequence[_Told]) -> tuple[Counter[str], Counter[str]]:
-    """Return how many answers are of each status, and how many errors of each kind."""
-    statuses = Counter(one.status for one in told if one.status is not None)
-    kinds = Counter(one.error.kind for one in told if one.error is not None)
-    return statuses, kinds
+def _exit_status(tally: Tally) -> int:
+    """Return the worst of what the requests alone would have."""
+    found = [EXIT_STATUS.get(status, FAILED) for status in tally.statuses]
+    found += [BAD_INPUT if kind in REQUEST_KINDS else FAILED for kind in tally.kinds]
+    return min(found, key=WORST_FIRST.index, default=DONE)
 
 
-def _summary(told: Sequence[_Told], elapsed: float) -> dict[str, object]:
-    statuses, kinds = _counts(told)
-    times = [one.time.total for one in told if one.time is not None]
+def _summary(tally: Tally, elapsed: float) -> dict[str, object]:
+    middle, longest = tally.middle_and_longest()
     return {
         "v": 1,
-        "requests": len(told),
-        **{status: statuses[status] for status in (*EXIT_STATUS, "failed")},
-        "errors": dict(kinds),
-        "time": {
-            "median": statistics.median(times) if times else None,
-            "longest": max(times, default=None),
-            "elapsed": elapsed,
-        },
+        "requests": tally.count,
+        **{status: tally.statuses[status] for status in (*EXIT_STATUS, "failed")},
+        "errors": dict(tally.kinds),
+        "time": {"median": middle, "longest": longest, "elapsed": elapsed},
     }
 
 
-def _print(told: Sequence[_Told], before: int, elapsed: float, file: Path | None) -> None:
+def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None:
     out = console()
-    statuses, kinds = _counts(told)
     table = table_of("answer", numbers=("requests", "median ms", "longest ms"))
     for status in (*EXIT_STATUS, "failed"):
-        times = [1e3 * one.time.total for one in told if one.status == status and one.time]
-        shown = [f"{statistics.median(times):.1f}", f"{max(times):.1f}"] if times else ["-", "-"]
-        table.add_row(status, str(statuses[status]), *shown)
-    for kind, count in sorted(kinds.items()):
+        times = tally.middle_and_longest(status)
+        shown = ["-" if time is None else f"{1e3 * time:.1f}" for time in times]
+        table.add_row(status, str(tally.statuses[status]), *shown)
+    for kind, count in sorted(tally.kinds.items()):
         table.add_row(f"error: {kind}", str(count), "-", "-")
     out.print(table)
-    done = len(told) - before
+    done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""
     out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}", markup=False)

@@ -25,6 +25,7 @@ __all__ = [
     "EXIT_STATUS",
     "FAILED",
     "OVERLOADED",
+    "bulk_progress",
     "draw_plan",
     "filling_folder",
     "note",
@@ -123,6 +124,31 @@ def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, 
             bar.update(task, completed=done, total=total)
 
         yield tell
+
+
+@contextmanager
+def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Show a bar with counts and the time left; yields what tells done, total and a few words."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    screen = console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[words]}", markup=False),
+    )
+    bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
+    with bar if screen.is_terminal else nullcontext():
+        task = bar.add_task(title, total=None, words="")
+        yield lambda done, total, words: bar.update(task, completed=done, total=total, words=words)
 
 
 @contextmanager

@@ -36,6 +36,7 @@ from tests.load.asking import (
     random_plans,
     spoilt,
 )
+from tests.load.bulk import bulk
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.served import Served, free_endpoint
 
@@ -396,6 +397,9 @@ def memory(first: int, last: int, seed: int) -> None:
     console.print(f"{sizes[last] / sizes[first]:.2f} times as much")
     for name, info in stores().items():
         console.print(f"{name}: {info.kept} of {info.most} kept, {info.hits:,} hits")
+
+
+main.add_command(bulk)
 
 
 if __name__ == "__main__":

@@ -69,3 +69,25 @@ def threads() -> Callable[[str], str | None]:
 def reversers() -> Callable[[bytes], bytes]:
     """Turns bytes around."""
     return lambda item: item[::-1]
+
+
+def letters(log: str) -> Callable[[bytes], bytes]:
+    """Answers chunks of bulk work with their own letters.
+
+    ``!`` kills its process whenever it comes, ``?`` the first time that it does; ``~`` takes a
+    while. All are logged.
+    """
+    from service.bulk.chunks import decode_chunk, encode_answers
+    from service.wire import Answer
+
+    def answer(payload: bytes) -> Answer:
+        before = Path(log).read_bytes() if Path(log).exists() else b""
+        with Path(log).open("ab") as stream:
+            stream.write(payload + b" %d\n" % os.getpid())
+        if payload.endswith(b"!") or (payload.endswith(b"?") and payload + b" " not in before):
+            os.kill(os.getpid(), signal.SIGKILL)
+        if payload.endswith(b"~"):
+            time.sleep(0.2)
+        return Answer(payload.upper(), "", seconds=1e-4)
+
+    return lambda chunk: encode_answers([answer(each) for each in decode_chunk(chunk)])

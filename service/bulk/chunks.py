@@ -1,0 +1,170 @@
+"""Chunks of questions, and the one function that answers them: bytes in, bytes out.
+
+The same wherever it runs, so that answers are equal to the last digit; their times aside, and what
+a deadline has left out.
+"""
+
+from __future__ import annotations
+
+import pickle
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import msgspec
+
+from hand_models.base import BoundedStore, CruxError
+from hand_models.parameters import ParameterTable
+from service.bulk.columns import row_of
+from service.requests import PlanRequest
+from service.wire import PLAN, Answer, Format
+
+if TYPE_CHECKING:
+    from planner.robots import RobotFile
+
+__all__ = [
+    "Setting",
+    "answer_chunk",
+    "decode_answers",
+    "decode_chunk",
+    "encode_answers",
+    "encode_chunk",
+    "own_version",
+]
+
+SETTINGS: Final = 4
+"""Settings whose models and files a process keeps."""
+
+Answerer = Callable[[bytes], Answer]
+
+
+class Setting(NamedTuple):
+    """What all questions of some bulk work have alike.
+
+    Attributes
+    ----------
+    robot : RobotFile or None
+        The only robot that is planned for; those that are bundled by default.
+    hand : ParameterTable or None
+        Entries in which hands are not the bundled one; a request's own go on top.
+    folder : Path or None
+        That names of mesh files in requests are relative to; with None they name none.
+    form : Format
+        Of questions and answers.
+    explain : bool or None
+        Whether what keeps a stance from a plan is explained; None: as each request says.
+    columns : tuple of str or None
+        Of the rows that answers are told as; with None they are whole replies.
+    version : str or None
+        Of the distribution that asks.
+    """
+
+    robot: RobotFile | None = None
+    hand: ParameterTable | None = None
+    folder: Path | None = None
+    form: Format = Format.JSON
+    explain: bool | None = None
+    columns: tuple[str, ...] | None = None
+    version: str | None = None
+
+
+def own_version() -> str | None:
+    """Return the version of the distribution; None where it is not installed."""
+    try:
+        return version("crux")
+    except PackageNotFoundError:
+        return None
+
+
+def encode_chunk(payloads: list[bytes]) -> bytes:
+    """Return encoded questions as a chunk."""
+    return msgspec.msgpack.encode(payloads)
+
+
+def decode_chunk(chunk: bytes) -> list[bytes]:
+    """Return the encoded questions of a chunk."""
+    return msgspec.msgpack.decode(chunk, type=list[bytes])
+
+
+def encode_answers(answers: list[Answer]) -> bytes:
+    """Return the answers to a chunk, in the order of its questions."""
+    return msgspec.msgpack.encode(answers)
+
+
+def decode_answers(answers: bytes) -> list[Answer]:
+    """Return the answers of a chunk, in the order of its questions."""
+    return [Answer(*each) for each in msgspec.msgpack.decode(answers)]
+
+
+def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
+    """Answer a chunk of questions, in whatever process.
+
+    Parameters
+    ----------
+    setting : bytes
+        A pickled `Setting`: models and files are built once for each that is new to the process.
+    chunk : bytes
+        Of `encode_chunk`.
+
+    Returns
+    -------
+    bytes
+        For `decode_answers`.
+
+    Raises
+    ------
+    CruxError
+        If the version that asks is not the one that is to answer.
+    """
+    answer = _answerers.get(setting, partial(_answerer, setting))
+    return encode_answers([answer(payload) for payload in decode_chunk(chunk)])
+
+
+_answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTINGS)
+
+
+def _answerer(pickled: bytes) -> Answerer:
+    """Return what answers a question; here the planner is imported, in each process."""
+    from service.answering import MeshFiles, handle, robots_of
+
+    setting: Setting = pickle.loads(pickled)
+    if setting.version != own_version():
+        raise CruxError(
+            f"crux {own_version()} is installed where it is to be answered, and crux "
+            f"{setting.version} where it is asked; install the same version on both"
+        )
+    robots = robots_of(setting.robot)
+    files = None if setting.folder is None else MeshFiles(setting.folder)
+    revised = partial(_revised, setting)
+
+    def answer(payload: bytes) -> Answer:
+        start = time.perf_counter()
+        found = handle(
+            PLAN,
+            payload,
+            setting.form.value,
+            setting.hand,
+            robots,
+            started=start,
+            files=files,
+            revised=revised,
+        )
+        if setting.columns is not None:
+            found = row_of(found, setting.form, setting.columns)
+        return found._replace(seconds=time.perf_counter() - start)
+
+    return answer
+
+
+def _revised(setting: Setting, request: PlanRequest) -> PlanRequest:
+    """Return a request that asks for no more than is told."""
+    explain = request.explain if setting.explain is None else setting.explain
+    if setting.columns is None:
+        return msgspec.structs.replace(request, explain=explain)
+    want = [each for each in request.want if each == "load_factor"]
+    return msgspec.structs.replace(
+        request, explain=explain, want=want, draws=[], detail="full" if explain else "hands"
+    )

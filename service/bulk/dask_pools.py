@@ -1,0 +1,188 @@
+"""Chunks answered by the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Hashable
+from contextlib import ExitStack, nullcontext
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Final, Self
+from urllib.parse import urlsplit
+
+from hand_models.base import CruxError, InvalidInputError
+from planner.processes import Lost, cores
+from service.bulk.chunks import answer_chunk
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+__all__ = ["LOCAL", "DaskPool", "check_address"]
+
+LOCAL: Final = "dask:local"
+"""A cluster of this machine's own, for as long as the work lasts."""
+
+PATIENCE: Final = 15.0
+"""How long to wait for a scheduler, or for its first worker [s]."""
+
+LOOK: Final = 1.0
+"""How often it is looked whether the scheduler is still there, while nothing comes [s]."""
+
+ALLOWED: Final = 3
+"""Deaths of workers after which Dask tries a chunk no more, as it is by default
+(``distributed.scheduler.allowed-failures``)."""
+
+
+def check_address(address: object) -> None:
+    """Refuse what is no address of a Dask scheduler.
+
+    Raises
+    ------
+    InvalidInputError
+    """
+    text = str(address)
+    try:
+        good = urlsplit(text).scheme in ("tcp", "tls", "ucx", "ws", "wss", "inproc")
+    except ValueError:
+        good = False
+    if not good:
+        raise InvalidInputError(
+            f"{text!r} is no place to work at; valid are processes, here, {LOCAL}, "
+            "tcp://HOST:PORT of a Dask scheduler, or its client",
+            field="on",
+        )
+
+
+class DaskPool:
+    """A cluster's workers, each of its threads a place to answer a chunk.
+
+    Parameters
+    ----------
+    on : str or Client
+        `LOCAL`, a scheduler's address, or a client.
+    workers : int or None
+        Of a cluster of this machine's own.
+    setting : bytes
+        As `answer_chunk` takes it.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``distributed`` is not installed, or ``on`` is no address.
+    """
+
+    largest = 64
+    deaths = ALLOWED + 1
+
+    def __init__(self, on: Any, workers: int | None, setting: bytes) -> None:
+        try:
+            import distributed
+        except ImportError:
+            raise InvalidInputError(
+                "needs distributed, which is not installed: pip install 'crux[dask]'", field="dask"
+            ) from None
+        self._own = not isinstance(on, distributed.Client)
+        if self._own and on != LOCAL:
+            check_address(on)
+            if workers is not None:
+                raise InvalidInputError(
+                    "a cluster has workers of its own; leave it out", field="workers"
+                )
+        self._on, self._workers, self._setting = on, workers, setting
+        self._stack = ExitStack()
+        self._open: dict[int, Future[bytes]] = {}
+        self._done: SimpleQueue[tuple[int, Future[bytes]]] = SimpleQueue()
+
+    def __enter__(self) -> Self:
+        try:
+            self._client: Client = self._stack.enter_context(self._connected())
+            self._client.wait_for_workers(1, timeout=PATIENCE)
+        except BaseException as error:
+            self._stack.close()
+            if isinstance(error, OSError | TimeoutError):
+                raise CruxError(
+                    f"no Dask scheduler with a worker answers at {self._on} within "
+                    f"{PATIENCE:g} s; start them with: dask scheduler, dask worker ADDRESS"
+                ) from None
+            raise
+        self._address = self._client.scheduler.address
+        return self
+
+    def _connected(self) -> Any:
+        from distributed import Client, LocalCluster
+
+        if not self._own:
+            return nullcontext(self._on)
+        # what it loses is told in the answers, or in one line
+        for name in logging.root.manager.loggerDict:
+            if name.split(".")[0] == "distributed":
+                logging.getLogger(name).setLevel(logging.CRITICAL)
+        where: Any = self._on
+        if where == LOCAL:
+            where = self._stack.enter_context(
+                LocalCluster(
+                    n_workers=cores() if self._workers is None else self._workers,
+                    threads_per_worker=1,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        return Client(where, timeout=PATIENCE, set_as_default=False)
+
+    def __exit__(self, *error: object) -> None:
+        if self._client.status == "running":
+            self._client.cancel(list(self._open.values()), force=True)
+        self._open.clear()
+        self._stack.close()
+
+    @property
+    def width(self) -> int:
+        """Threads that the workers have now, which come and go."""
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
+
+    def put(self, number: int, chunk: bytes, about: Hashable = None) -> None:
+        """Submit a chunk."""
+        future = self._client.submit(answer_chunk, self._setting, chunk, pure=False)
+        self._open[number] = future
+        future.add_done_callback(lambda done: self._done.put((number, done)))
+
+    def collect(self) -> list[tuple[int, bytes | Lost]]:
+        """Wait until a chunk is answered or lost.
+
+        Raises
+        ------
+        CruxError
+            If the scheduler is gone, or a worker cannot answer at all.
+        """
+        while True:
+            self._check_scheduler()
+            try:
+                number, future = self._done.get(timeout=LOOK)
+            except Empty:
+                continue
+            if self._open.pop(number, None) is not None:
+                return [(number, self._found(future))]
+
+    def _check_scheduler(self) -> None:
+        if self._client.status != "running":
+            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+
+    def _found(self, future: Future[bytes]) -> bytes | Lost:
+        from distributed import KilledWorker
+
+        if future.status == "finished":
+            answers: bytes = future.result()
+            return answers
+        if future.cancelled():
+            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            return Lost(f"{self.deaths} Dask workers died of it")
+        if isinstance(error, MemoryError):
+            return Lost("a Dask worker had no memory for it")
+        if isinstance(error, CruxError):
+            raise error
+        raise CruxError(
+            f"a Dask worker cannot answer ({type(error).__name__}: {error}); it needs the same "
+            "crux, Python and packages as this process"
+        )

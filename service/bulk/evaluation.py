@@ -1,0 +1,283 @@
+"""Any number of questions, answered in order: chunks go out, come back, and are tried again."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from hand_models.parameters import ParameterTable
+from planner.processes import Lost
+from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_version
+from service.bulk.columns import row_of
+from service.bulk.grouping import about, grouped
+from service.bulk.pools import Pool, pool_on
+from service.requests import PlanRequest
+from service.wire import Answer, Format, LostError, MalformedError, encode_error, identifier
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from planner.robots import RobotFile
+
+__all__ = ["answered", "evaluate"]
+
+PACE: Final = 0.5
+"""How long a chunk is to take [s]: long beside what it costs to send, short beside any wait."""
+
+WINDOW: Final = 2
+"""Chunks for each process that are made of questions that came together."""
+
+AHEAD: Final = 3
+"""Such windows that may be ahead of the question whose answer is due."""
+
+BYTES: Final = 2**22
+"""Of a chunk, but for one of a single question; of those ahead, for each process and window."""
+
+AGAIN: Final = 2
+"""Times that a chunk is tried again before it is halved."""
+
+
+def evaluate(
+    questions: Iterable[bytes | PlanRequest],
+    on: str | Client = "processes",
+    *,
+    workers: int | None = None,
+    hand: ParameterTable | None = None,
+    robot: RobotFile | None = None,
+    folder: Path | None = None,
+    form: Format = Format.JSON,
+    explain: bool | None = None,
+    columns: tuple[str, ...] | None = None,
+) -> Generator[Answer, None, None]:
+    """Answer any number of plan requests, in order, errors in their places.
+
+    Questions are taken as there is work for them: some chunks are ahead at most, however many there
+    are. A process that dies is replaced, and its chunk tried again, `AGAIN` times at most; then it
+    is halved, until the question that its process dies of is alone, and ``lost``. To break it off,
+    close it.
+
+    Parameters
+    ----------
+    questions : iterable of bytes or PlanRequest
+        Bytes are encoded requests.
+    on : str or distributed.Client, optional
+        ``processes`` of this machine, ``here`` for this process alone, ``tcp://HOST:PORT`` of a
+        Dask scheduler or its client, ``dask:local`` for a cluster of this machine's own.
+    workers : int, optional
+        Processes of this machine; by default one a core.
+    hand : ParameterTable, optional
+        Entries in which hands are not the bundled one; a request's own go on top.
+    robot : RobotFile, optional
+        The only robot that is planned for; those that are bundled by default.
+    folder : Path, optional
+        That names of mesh files in requests are relative to, wherever they are answered; by default
+        requests name none.
+    form : Format, optional
+        Of questions and answers.
+    explain : bool, optional
+        Whether what keeps stances from plans is explained; by default as each request says.
+    columns : tuple of str, optional
+        Of the rows (`service.bulk.Row`, as MessagePack) that answers are told as; by default they
+        are whole replies.
+
+    Yields
+    ------
+    Answer
+        The very same bytes wherever they were made, but for ``time``, and for what a deadline has
+        left out.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``on`` or ``workers`` is impossible, or Dask is not installed.
+    CruxError
+        If no process can be started, or a cluster is gone: what is not yet answered can be asked
+        again.
+    """
+    setting = Setting(robot, hand, folder, form, explain, columns, own_version())
+    with pool_on(on, workers, setting) as pool:
+        yield from answered(questions, pool, form, columns)
+
+
+class _Chunk(NamedTuple):
+    """Questions with their places, how often their processes have died, and if they were halved."""
+
+    places: tuple[int, ...]
+    payloads: tuple[bytes, ...]
+    deaths: int = 0
+    halved: bool = False
+
+    @property
+    def size(self) -> int:
+        """Bytes of its questions."""
+        return sum(map(len, self.payloads))
+
+
+def answered(
+    questions: Iterable[bytes | PlanRequest],
+    pool: Pool,
+    form: Format = Format.JSON,
+    columns: tuple[str, ...] | None = None,
+) -> Iterator[Answer]:
+    """Yield the answers to questions in order, made by a pool that has been entered."""
+    work = _Work(enumerate(questions), pool, form, columns)
+    following = 0
+    while True:
+        work.take_more(following)
+        while following in work.early:
+            yield work.early.pop(following)
+            following += 1
+        if not work.chunks:
+            if work.ended:
+                return
+            continue
+        work.collect()
+
+
+class _Work:
+    """Questions that are out, and answers that are due later.
+
+    Attributes
+    ----------
+    ended : bool
+        Whether there are no more questions.
+    early : dict of int to Answer
+        By the places of their questions.
+    chunks : dict of int to _Chunk
+        Those that are out, by number.
+    """
+
+    def __init__(
+        self,
+        source: Iterator[tuple[int, bytes | PlanRequest]],
+        pool: Pool,
+        form: Format,
+        columns: tuple[str, ...] | None,
+    ) -> None:
+        self._source, self._pool, self._form, self._columns = source, pool, form, columns
+        self.ended = False
+        self.early: dict[int, Answer] = {}
+        self.chunks: dict[int, _Chunk] = {}
+        self._asked = self._put = self._bytes = 0
+        self._together = 1
+        """Questions in a chunk."""
+
+    def take_more(self, following: int) -> None:
+        """Give out chunks of new questions, while not too many are ahead of one that is due."""
+        width = self._pool.width
+        count, most = self._together * width * WINDOW, width * BYTES
+        while (
+            not self.ended
+            and self._asked - following <= (AHEAD - 1) * count
+            and self._bytes <= (AHEAD - 1) * most
+        ):
+            for chunk, rock in self._chunks(self._window(count, most)):
+                self._give(chunk, rock)
+
+    def collect(self) -> None:
+        """Wait for answers, and try again what has lost its process."""
+        for number, result in self._pool.collect():
+            chunk = self.chunks.pop(number)
+            self._bytes -= chunk.size
+            if not isinstance(result, Lost):
+                answers = decode_answers(result)
+                self._learn(answers)
+                self.early.update(zip(chunk.places, answers, strict=True))
+                continue
+            parts = _again(chunk, self._pool.deaths)
+            for part in parts:
+                self._give(part)
+            if not parts:
+                self._lose(chunk, result)
+
+    def _window(self, count: int, most: int) -> list[tuple[int, bytes]]:
+        """Take new questions, no more than so many or so many bytes."""
+        found: list[tuple[int, bytes]] = []
+        size = taken = 0
+        while taken < count and size < most:
+            following = next(self._source, None)
+            if following is None:
+                self.ended = True
+                break
+            i, question = following
+            self._asked, taken = i + 1, taken + 1
+            payload = _encoded(question, self._form)
+            if isinstance(payload, Answer):
+                self.early[i] = self._told(payload)
+            else:
+                found.append((i, payload))
+                size += len(payload)
+        return found
+
+    def _chunks(self, window: list[tuple[int, bytes]]) -> Iterator[tuple[_Chunk, bytes]]:
+        """Yield chunks of questions about the same, as far as may be, and their rocks."""
+        abouts = [about(payload, self._form) for _, payload in window]
+        places: list[int] = []
+        payloads: list[bytes] = []
+        rock, size = b"", 0
+        for k in grouped(abouts):
+            place, payload = window[k]
+            if places and (len(places) == self._together or size + len(payload) > BYTES):
+                yield _Chunk(tuple(places), tuple(payloads)), rock
+                places, payloads, size = [], [], 0
+            places.append(place)
+            payloads.append(payload)
+            size += len(payload)
+            rock = abouts[k].rock
+        if places:
+            yield _Chunk(tuple(places), tuple(payloads)), rock
+
+    def _give(self, chunk: _Chunk, rock: bytes = b"") -> None:
+        self.chunks[self._put] = chunk
+        self._bytes += chunk.size
+        self._pool.put(self._put, encode_chunk(list(chunk.payloads)), rock)
+        self._put += 1
+
+    def _learn(self, answers: list[Answer]) -> None:
+        """Let chunks be as large as is worth it, at most twice as large as before."""
+        each = sum(answer.seconds for answer in answers) / len(answers)
+        best = int(PACE / max(each, 1e-6))
+        self._together = max(1, min(best, 2 * self._together, self._pool.largest))
+
+    def _lose(self, chunk: _Chunk, lost: Lost) -> None:
+        """Answer the question that is alone in a chunk."""
+        (place,), (payload,) = chunk.places, chunk.payloads
+        error = LostError(lost.reason)
+        self.early[place] = self._told(
+            encode_error(error, self._form, identifier(payload, self._form))
+        )
+
+    def _told(self, answer: Answer) -> Answer:
+        return answer if self._columns is None else row_of(answer, self._form, self._columns)
+
+
+def _again(chunk: _Chunk, deaths: int) -> list[_Chunk]:
+    """Return what is tried in place of a chunk whose process has died; nothing if it is lost.
+
+    A half is halved at once; a question that is alone gets another try: the death of its process
+    may have been no fault of its own.
+    """
+    deaths += chunk.deaths
+    alone = len(chunk.places) == 1
+    if deaths <= (1 if chunk.halved and alone else 0 if chunk.halved else AGAIN):
+        return [chunk._replace(deaths=deaths)]
+    if alone:
+        return []
+    half = len(chunk.places) // 2
+    return [
+        _Chunk(chunk.places[part], chunk.payloads[part], halved=True)
+        for part in (slice(half), slice(half, None))
+    ]
+
+
+def _encoded(question: bytes | PlanRequest, form: Format) -> bytes | Answer:
+    """Return a question's bytes, or the error of what is none."""
+    if isinstance(question, bytes):
+        return question
+    try:
+        return form.encode(question)
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        name: Any = getattr(question, "id", None)
+        known = name if isinstance(name, str) else None
+        return encode_error(MalformedError(f"no request: {error}"), form, known)

@@ -1,0 +1,85 @@
+"""Requests of a file, one a line, read as needed, and a digest of those that are answered."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from typing import BinaryIO
+
+from hand_models.base import InvalidInputError
+
+__all__ = ["LineDigest", "Lines"]
+
+
+class Lines:
+    """The lines of a file, or of standard input, that are not blank.
+
+    Parameters
+    ----------
+    source : str
+        A path, or ``-``: standard input is kept in a file of its own until the end.
+
+    Attributes
+    ----------
+    count : int
+        How many there are.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be read.
+    """
+
+    def __init__(self, source: str) -> None:
+        try:
+            if source == "-":
+                self._file: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
+                shutil.copyfileobj(sys.stdin.buffer, self._file)
+            else:
+                self._file = Path(source).open("rb")  # noqa: SIM115
+            self.count = sum(1 for _ in self)
+        except OSError as error:
+            raise InvalidInputError(f"{error.strerror}: {source}", field="REQUESTS") from None
+
+    def __iter__(self) -> Iterator[bytes]:
+        return (line for _, line in self.numbered())
+
+    def numbered(self) -> Iterator[tuple[int, bytes]]:
+        """Yield each line, without its end, and its number in the file, from one."""
+        self._file.seek(0)
+        for number, line in enumerate(self._file, start=1):
+            if line.strip():
+                yield number, line.removesuffix(b"\n")
+
+    def number(self, index: int) -> int:
+        """Return the number in the file of a line, by its place among those that are not blank."""
+        return next(number for i, (number, _) in enumerate(self.numbered()) if i == index)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class LineDigest:
+    """SHA-256 over the SHA-256 digests of lines, one after another."""
+
+    def __init__(self) -> None:
+        self._all = sha256()
+
+    def copy(self) -> LineDigest:
+        """Return one that goes its own way from here."""
+        found = LineDigest()
+        found._all = self._all.copy()
+        return found
+
+    def add(self, line: bytes) -> None:
+        """Take in a line."""
+        self._all.update(sha256(line).digest())
+
+    def hex(self) -> str:
+        """Return the digest so far."""
+        return self._all.hexdigest()

@@ -1,0 +1,118 @@
+"""The same answers on a Dask cluster, whatever becomes of it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from hand_models.base import CruxError
+from service.bulk import evaluate
+from tests.service.bulk.test_evaluation import CASES, encoded, timeless
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.commands import FAILED
+from tests.suite.helpers.processes import begun, until, watched
+from tests.suite.helpers.requests import HEAVY, wall_request
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[object]:
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
+    asked = encoded(CASES)
+    here = [timeless(answer.payload) for answer in evaluate(asked, "here")]
+    assert [timeless(answer.payload) for answer in evaluate(asked, client)] == here
+    address = client.scheduler_info()["address"]
+    assert [timeless(answer.payload) for answer in evaluate(asked, address)] == here
+    # the client is its owner's
+    assert client.status == "running"
+
+
+def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):
+    taken = 0
+
+    def endless() -> Iterator[bytes]:
+        nonlocal taken
+        for taken in itertools.count(1):
+            yield msgspec.json.encode({"v": 1, "id": str(taken)})
+
+    answers = evaluate(endless(), client)
+    found = [json.loads(answer.payload)["id"] for answer in itertools.islice(answers, 500)]
+    answers.close()
+    assert found == [str(i) for i in range(1, 501)]
+    assert taken < 5000
+
+
+def test_a_worker_that_is_killed_is_replaced(client):
+    asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(120)])
+    killed, found = [], []
+    for answer in evaluate(asked, client):
+        found.append(timeless(answer.payload))
+        if len(found) == 10:
+            killed = list(client.run(os.getpid).values())[:1]
+            os.kill(killed[0], signal.SIGKILL)
+    assert killed
+    assert [reply["id"] for reply in found] == [str(i) for i in range(120)]
+    assert {reply["status"] for reply in found} == {"overloaded"}
+
+
+def test_no_scheduler_is_told(monkeypatch):
+    monkeypatch.setattr("service.bulk.dask_pools.PATIENCE", 0.5)
+    with pytest.raises(CruxError, match=r"no Dask scheduler with a worker answers at tcp://"):
+        list(evaluate([b"{}"], "tcp://127.0.0.1:9"))
+
+
+def dask(*words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *words, "--no-dashboard"],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+@watched
+def test_a_scheduler_that_goes_away_leaves_what_is_whole(tmp_path: Path):
+    contact, path, table = (tmp_path / name for name in ("scheduler.json", "q.jsonl", "t.csv"))
+    asked = [wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(2000)]
+    path.write_text("".join(json.dumps(each) + "\n" for each in asked))
+    scheduler = dask(
+        "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(contact)
+    )
+    until(lambda: contact.exists() and contact.read_text().endswith("}"), scheduler)
+    address = json.loads(contact.read_text())["address"]
+    worker = dask("worker", address, "--nthreads", "1")
+    try:
+        batch = begun("batch", str(path), "-o", str(table), "--dask", address)
+        until(lambda: table.exists() and table.read_bytes().count(b"\n") > 10, batch)
+        scheduler.kill()
+        _, error = batch.communicate()
+        rows = table.read_bytes().count(b"\n") - 1
+        kept = f"{rows} of 2000 requests are answered in {table}; --resume goes on"
+        told = f"crux: the Dask scheduler at {address} is gone; {kept}\n"
+        assert (batch.returncode, error.decode()) == (FAILED, told)
+    finally:
+        for process in (scheduler, worker):
+            process.terminate()
+            process.wait()

@@ -1,0 +1,258 @@
+"""Tables of plans: their columns, and that they go on after anything."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from hand_models.base import InvalidInputError
+from service.answering import dispatch
+from service.bulk import chosen_columns, columns_of
+from service.bulk.tables import CsvTable, ParquetTable
+from service.commands.cli import run
+from tests.service.commands.test_interruption import limited
+from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint, result
+from tests.suite.helpers.processes import begun, ended, until, watched, workers
+from tests.suite.helpers.requests import HEAVY, plan_request, wall_request
+
+LIMBS = ("front_right", "rear_right", "rear_left", "front_left")
+COUNT = 24
+
+
+def needs(ending: str) -> None:
+    if ending == ".parquet":
+        pytest.importorskip("pyarrow")
+
+
+@pytest.fixture
+def lines(tmp_path: Path) -> Path:
+    """Requests that take a while each, one of them impossible, and blank lines."""
+    path = tmp_path / "requests.jsonl"
+    asked = [wall_request(HEAVY + i) | {"id": f"r{i}"} for i in range(COUNT)]
+    asked[5] = {"v": 1, "id": 'bad, "quoted"'}
+    path.write_text("\n\n".join(json.dumps(each) for each in asked) + "\n", encoding="utf-8")
+    return path
+
+
+def content(path: Path) -> list[dict]:
+    """Rows of a table as Python has them."""
+    if path.suffix == ".csv":
+        with path.open(newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+    from pyarrow import dataset
+
+    return dataset.dataset(path).to_table().to_pylist()
+
+
+def manifest(path: Path) -> dict:
+    kind = CsvTable if path.suffix == ".csv" else ParquetTable
+    return json.loads(kind.manifest_path(path).read_text())
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_rows_tell_what_replies_do(ending, lines, tmp_path, capfd):
+    needs(ending)
+    path = tmp_path / f"table{ending}"
+    assert run(["batch", str(lines), "-o", str(path), "--json"]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    assert json.loads(out)["overloaded"] == COUNT - 1
+    assert err.startswith("crux: line 11: stance: ")
+    rows = content(path)
+    assert [int(row["index"]) for row in rows] == list(range(COUNT))
+    plan = dispatch.plan(plan_request(wall_request(HEAVY + 1) | {"id": "r1"}))
+    row = rows[1]
+    assert (row["id"], row["status"]) == ("r1", "overloaded")
+    assert float(row["utilisation"]) == plan.utilisation
+    assert row["limiting_limb"] == plan.limiting.limb
+    assert row["limiting_limit"] == plan.limiting.limit
+    for hand in plan.hands:
+        tensions = [finger.tendon_tension for finger in hand.fingers]
+        names = ("outer_left", "inner_left", "inner_right", "outer_right")
+        assert [float(row[f"{hand.limb}_{name}_tension_N"]) for name in names] == tensions
+        axes = ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
+        assert [float(row[f"{hand.limb}_{axis}"]) for axis in axes] == hand.wrench
+    bad = rows[5]
+    assert (bad["id"], bad["status"] or None) == ('bad, "quoted"', None)
+    assert (bad["error_kind"], bad["error_field"]) == ("invalid", "stance")
+    assert manifest(path)["complete"]
+
+
+def test_units_are_in_the_schema_of_parquet(lines, tmp_path, capfd):
+    pytest.importorskip("pyarrow")
+    from pyarrow import dataset
+
+    path = tmp_path / "table.parquet"
+    run(["batch", str(lines), "-o", str(path), "--json"])
+    schema = dataset.dataset(path).schema
+    for column in columns_of(LIMBS):
+        told = {
+            key.decode(): text.decode() for key, text in schema.field(column.name).metadata.items()
+        }
+        assert told == {"unit": column.unit, "meaning": column.meaning}
+    assert schema.field("rear_left_mx_Nm").metadata[b"unit"] == "N·m".encode()
+
+
+def test_columns_are_chosen_by_name_and_pattern():
+    def names(wanted: str, explained: bool = False) -> list[str]:
+        return [column.name for column in chosen_columns(wanted, LIMBS, explained)]
+
+    assert names("status,id") == ["index", "id", "status"]
+    assert len(names("*_tension_N")) == 1 + 16
+    assert names("index") == ["index"]
+    assert names("sufficient", True) == ["index", "sufficient"]
+    for wrong in ("tension", "id,", "", "sufficient"):
+        with pytest.raises(InvalidInputError, match="no column"):
+            names(wrong)
+
+
+def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capfd):
+    path = tmp_path / "table.csv"
+    asked = ["batch", str(lines), "-o", str(path), "--json"]
+    run([*asked, "--explain", "--columns", "irreducible,sufficient"])
+    row = content(path)[0]
+    plan = dispatch.plan(plan_request(wall_request(HEAVY)))
+    assert len(row["irreducible"].split("; ")) == len(plan.certificate.irreducible)
+    assert plan.certificate.irreducible[0].limb in row["irreducible"]
+    run(asked)
+    assert "irreducible" not in content(path)[0]
+    capfd.readouterr()
+    assert run([*asked, "--columns", "sufficient"]) == BAD_INPUT
+    assert "it needs --explain" in complaint(capfd)
+    assert run(["batch", str(lines), "--columns", "id"]) == BAD_INPUT
+    assert "needs a table" in complaint(capfd)
+
+
+@watched
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_what_is_interrupted_goes_on_and_is_the_same_table(ending, lines, tmp_path, capfd):
+    needs(ending)
+    whole, path = tmp_path / f"whole{ending}", tmp_path / f"table{ending}"
+    assert run(["batch", str(lines), "-o", str(whole), "--json"]) == BAD_INPUT
+    summary = json.loads(capfd.readouterr().out)
+    process = begun("batch", str(lines), "-o", str(path), "--workers", "2")
+    until(lambda: len(workers(process)) >= 2, process)
+    process.send_signal(signal.SIGINT)
+    status, error = ended(process)
+    rows = len(content(path)) if manifest(path)["parts"] else 0
+    kept = f"{rows} of {COUNT} requests are answered in {path}; --resume goes on"
+    assert (status, error) == (FAILED, f"crux: interrupted: {kept}\n")
+    again = ["batch", str(lines), "-o", str(path), "--json", "--resume"]
+    assert run(again) == BAD_INPUT
+    assert content(path) == content(whole)
+    # nothing is left to do, and the status is that of all
+    assert run(again) == BAD_INPUT
+    told = json.loads(capfd.readouterr().out.splitlines()[-1])
+    assert {**told, "time": 0, "file": 0} == {**summary, "time": 0, "file": 0}
+    assert content(path) == content(whole)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_what_a_kill_has_left_half_done_is_done_again(ending, lines, tmp_path, capfd, monkeypatch):
+    """Parts of three rows; then what is there when the process is killed just before a manifest."""
+    needs(ending)
+    monkeypatch.setattr("service.bulk.tables.ROWS", 3)
+    whole, path = tmp_path / f"whole{ending}", tmp_path / f"table{ending}"
+    for each in (whole, path):
+        run(["batch", str(lines), "-o", str(each), "--json"])
+    kind = CsvTable if ending == ".csv" else ParquetTable
+    told = manifest(path)
+    if ending == ".csv":
+        data = path.read_bytes().splitlines(keepends=True)
+        told["parts"][0] |= {"rows": 6, "bytes": len(b"".join(data[:7]))}
+        path.write_bytes(b"".join(data[:9]) + data[9][:20])
+    else:
+        assert [part["rows"] for part in told["parts"]] == [3] * (COUNT // 3)
+        told["parts"] = told["parts"][:2]
+        (path / ".part-000003.part.parquet").write_bytes(b"PAR1")
+    from service.bulk import Lines
+    from service.bulk.lines import LineDigest
+
+    digest = LineDigest()
+    for line in list(Lines(str(lines)))[:6]:
+        digest.add(line)
+    told |= {"sha256": digest.hex(), "statuses": {"overloaded": 5}, "errors": {"invalid": 1}}
+    kind.manifest_path(path).write_text(json.dumps(told))
+    capfd.readouterr()
+    assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    assert json.loads(capfd.readouterr().out)["requests"] == COUNT
+    assert content(path) == content(whole)
+
+
+def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
+    path, hand = tmp_path / "table.csv", tmp_path / "hand.toml"
+    hand.write_text("[hand]\nmass = { value = 2.0, unit = 'kg', source = 'measured' }\n")
+    asked = ["batch", str(lines), "-o", str(path), "--json"]
+    run(asked)
+    before = path.read_bytes()
+    for more, words in (
+        (["--columns", "id"], "another columns"),
+        (["--explain"], "another"),
+        (["--hand", str(hand)], "another hand"),
+    ):
+        capfd.readouterr()
+        assert run([*asked, "--resume", *more]) == BAD_INPUT
+        assert words in complaint(capfd)
+    text = lines.read_text()
+    for other in (text.replace("r3", "other"), text[: len(text) // 2]):
+        lines.write_text(other)
+        assert run([*asked, "--resume"]) == BAD_INPUT
+        assert "answer other requests" in complaint(capfd)
+    # more requests after those that are answered are the same work
+    lines.write_text(text + json.dumps(wall_request() | {"id": "more"}) + "\n")
+    assert run([*asked, "--resume"]) == BAD_INPUT
+    assert result(capfd)["optimal"] == 1
+    assert path.read_bytes().startswith(before)
+    assert [row["id"] for row in content(path)][-1] == "more"
+
+
+def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
+    notes, folder = tmp_path / "notes.csv", tmp_path / "notes.parquet"
+    notes.write_text("notes")
+    assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
+    assert "no table that a batch has written" in complaint(capfd)
+    assert notes.read_text() == "notes"
+    folder.mkdir()
+    (folder / "notes").write_text("notes")
+    needs(".parquet")
+    for more in ([], ["--resume"]):
+        assert run(["batch", str(lines), "-o", str(folder), *more]) == BAD_INPUT
+        assert "no table that a batch has written" in complaint(capfd)
+    assert [path.name for path in folder.iterdir()] == ["notes"]
+
+
+def test_a_full_disk_leaves_whole_rows(lines, tmp_path, capfd):
+    path = tmp_path / "table.csv"
+    status, error = limited("batch", str(lines), "-o", str(path), size=4000)
+    kept = f"0 of {COUNT} requests are answered in {path}; --resume goes on"
+    assert (status, error) == (FAILED, f"crux: cannot write {path}: File too large; {kept}\n")
+    assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    assert [int(row["index"]) for row in content(path)] == list(range(COUNT))
+
+
+@pytest.mark.parametrize(
+    ("module", "more", "words"),
+    [
+        ("pyarrow", ["-o", "FOLDER/table.parquet"], "pip install 'crux[parquet]'"),
+        ("distributed", ["--dask", "local"], "pip install 'crux[dask]'"),
+    ],
+)
+def test_what_is_not_installed_is_told_in_one_line(
+    module, more, words, lines, tmp_path, capfd, monkeypatch
+):
+    for name in [module, *(name for name in sys.modules if name.startswith(f"{module}."))]:
+        monkeypatch.setitem(sys.modules, name, None)
+    given = [part.replace("FOLDER", str(tmp_path)) for part in more]
+    assert run(["batch", str(lines), *given]) == BAD_INPUT
+    assert words in complaint(capfd)
+
+
+def test_a_batch_without_errors_is_overloaded_at_worst(tmp_path, capfd):
+    path, table = tmp_path / "requests.jsonl", tmp_path / "table.csv"
+    path.write_text(json.dumps(wall_request(HEAVY)))
+    assert run(["batch", str(path), "-o", str(table), "--json"]) == OVERLOADED
+    assert run(["batch", str(path), "-o", str(table), "--json", "--resume"]) == OVERLOADED
