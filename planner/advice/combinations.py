@@ -23,11 +23,12 @@ import numpy.typing as npt
 from hand_models.base import Array, Indices, Pose, wrench_transport
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
+from planner import deadline
 from planner.advice.body import SHIFT_UNIT, BodySearch, can_move
 from planner.advice.changes import Change, changed, combined
 from planner.advice.hands import lettings, variants
 from planner.advice.new_holds import APART, every_hold
-from planner.advice.trials import Trials, direction
+from planner.advice.trials import TRIED, Trials, direction
 from planner.prepare import settle_each
 from planner.programs import Support
 from planner.question import HandOnHold
@@ -214,7 +215,7 @@ class CombinationSearch:
     def run(self) -> None:
         """Look for changes that hold, then for smaller ones, with the plans that are left."""
         if self.find(0, smallest=False) is not None:
-            self.find(self.trials.left - SMALLER, smallest=True)
+            self.find(max(self.trials.left - SMALLER, 0), smallest=True)
 
     def find(self, last: int, *, smallest: bool) -> Choice | None:
         """Plan for one choice after the other, until one holds or so many plans are left.
@@ -235,7 +236,10 @@ class CombinationSearch:
         while self._rows and self.trials.left > last:
             known = self.known(smallest=smallest)
             starts = {as_it_is, seen[-1], *self.anywhere(known)}
-            choices = {known.climbed(start) for start in starts}
+            choices = set()
+            for start in starts:
+                deadline.check(TRIED)
+                choices.add(known.climbed(start))
             new = [each for each in choices if each[1] not in seen]
             if not new:
                 return None
@@ -328,6 +332,7 @@ def _variants(trials: Trials) -> Iterator[_Variant]:
     closed = [each for each in settled if isinstance(each, SettledHand)]
     for one, space in zip(closed, wrench_spaces(closed, limits.tendon_tension), strict=True):
         if one not in supports:
+            deadline.check(TRIED)
             supports[one] = Support(space, limits.utilisation)
     body = stance.body.inverse()
     for (limb, said, hand), each in zip(wanted, settled, strict=True):

@@ -19,7 +19,7 @@ from planner.question import Objective, Question
 from planner.scene import findings, scene_of
 from planner.solving import Trial, try_stance
 
-__all__ = ["PLANS", "WITHOUT", "Trials", "Tried", "direction"]
+__all__ = ["PLANS", "TRIED", "WITHOUT", "Trials", "Tried", "direction"]
 
 PLANS: Final = 100
 """That are made for the advice about a question."""
@@ -28,6 +28,7 @@ WITHOUT: Final = ("mass", "strength")
 """Kinds that do not count as help, nor as part of a pair: the task becomes another."""
 
 TRIED: Final = "all changes were tried"
+"""What a deadline came before."""
 
 
 class Tried(NamedTuple):
