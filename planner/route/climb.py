@@ -9,12 +9,12 @@ the limb lifts (a stance without that hand); then it takes the new hold:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Literal
 
-from hand_models.base import InvalidInputError, Pose
+from hand_models.base import InvalidInputError, Pose, within
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
@@ -88,6 +88,8 @@ class RouteStage:
     limb : str or None
         The one that moves.
     question : Question
+    paths : dict of str
+        Where the route tells ``hands[i]`` and ``body`` of its stance.
     """
 
     index: int
@@ -95,6 +97,7 @@ class RouteStage:
     phase: Phase
     limb: str | None
     question: Question
+    paths: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,8 @@ def stages(route: Route) -> Iterator[RouteStage]:
     Raises
     ------
     InvalidInputError
-        If a move's limb holds nothing to start with, or is the only one that does.
+        If a move's limb holds nothing to start with, or is the only one that does, or a hand
+        cannot be where it is; the field is relative to the route.
     """
     if route.start.joints not in (None, SOLVE):
         raise InvalidInputError(
@@ -170,10 +174,17 @@ def stages(route: Route) -> Iterator[RouteStage]:
                 field=f"limits.per_hand.{limb}",
             )
     body = route.start.body
+    told = {hand.limb: f"stance.hands[{i}]" for i, hand in enumerate(route.start.hands)}
+    body_told = "stance.body"
     index = 0
 
     def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> RouteStage:
-        stance = replace(route.start, hands=tuple(held), body=body)
+        paths = {f"hands[{i}]": told[hand.limb] for i, hand in enumerate(held)}
+        paths["body"] = body_told
+        try:
+            stance = replace(route.start, hands=tuple(held), body=body)
+        except InvalidInputError as error:
+            raise _in_route(error, paths) from None
         on_rock = {hand.limb for hand in held}
         caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
         question = Question(
@@ -184,7 +195,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
             objective=route.objective,
             explain=route.explain,
         )
-        return RouteStage(index, move, phase, limb, question)
+        return RouteStage(index, move, phase, limb, question, paths)
 
     yield stage(0, "start", None, list(hands.values()))
     for number, move in enumerate(route.moves, start=1):
@@ -199,12 +210,12 @@ def stages(route: Route) -> Iterator[RouteStage]:
                 "the only hand on the rock cannot lift", field=f"moves[{number - 1}].limb"
             )
         if move.body is not None:
-            body = move.body
+            body, body_told = move.body, f"moves[{number - 1}].body"
             index += 1
             yield stage(number, "shift", limb, list(hands.values()))
         index += 1
         yield stage(number, "lift", limb, [hand for hand in hands.values() if hand.limb != limb])
-        hands[limb] = move.hand
+        hands[limb], told[limb] = move.hand, f"moves[{number - 1}]"
         index += 1
         yield stage(number, "place", limb, list(hands.values()))
 
@@ -262,15 +273,23 @@ def _plan_stage(stage: RouteStage) -> Answer:
     except UnreachableError as error:
         return OutOfReach(error.message)
     except InvalidInputError as error:
-        return error.within(
-            "start" if stage.move == 0 else f"moves[{stage.move - 1}] ({stage.phase})"
-        )
+        return _in_route(error, stage.paths)
+
+
+def _in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:
+    """Return the error of a stage's question with its field as the route tells it."""
+    place = (error.field or "").removeprefix("stance.")
+    for part, path in paths.items():
+        if place == part or place.startswith(f"{part}."):
+            error.field = path + place.removeprefix(part)
+    return error
 
 
 def _must_touch(stage: RouteStage) -> None:
     """Refuse a move that ends in the air."""
     stance = stage.question.stance
-    hand = next(hand for hand in stance.hands if hand.limb == stage.limb)
-    settled = settle_hand(hand, stance)
-    if not (settled.holding.any() or settled.palm.engaged):
-        raise InvalidInputError(f"{hand.limb} touches nothing there", field="hold")
+    i = next(i for i, hand in enumerate(stance.hands) if hand.limb == stage.limb)
+    with within(f"hands[{i}]"):
+        settled = settle_hand(stance.hands[i], stance)
+        if not (settled.holding.any() or settled.palm.engaged):
+            raise InvalidInputError(f"{stage.limb} touches nothing there", field="hold")

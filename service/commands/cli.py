@@ -194,8 +194,9 @@ def plan(
             bare = _without_palms(request, robots) if request.detail == "full" else None
         if picture is not None:
             draw_plan(answer, picture)
+    written: list[Path] = []
     if advice_folder is not None and isinstance(answer.reply, PlanReply):
-        _write_advice(request, answer.reply, advice_folder)
+        written = _write_advice(request, answer.reply, advice_folder)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
     elif as_json:
@@ -203,18 +204,24 @@ def plan(
         say(msgspec.to_builtins(answer.reply) | without)
     else:
         print_plan(answer.reply, console(), without_palm=bare)
+        if written:
+            last = f" to {written[-1].name}, the best first" if len(written) > 1 else ""
+            click.echo(f"advice: {written[0]}{last}")
     return EXIT_STATUS.get(answer.reply.status, FAILED)
 
 
-def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> None:
-    """Write each advice as a request whose plan gives what it promises."""
+def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[Path]:
+    """Write each advice as a request whose plan gives what it promises, and return their paths."""
     from service import answering
 
+    written = []
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
         for i, advice in enumerate(reply.advice or ()):
             text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
-            (folder / f"advice-{i + 1}.json").write_bytes(text)
+            written.append(folder / f"advice-{i + 1}.json")
+            written[-1].write_bytes(text)
+    return written
 
 
 def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:

@@ -16,8 +16,8 @@ MOST: Final = 3
 """Changes shown; the best first."""
 
 
-def print_advice(told: Iterable[Advice], out: Console) -> None:
-    """Print what would make a stance hold, or hold more."""
+def print_advice(told: Iterable[Advice], out: Console, *, holding: bool = False) -> None:
+    """Print what would make a stance hold, or be better where it is ``holding`` already."""
     for advice in islice(told, MOST):
-        what = "would hold" if advice.holds else "would help"
+        what = "would be better" if holding else "would hold" if advice.holds else "would help"
         out.print(f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}", markup=False)

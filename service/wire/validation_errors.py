@@ -33,6 +33,7 @@ WORDS: Final = {
     "None": "null",
 }
 OUT_OF_RANGE: Final = re.compile(r"^Expected `(?:float|int)[^`]*` [<>]")
+LONG: Final = re.compile(r"\d+\.\d{6,}")
 Decoder = Callable[[Any], object]
 
 LONGEST: Final = 400
@@ -73,6 +74,8 @@ def validation_error(
         message = re.sub(r"`([^`]*)`", _plain, complaint)
         message = message[:1].lower() + message[1:]
         if OUT_OF_RANGE.search(complaint):
+            # a bound such as π is told as such, not with all digits of a double
+            message = LONG.sub(lambda number: f"{float(number[0]):.6g}", message)
             message += _in_units(places)
     return _clip(field.removeprefix(".")) or None, _clip(message)
 

@@ -158,7 +158,7 @@ def test_a_hold_inside_the_palm_names_its_move(route, workers: int):
     broken = replace(route, moves=(*route.moves[:2], replace(move, hand=into_palm)))
     with pytest.raises(InvalidInputError, match="inside the palm") as caught:
         evaluate(broken, workers=workers)
-    assert caught.value.field == "moves[2] (place).hold"
+    assert caught.value.field == "moves[2].hold"
 
 
 def test_a_limb_that_holds_nothing_cannot_move(route):
@@ -273,7 +273,25 @@ def test_a_move_that_ends_in_the_air_is_refused(route):
     away = replace(move.hand, hold_in_hand=Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
     with pytest.raises(InvalidInputError, match="touches nothing") as caught:
         evaluate(replace(route, moves=(replace(move, hand=away),)))
-    assert caught.value.field == "moves[0] (place).hold"
+    assert caught.value.field == "moves[0].hold"
+
+
+def test_what_is_wrong_with_a_stance_on_the_way_is_told_where_the_route_has_it(route):
+    first, second = route.start.hands[:2]
+    start = replace(route.start, hands=(replace(first, pose=second.pose), *route.start.hands[1:]))
+    with pytest.raises(InvalidInputError, match="in one and the same place") as caught:
+        evaluate(replace(route, start=start, moves=()))
+    assert caught.value.field == "stance.hands[1].pose.position"
+    move = route.moves[0]
+    (there,) = (hand for hand in route.start.hands if hand.limb == route.moves[1].hand.limb)
+    onto = replace(move, hand=replace(move.hand, pose=there.pose))
+    with pytest.raises(InvalidInputError, match="in one and the same place") as caught:
+        evaluate(replace(route, moves=(onto,)))
+    told = caught.value.field
+    far = replace(move.hand, pose=Pose(np.array([0.0, 450.0, 600.0]), move.hand.pose.rotation))
+    with pytest.raises(InvalidInputError, match="from the body") as caught:
+        evaluate(replace(route, moves=(replace(move, hand=far),)))
+    assert (told, caught.value.field) == 2 * ("moves[0].pose.position",)
 
 
 # Joints -----------------------------------------------------------------------------------------

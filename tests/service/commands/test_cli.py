@@ -183,6 +183,24 @@ def test_a_file_of_draws_that_cannot_be_is_refused_in_one_line(
     assert told in said
 
 
+@pytest.mark.parametrize(
+    ("stance", "what"), [("wall-300", "would be better"), ("boulders", "would hold")]
+)
+def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
+    stance: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run(["plan", stance, "--advice", str(tmp_path / "advised")])
+    lines = capfd.readouterr().out.splitlines()
+    files = sorted((tmp_path / "advised").iterdir(), key=lambda file: (len(file.name), file.name))
+    first, last = files[0].name, files[-1].name
+    assert lines[-1] == f"advice: {tmp_path / 'advised' / first} to {last}, the best first"
+    told = [line for line in lines if line.startswith("would ")]
+    assert len(told) == 3
+    for line, file in zip(told, files, strict=False):
+        assert run(["plan", str(file), "--json"]) == DONE
+        assert line.startswith(f"{what}, utilisation {result(capfd)['utilisation']:.2f}: ")
+
+
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
