@@ -184,6 +184,8 @@ def plan(
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     request = with_extras(request, *extras, whole=not as_json)
+    if advice_folder is not None and request.detail != "full":
+        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):
@@ -193,7 +195,8 @@ def plan(
             bare = _without_palms(request, robots) if request.detail == "full" else None
         if picture is not None:
             draw_plan(answer, picture)
-    if advice_folder is not None and isinstance(answer.reply, PlanReply):
+    if advice_folder is not None:
+        assert isinstance(answer.reply, PlanReply)  # of a whole request
         _write_advice(request, answer.reply, advice_folder)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
@@ -206,11 +209,14 @@ def plan(
 
 
 def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> None:
-    """Write each advice as a request whose plan gives what it promises."""
+    """Write each advice as a request whose plan gives what it promises, and none of another."""
     from service import answering
 
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("advice-*.json"):
+            if old.stem.removeprefix("advice-").isdecimal():
+                old.unlink()
         for i, advice in enumerate(reply.advice or ()):
             text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
             (folder / f"advice-{i + 1}.json").write_bytes(text)
