@@ -16,8 +16,7 @@ from planner.advice.changes import Change, changed
 from planner.prepare import PreparedStance, prepare_stance, settle_each
 from planner.programs import SLACK, WRENCH_UNIT
 from planner.question import Objective, Question
-from planner.scene import findings, scene_of
-from planner.solving import Trial, try_stance
+from planner.solving import Trial, scene_findings, try_stance
 
 __all__ = ["PLANS", "TRIED", "WITHOUT", "Trials", "Tried", "direction"]
 
@@ -171,5 +170,4 @@ def direction(trial: Trial) -> Array | None:
 
 def _odd(prepared: PreparedStance) -> frozenset[str]:
     """Return the kinds of what is odd about a stance."""
-    scene = scene_of(prepared.question.stance, prepared.batch.hands)
-    return frozenset(each.kind for each in findings(scene))
+    return frozenset(each.kind for each in scene_findings(prepared))

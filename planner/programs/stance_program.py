@@ -218,6 +218,8 @@ class StanceProgram(ABC):
             options["time_limit"] = left
         with _cvxpy, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
+            # of what has no end, a value is none
+            warnings.simplefilter("ignore", RuntimeWarning)
             problem, variables, rows = self.define()
             try:
                 problem.solve(**options)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -34,6 +36,9 @@ WIDEST: Final = 100.0
 
 NEGATIVE: Final = 1e-9
 """How far below zero rounding may put a principal moment, over the largest."""
+
+NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+"""A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
 
 THIN: Final = 1e-6
 """Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
@@ -207,10 +212,8 @@ def _numbers(
     raw = element.get(attribute)
     if raw is None:
         raise InvalidInputError(f"{place} is missing")
-    try:
-        numbers = [float(word) for word in raw.split()]
-    except ValueError:
-        numbers = []
+    words = raw.split()
+    numbers = [float(word) for word in words] if all(map(NUMBER.fullmatch, words)) else []
     # written so that what is not a number fails
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
@@ -259,7 +262,7 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         if limit is None:
             raise InvalidInputError(f"{owner} is {kind} and has no <limit>; continuous needs none")
         for rating in ("effort", "velocity"):
-            _numbers(owner, limit, rating, 1, math.inf)
+            _numbers(owner, limit, rating, 1, sys.float_info.max)
         # URDF takes a limit that is left out for zero
         low, high = (
             _numbers(owner, limit, end, 1, WIDEST)[0] if end in limit.attrib else 0.0

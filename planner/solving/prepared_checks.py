@@ -24,7 +24,14 @@ from planner.result import (
 from planner.scene import findings, link_findings, scene_of
 from planner.verification import Check
 
-__all__ = ["PreparedChecks", "Reading", "idle_joints", "prepare_checks", "read_loads"]
+__all__ = [
+    "PreparedChecks",
+    "Reading",
+    "idle_joints",
+    "prepare_checks",
+    "read_loads",
+    "scene_findings",
+]
 
 
 class PreparedChecks(NamedTuple):
@@ -66,10 +73,7 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
         If the stance cannot be; the field is relative to the question.
     """
     hands, stance, batch = prepared.hands, prepared.question.stance, prepared.batch
-    scene, where = scene_of(stance, batch.hands), prepared.where
-    odd = findings(scene)
-    if where is not None:
-        odd = (*odd, *link_findings(scene, where.angles))
+    odd, where = scene_findings(prepared), prepared.where
     return PreparedChecks(
         recovery=None if hands.floating else _recovery(prepared),
         check=Check(prepared.question, batch, where),
@@ -81,6 +85,19 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
             *off_sentences(where),
         ),
     )
+
+
+def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
+    """Return what is odd about a stance as a scene, and about its links where joints are known.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
+    """
+    scene, where = scene_of(prepared.question.stance, prepared.batch.hands), prepared.where
+    odd = findings(scene)
+    return odd if where is None else (*odd, *link_findings(scene, where.angles))
 
 
 def _recovery(prepared: PreparedStance) -> LoadRecovery:

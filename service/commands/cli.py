@@ -185,6 +185,8 @@ def plan(
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     request = with_extras(request, *extras, whole=not as_json)
+    if advice_folder is not None and request.detail != "full":
+        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
     robots = robots_of(robot)
     with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):
@@ -195,7 +197,8 @@ def plan(
         if picture is not None:
             draw_plan(answer, picture)
     written: list[Path] = []
-    if advice_folder is not None and isinstance(answer.reply, PlanReply):
+    if advice_folder is not None:
+        assert isinstance(answer.reply, PlanReply)  # of a whole request
         written = _write_advice(request, answer.reply, advice_folder)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
@@ -211,12 +214,18 @@ def plan(
 
 
 def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[Path]:
-    """Write each advice as a request whose plan gives what it promises, and return their paths."""
+    """Write each advice as a request whose plan gives what it promises, and none of another.
+
+    Returns their paths.
+    """
     from service import answering
 
     written = []
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("advice-*.json"):
+            if old.stem.removeprefix("advice-").isdecimal():
+                old.unlink()
         for i, advice in enumerate(reply.advice or ()):
             text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
             written.append(folder / f"advice-{i + 1}.json")

@@ -20,11 +20,12 @@ from planner.deadline import DeadlineError
 from planner.prepare import prepare_stance
 from planner.question import BodyRange, Load, Question
 from planner.result import Advice
-from planner.solving import plan as planned, try_stance
+from planner.solving import plan as planned, scene_findings, try_stance
 from service import answering
 from service.answering import advised, question
 from service.commands.stances import read_request
 from service.requests import PlanRequest
+from tests.suite.helpers.random_questions import requested
 from tests.suite.helpers.stances import SANDPAPER, ask, moved, on_wall, random_question
 
 SEED = 32  # four hands under their own weight, no limits of their own
@@ -239,6 +240,18 @@ def test_what_is_told_of_least_effort_is_of_a_plan_of_least_effort():
         there = planned(changed(asked, each.changes))
         assert there.verified
         assert there.utilisation == pytest.approx(each.utilisation, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [28, 75])
+def test_no_advice_is_told_that_would_be_warned_of_with_joints_too(seed):
+    asked = requested(seed)
+    told, whole = advise(asked)
+    assert whole
+    assert told
+    known = {each.kind for each in scene_findings(prepare_stance(asked))}
+    for each in told:
+        there = scene_findings(prepare_stance(changed(asked, each.changes)))
+        assert {found.kind for found in there} <= known
 
 
 def test_where_no_change_leaves_a_plan_nothing_is_told():

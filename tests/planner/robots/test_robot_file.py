@@ -261,6 +261,16 @@ def test_what_no_limb_can_do_without(missing):
             "urdf: joint 'hip': upper of <limit> must be a number within",
         ),
         ('effort="0"', "", "urdf: joint 'hip': effort of <limit> is missing"),
+        (
+            'effort="0"',
+            'effort="1e400"',
+            "urdf: joint 'hip': effort of <limit> must be a number within",
+        ),
+        (
+            'mass value="2.0"',
+            'mass value="2_0"',  # 20 for Python, and no mass at all for Pinocchio
+            "urdf: link 'thigh': value of <mass> must be a num",
+        ),
         ('xyz="0.6 0 0"', 'xyz="600 0 0"', "urdf: joint 'knee': xyz of <origin> must be 3 numbers"),
         (
             'xyz="0.6 0 0"',

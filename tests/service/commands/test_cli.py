@@ -201,6 +201,31 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
         assert line.startswith(f"{what}, utilisation {result(capfd)['utilisation']:.2f}: ")
 
 
+def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder, path = tmp_path / "advice", stance_file(wall_request(HEAVY))
+    folder.mkdir()
+    for name in ("advice-1.json", "advice-99.json", "advice-mine.json"):
+        (folder / name).write_text("{}")
+    assert run(["plan", path, "--advice", str(folder), "--json"]) == OVERLOADED
+    told = result(capfd)["advice"]
+    names = {f"advice-{i + 1}.json" for i in range(len(told))}
+    assert {file.name for file in folder.iterdir()} == names | {"advice-mine.json"}
+    assert told
+    run(["plan", str(folder / "advice-1.json"), "--json"])
+    assert result(capfd)["utilisation"] == pytest.approx(told[0]["utilisation"], abs=1e-6)
+
+
+def test_advice_that_a_brief_reply_does_not_tell_cannot_be_written(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, folder = stance_file(wall_request(HEAVY) | {"detail": "set_points"}), tmp_path / "advice"
+    assert run(["plan", path, "--advice", str(folder), "--json"]) == BAD_INPUT
+    assert "detail: --advice needs the full reply" in complaint(capfd)
+    assert not folder.exists()
+
+
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
