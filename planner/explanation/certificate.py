@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
 from hand_models.wrench_spaces import WrenchSpace
-from planner import deadline, programs
+from planner import programs
 from planner.explanation.active_limits import LimitUse, limit_name
 from planner.explanation.infeasibility import (
     BODY,
@@ -78,7 +78,8 @@ def certify(
         The loads that come nearest to the body wrench, with given wrenches of hands as they are
         given; found here by default.
     known : Outcome, optional
-        Of the program without a plan. Where the time is over, its multipliers are the proof.
+        Of the program without a plan. Where the nearest loads are too near to prove it, or the time
+        is over, its multipliers are the proof.
     explain : bool, optional
         Whether the irreducible set is sought, too, and what of it would do alone.
 
@@ -100,7 +101,7 @@ def certify(
     else:
         found = _contradiction(system, limbs)
     proven = found is not None and system.proves(*found)
-    if not proven and known is not None and deadline.expired():
+    if not proven and known is not None:
         found = _multipliers(system, known, capped=cap is not None)
         proven = found is not None and system.proves(*found)
     if found is None or not proven:

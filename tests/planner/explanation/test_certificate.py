@@ -13,7 +13,7 @@ from hand_models.rock import Edge, Plane
 from planner.programs import WRENCH_UNIT
 from planner.solving import plan
 from tests.suite.helpers import peer
-from tests.suite.helpers.stances import ask, on_wall, random_answer
+from tests.suite.helpers.stances import ask, on_wall, random_answer, random_question
 
 SEEDS = (
     3, 5, 12, 39, 58, 64, 86, 98, 110, 117, 142, 143, 148, 150, 160, 166, 175, 187, 191, 199,
@@ -123,3 +123,19 @@ def test_the_reason_says_what_is_missing():
     worst = int(np.argmax(np.abs(answer.certificate.shortfall / WRENCH_UNIT)))
     assert ("fx", "fy", "fz", "mx", "my", "mz")[worst] in answer.reason
     assert "missing" in answer.reason
+
+
+@pytest.mark.parametrize(
+    ("seed", "times", "status"),
+    [(5117, 0.9, "infeasible"), (5071, 1.0001, "overloaded")],
+    ids=["mN off what one hand can give", "a little over its limits"],
+)
+def test_what_is_next_to_what_can_be_had_has_its_proof_too(seed, times, status):
+    """The way to the nearest loads is too short then for a direction; multipliers have one."""
+    asked = random_question(seed, "load_factor")
+    needed = times * plan(asked).load_factor * asked.body_wrench
+    answer = plan(replace(asked, body_wrench=needed))
+    assert answer.status == status
+    assert answer.verified
+    assert answer.certificate is not None
+    assert answer.certificate.supremum < answer.certificate.needed
