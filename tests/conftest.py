@@ -1,10 +1,14 @@
 """Settings of all tests, and what tests of different packages need."""
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+# what a shell has in the background ignores it, and so would commands that tests interrupt
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
