@@ -116,9 +116,15 @@ def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, wo
     assert answer.solver.status == word
 
 
-def test_an_infeasible_stance_whose_distance_is_not_found_gets_failed(monkeypatch):
+def test_an_infeasible_stance_whose_distance_is_not_found_is_proven_by_multipliers(monkeypatch):
     nothing = Outcome(False, "solver_error", 0, float("nan"))
     monkeypatch.setattr(programs, "nearest", lambda *_: nothing)
+    answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
+    assert answer.status == "infeasible"
+    assert answer.certificate.supremum < answer.certificate.needed
+    # without these there is no proof, and none is made up
+    for name in ("unique", "margin", "vertex"):
+        monkeypatch.setattr(programs, name, lambda *_: nothing)
     answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
     assert answer.status == "failed"
     assert answer.certificate is None
