@@ -40,6 +40,9 @@ SPARE: Final = 5
 MASS: Final = 5
 """Plans for a lighter body, at most."""
 
+MANY: Final = ("pair", "combination")
+"""Kinds of several changes together."""
+
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""
 
@@ -158,9 +161,13 @@ def _ranked(trials: Trials) -> list[Tried]:
         does = not holds and trials.holds(tried.utilisation)
         return not does, tried.change.size if does else -gain / max(tried.change.size, SLACK)
 
+    def told(tried: Tried) -> bool:
+        # on its way to one that holds the search tries others
+        found = not trials.helped or trials.holds(tried.utilisation)
+        return tried.utilisation < (1.0 - WORTH) * base and (found or tried.change.kind not in MANY)
+
     found, seen = [], set()
-    worth = [each for each in trials.found if each.utilisation < (1.0 - WORTH) * base]
-    for tried in sorted(worth, key=rank):
+    for tried in sorted(filter(told, trials.found), key=rank):
         change = tried.change
         alike = (
             change.kind,

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -26,9 +27,11 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Array, Pose
 from planner import programs
 from planner.advice.changes import Change, pose_message
-from planner.advice.trials import Trials, direction
+from planner.advice.trials import WORSE, Trials, direction
 from planner.prepare import PreparedStance
 from planner.programs import WRENCH_UNIT
+from planner.result import Distance
+from planner.scene import body_clearance, scene_of
 from planner.solving import Trial
 
 __all__ = ["SHIFT_UNIT", "BodySearch", "can_move", "slope"]
@@ -113,6 +116,10 @@ class BodySearch:
         self.range = prepared.question.body_range
         self._cuts: list[_Cut] = []
         self._known: list[tuple[Array, float]] = []
+        self._rock: dict[_Tilt, list[tuple[Array, float]]] = {}
+        now = self._nearest(np.zeros(3), _Tilt())
+        # what is in rock today may stay so
+        self._allowed = -math.inf if now is None else min(now.distance, 0.0)
         if base is not None:
             self._keep(np.zeros(3), base)
 
@@ -177,7 +184,9 @@ class BodySearch:
         far = np.linalg.norm(shifts[:, None] - centres, axis=2)
         clear = np.array(list(self._clearances(0)))
         fine = (far <= radii).all(axis=1) & (shifts @ clear[:, :3].T <= clear[:, 3]).all(axis=1)
-        return np.vstack([np.zeros(3), shifts[fine & shifts.any(axis=1)]])
+        there = shifts[fine & shifts.any(axis=1)]
+        free = [each for each in there if self._rock_plane(each, _Tilt()) is None]
+        return np.vstack([np.zeros(3), *free])
 
     @property
     def _best(self) -> float:
@@ -226,6 +235,8 @@ class BodySearch:
         """Return the least of cost · x under A x ≤ b, x[:3] a shift within range and reach."""
         centres, radii = self._reaches(tilt)
         rows, most = [*rows, *self._clearances(len(cost) - 3)], self.range.shift
+        nothing = np.zeros(len(cost) - 3)
+        rows += [(*normal, *nothing, bound) for normal, bound in self._rock.get(tilt, [])]
         bounds = [(-most, most)] * 3 + [(0.0, None)] * (len(cost) - 3)
         for _ in range(TANGENTS):
             table = np.array(rows).reshape(-1, len(cost) + 1)
@@ -236,11 +247,15 @@ class BodySearch:
             far = np.sqrt(np.einsum("nx,nx->n", away, away))
             beyond = far > (1.0 + REACHED) * radii
             if not beyond.any():
-                break
+                cut = self._rock_plane(found.x[:3], tilt)
+                if cut is None:
+                    break
+                self._rock.setdefault(tilt, []).append(cut)
+                rows.append((*cut[0], *nothing, cut[1]))
             for u, centre, radius in zip(
                 away[beyond] / far[beyond, None], centres[beyond], radii[beyond], strict=True
             ):
-                rows.append((*u, *np.zeros(len(cost) - 3), float(u @ centre) + radius))
+                rows.append((*u, *nothing, float(u @ centre) + radius))
         return np.asarray(found.x)
 
     def _clearances(self, further: int) -> Iterator[tuple[float, ...]]:
@@ -251,6 +266,20 @@ class BodySearch:
             off = float(into @ (hand.pose.position - stance.body.position))
             # what is nearer today may stay so
             yield (*(into @ stance.body.rotation), *np.zeros(further), off - min(off, CLEAR))
+
+    def _rock_plane(self, shift: Array, tilt: _Tilt) -> tuple[Array, float] | None:
+        """Return n, c of n · d ≤ c that takes the body out of rock; None where it is not in any."""
+        nearest = self._nearest(shift, tilt)
+        if nearest is None or nearest.distance >= self._allowed - WORSE:
+            return None
+        one, other = np.array(nearest.points)
+        # points lie the other way round where one is in the other
+        inward = self.prepared.question.stance.body.rotation.T @ (other - one) / nearest.distance
+        return inward, float(inward @ shift) + nearest.distance - self._allowed
+
+    def _nearest(self, shift: Array, tilt: _Tilt) -> Distance | None:
+        stance = replace(self.prepared.question.stance, body=self._body(shift, tilt))
+        return body_clearance(scene_of(stance, self.prepared.batch.hands))
 
     def _reaches(self, tilt: _Tilt) -> tuple[Array, Array]:
         """Return balls in which a shift keeps hands in reach: centres (n, 3), radii (n,)."""
@@ -278,6 +307,8 @@ class BodySearch:
 
     def _change(self, shift: Array, tilt: _Tilt) -> Change:
         stance = self.prepared.question.stance
+        if np.linalg.norm(shift) < LEAST:
+            shift = np.zeros(3)
         body = self._body(shift, tilt)
         changes: dict[str, Any] = {"stance.body": pose_message(body)}
         if stance.joints is not None:
@@ -288,9 +319,11 @@ class BodySearch:
     def _words(self, shift: Array, tilt: _Tilt) -> Iterator[str]:
         along = self.prepared.question.stance.body.rotation @ shift
         told = ", ".join(f"{value:z.3f}" for value in along)
-        yield f"shift the body by [{told}] m in W"
+        if shift.any():
+            yield f"shift the body by [{told}] m in W"
         if tilt.angle:
+            whom = "it" if shift.any() else "the body"
             yield (
-                f"tilt it by {math.degrees(tilt.angle):.1f}° about its {AXES[tilt.axis]} axis "
+                f"tilt {whom} by {math.degrees(tilt.angle):.1f}° about its {AXES[tilt.axis]} axis "
                 "through its centre of mass"
             )

@@ -52,10 +52,23 @@ def combined(changes: Sequence[Change]) -> Change | None:
     """Return several changes as one; None of none, or where they say different things."""
     if not changes:
         return None
-    whole: Change | None = changes[0]
-    for each in changes[1:]:
+    free = [each for each in changes if each.kind == "free_hand"]
+    new = [_further(each, k) for k, each in enumerate(free)]
+    first, *others = [*(each for each in changes if each.kind != "free_hand"), *new]
+    whole: Change | None = first
+    for each in others:
         whole = None if whole is None else joined(whole, each)
     return whole if whole is None or len(changes) < 3 else whole._replace(kind="combination")
+
+
+def _further(change: Change, count: int) -> Change:
+    """Return a new hand as the one after so many others that are new."""
+    hands = [HAND_PATH.fullmatch(path) for path in change.changes]
+    moved = [
+        path if hand is None else hand_path(int(hand[1]) + count, hand[2])
+        for path, hand in zip(change.changes, hands, strict=True)
+    ]
+    return change._replace(changes=dict(zip(moved, change.changes.values(), strict=True)))
 
 
 def pose_message(pose: Pose) -> dict[str, list[float]]:

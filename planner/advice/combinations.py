@@ -38,8 +38,8 @@ __all__ = ["Choice", "CombinationSearch", "Known"]
 
 Mask = npt.NDArray[np.bool_]
 
-CLOSE: Final = 1e-9
-"""Less than that is no better."""
+DIGITS: Final = 6
+"""Of what choices are worth: what rounding errors add decides nothing."""
 
 ENOUGH: Final = 1.5
 """Part of what is needed beyond which a choice is no better."""
@@ -55,6 +55,9 @@ HOPELESS: Final = 0.97
 
 NEW: Final = ("free_hand", "new_hold")
 """Kinds with a hand elsewhere."""
+
+FORBIDDEN: Final = 200
+"""Choices that cannot be, after which a search ends."""
 
 SMALLER: Final = 12
 """Plans for smaller changes, once some hold."""
@@ -144,8 +147,8 @@ class Known(NamedTuple):
         """Return what choices are worth, by what they give in all directions (k, …), and size."""
         part = given.min(axis=0)
         if self.smallest:
-            return np.where(part >= 1.0, -SIZE * sizes, part - FAR)
-        return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes)
+            return np.where(part >= 1.0, -SIZE * sizes, part - FAR).round(DIGITS)
+        return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes).round(DIGITS)
 
     def _best(self, slot: Indices, given: Array) -> Indices:
         """Return the variants of a limb that are worth most by themselves, `FEW` at most."""
@@ -182,7 +185,7 @@ class Known(NamedTuple):
                 a, b = np.unravel_index(int(worth.argmax()), worth.shape)
                 if worth[a, b] > best:
                     hands[i], hands[j], best = int(first[a]), int(second[b]), float(worth[a, b])
-            if best <= before + CLOSE:
+            if best <= before:
                 return best, Choice(tuple(hands), shift)
 
 
@@ -232,7 +235,7 @@ class CombinationSearch:
             What holds.
         """
         as_it_is = Choice(tuple(int(slot[self._sizes[slot].argmin()]) for slot in self._slots), 0)
-        seen = [as_it_is]
+        seen, forbidden = [as_it_is], 0
         while self._rows and self.trials.left > last:
             known = self.known(smallest=smallest)
             starts = {as_it_is, seen[-1], *self.anywhere(known)}
@@ -249,8 +252,11 @@ class CombinationSearch:
             seen.append(choice)
             change = self.change(choice)
             trial = None if change is None else self.trials.one(change)
-            if trial is None:
+            if trial is None and forbidden < FORBIDDEN:
+                forbidden += 1
                 self._forbid(choice)
+            elif trial is None:
+                return None
             elif self.trials.holds(trial.utilisation):
                 return choice
             else:
@@ -291,6 +297,10 @@ class CombinationSearch:
 
     def _forbid(self, choice: Choice) -> None:
         """Leave out variants that cannot be, or pairs that do not go together; else the largest."""
+        moved = self._moved(choice.shift)
+        if moved is not None and not self.trials.possible(moved):
+            self._reached[:, choice.shift] = False
+            return
         alone = {i: each for i in choice.hands if (each := self._variants[i].change) is not None}
         gone = [i for i, each in alone.items() if not self.trials.possible(each)]
         apart = []
@@ -309,9 +319,12 @@ class CombinationSearch:
     def change(self, choice: Choice) -> Change | None:
         """Return all that is changed, as one."""
         changes = [each for i in choice.hands if (each := self._variants[i].change) is not None]
-        if self._body is not None and choice.shift:
-            changes.append(self._body.shifted(self._shifts[choice.shift]))
-        return combined(changes)
+        moved = self._moved(choice.shift)
+        return combined(changes if moved is None else [*changes, moved])
+
+    def _moved(self, shift: int) -> Change | None:
+        """Return a shift of the body, by its index, as a change."""
+        return self._body.shifted(self._shifts[shift]) if self._body is not None and shift else None
 
 
 def _variants(trials: Trials) -> Iterator[_Variant]:
@@ -319,11 +332,13 @@ def _variants(trials: Trials) -> Iterator[_Variant]:
     prepared = trials.base.prepared
     stance, limits = trials.question.stance, trials.question.limits
     wanted: list[tuple[str, Change | None, HandOnHold]] = []
-    for i, hand in enumerate(stance.hands):
+    # in an order that is not that of the question
+    for i in sorted(range(len(stance.hands)), key=lambda i: stance.hands[i].limb):
+        hand = stance.hands[i]
         wanted.append((hand.limb, None, hand))
         for change in variants(prepared, i):
             wanted.append((hand.limb, change, _hand(trials, change, i)))
-    for limb in stance.robot.limbs:
+    for limb in sorted(stance.robot.limbs):
         index = prepared.limbs.index(limb) if limb in prepared.limbs else len(stance.hands)
         for change in every_hold(trials, limb):
             wanted.append((limb, change, _hand(trials, change, index)))

@@ -85,7 +85,8 @@ class NewHold:
     @property
     def likes(self) -> list[int]:
         """Hands that it may be like."""
-        return [i for i in range(len(self.prepared.limbs)) if i != self.index]
+        limbs = self.prepared.limbs
+        return [i for i in sorted(range(len(limbs)), key=limbs.__getitem__) if i != self.index]
 
     def probe(self, turns: Sequence[float]) -> None:
         """Try it like each hand, turned from that, at the first place."""

@@ -16,15 +16,19 @@ from planner.advice.changes import Change, changed
 from planner.prepare import PreparedStance, prepare_stance, settle_each
 from planner.programs import SLACK, WRENCH_UNIT
 from planner.question import Objective, Question
+from planner.scene import body_clearance, scene_of
 from planner.solving import Trial, scene_findings, try_stance
 
-__all__ = ["PLANS", "TRIED", "WITHOUT", "Trials", "Tried", "direction"]
+__all__ = ["PLANS", "TRIED", "WITHOUT", "WORSE", "Trials", "Tried", "direction"]
 
 PLANS: Final = 100
 """That are made for the advice about a question."""
 
 WITHOUT: Final = ("mass", "strength")
 """Kinds that do not count as help, nor as part of a pair: the task becomes another."""
+
+WORSE: Final = 1e-3
+"""By how much what is odd may grow: metres, or without a unit."""
 
 TRIED: Final = "all changes were tried"
 """What a deadline came before."""
@@ -121,12 +125,15 @@ class Trials:
         return trial
 
     def _prepared(self, question: Question) -> PreparedStance | None:
-        """Return a question's stance; None if it cannot be, or would be warned of."""
+        """Return a question's stance; None if it cannot be, or would be odder than today's."""
         try:
             prepared = prepare_stance(question)
         except InvalidInputError:
             return None
-        return None if _odd(prepared) - self._odd else prepared
+        worse = any(
+            size > self._odd.get(kind, 0.0) + WORSE for kind, size in _odd(prepared).items()
+        )
+        return None if worse else prepared
 
     def turned(self, prepared: PreparedStance, wrench: Array) -> Trial:
         """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
@@ -168,6 +175,10 @@ def direction(trial: Trial) -> Array | None:
     return np.asarray((data.wrench - programs.body_wrench(data, nearest.loads))[:6] / WRENCH_UNIT)
 
 
-def _odd(prepared: PreparedStance) -> frozenset[str]:
-    """Return the kinds of what is odd about a stance."""
-    return frozenset(each.kind for each in scene_findings(prepared))
+def _odd(prepared: PreparedStance) -> dict[str, float]:
+    """Return how much of each kind is odd about a stance, and how deep its body is in rock [m]."""
+    nearest = body_clearance(scene_of(prepared.question.stance, prepared.batch.hands))
+    found = {} if nearest is None else {"clearance": max(-nearest.distance, 0.0)}
+    for each in scene_findings(prepared):
+        found[each.kind] = max(abs(each.value), found.get(each.kind, 0.0))
+    return found

@@ -13,7 +13,7 @@ from planner.robots import Robot
 from planner.scene.scene import Scene
 from planner.scene.solids import Solid, capsule_solids, distance_between, hand_solids, rock_solids
 
-__all__ = ["clearance", "link_findings"]
+__all__ = ["body_clearance", "clearance", "link_findings"]
 
 TOUCHING: Final = 0.02
 """How deep links may be in rock or in each other before that is odd: capsules are rough [m]."""
@@ -62,22 +62,29 @@ def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
     angles : mapping of str to ndarray, or None
         Of every limb [rad]; None where they are not known: then links are not measured.
     """
-    hands, rocks, body = hand_solids(scene), rock_solids(scene), _body(scene)
+    hands, body = hand_solids(scene), _body(scene)
     unchecked = [] if body else [NO_BODY]
     of_links: dict[str, Distance | None] = {}
     if angles is None:
         unchecked.append(NO_JOINTS)
     else:
         links = _links(scene, angles)
-        of_links["link_rock"] = _least(scene, _with_rock(scene, links[len(body) :], rocks))
+        of_links["link_rock"] = _least(
+            scene, _with_rock(scene, links[len(body) :], rock_solids(scene))
+        )
         of_links["link_link"] = _least(scene, _among_links(scene, links, hands))
     return Clearance(
         **of_links,
         hand_hand=_least(scene, _pairs(hands, hands, np.argwhere(np.tri(len(hands), k=-1)))),
         hand_body=_least(scene, _pairs(hands, body, _every(hands, body))),
-        body_rock=_least(scene, _with_rock(scene, body, rocks)),
+        body_rock=body_clearance(scene),
         unchecked=unchecked,
     )
+
+
+def body_clearance(scene: Scene) -> Distance | None:
+    """Return the body's least distance from rock; None where the robot's file has no capsules."""
+    return _least(scene, _with_rock(scene, _body(scene), rock_solids(scene)))
 
 
 def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, ...]:

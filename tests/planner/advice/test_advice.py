@@ -20,6 +20,7 @@ from planner.deadline import DeadlineError
 from planner.prepare import prepare_stance
 from planner.question import BodyRange, Load, Question
 from planner.result import Advice
+from planner.scene import clearance, scene_of
 from planner.solving import plan as planned, scene_findings, try_stance
 from service import answering
 from service.answering import advised, question
@@ -154,7 +155,31 @@ def test_no_place_of_a_grid_is_better_than_the_best_shift():
         off = [h.pose.rotation[:, 2] @ (h.pose.position - body.position) for h in stance.hands]
         if min(off) < 0.15 or max(stance.robot.stretches(body, limbs, poses)) > 1.0:
             continue
+        if clear_of_rock(replace(asked, stance=replace(stance, body=body))) < 0.0:
+            continue
         assert shifted(asked, shift) >= best * (1.0 - 5e-3)
+
+
+def clear_of_rock(asked) -> float:
+    prepared = prepare_stance(asked)
+    return clearance(scene_of(asked.stance, prepared.batch.hands), None).body_rock.distance
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1005, 1030, 1040, 1058, 1097])
+def test_no_advice_takes_the_body_into_rock_or_deeper_than_it_is(seed):
+    asked = requested(seed)
+    now = clear_of_rock(asked)
+    told, _ = advise(asked)
+    assert told
+    for each in told:
+        assert clear_of_rock(changed(asked, each.changes)) >= min(now, 0.0) - 1.1e-3
+
+
+def test_a_shift_that_is_told_is_one():
+    told, _ = advise(requested(1058))
+    assert told
+    assert not any("[0.000, 0.000, 0.000]" in each.sentence for each in told)
 
 
 def test_the_body_stays_in_the_range_that_is_given():

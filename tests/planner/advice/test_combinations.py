@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import pytest
+from msgspec import convert
 
 from planner.advice import advise, changed
 from planner.advice.combinations import CombinationSearch
 from planner.advice.trials import Trials
 from planner.solving import plan as planned
+from service import answering
+from service.answering import advised, question
+from service.requests import PlanRequest
+from tests.suite.helpers.random_requests import random_request
 from tests.suite.helpers.stances import random_question
 
 GIVEN, OWN = 119, 154
 """Seeds of a stance under a wrench that is given, and of one that is far overloaded by itself."""
+
+ALONE = 376
+"""Seed of a request with a single hand that all others help."""
 
 
 @pytest.mark.parametrize("seed", [GIVEN, OWN])
@@ -56,3 +64,21 @@ def test_a_stance_that_no_single_change_helps_is_told_some_that_hold_together(se
     there = planned(changed(asked, first.changes))
     assert there.utilisation == pytest.approx(first.utilisation, abs=1e-6)
     assert all(each.size >= first.size for each in told if each.holds)
+
+
+def test_hands_of_several_free_limbs_are_put_together():
+    message = convert(random_request(ALONE), PlanRequest)
+    asked = question(message)
+    (hand,) = asked.stance.hands
+    told, _ = advise(asked)
+    first = told[0]
+    assert first.holds
+    assert len(set(first.limbs) - {hand.limb}) > 1
+    there = changed(asked, first.changes)
+    assert [each.limb for each in there.stance.hands] == [
+        hand.limb,
+        *(each for each in first.limbs if each != hand.limb),
+    ]
+    assert planned(there).utilisation == pytest.approx(first.utilisation, abs=1e-6)
+    written = answering.plan(advised(message, first))
+    assert written.utilisation == pytest.approx(first.utilisation, abs=1e-6)
