@@ -84,7 +84,7 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     if isinstance(reply.clearance, Clearance):
         print_clearance(reply.clearance, out)
     print_advice(reply.advice or (), out, holding=reply.status == "optimal")
-    if reply.advice is not None and not reply.advice and "advice" not in reply.unfinished:
+    if reply.advice == [] and "advice" not in reply.unfinished:
         out.print("of all changes that were tried none would help")
     if reply.hands is not None:
         show(

@@ -201,6 +201,13 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
         assert line.startswith(f"{what}, utilisation {result(capfd)['utilisation']:.2f}: ")
 
 
+def test_nothing_is_said_of_changes_that_nobody_asked_for(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["plan", "wall-300"]) == DONE
+    assert "changes" not in capfd.readouterr().out
+
+
 def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
     stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
