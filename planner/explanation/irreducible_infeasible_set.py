@@ -197,6 +197,10 @@ class _Rows(NamedTuple):
         rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
         N, inverse = left[:, rank:].T, (across[:rank].T / sizes[:rank]) @ left[:, :rank].T
         missing, above = N @ self.right, N[:, BODY:]
+        if not len(N):  # on no equations SciPy's nnls may end the process
+            loads = inverse @ self.right
+            yield from ((place, loads) for place in places)
+            return
         for place in places:
             (freed,) = (self.whose == place).nonzero()
             try:

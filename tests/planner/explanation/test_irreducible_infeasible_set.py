@@ -7,8 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from scipy.optimize import linprog
+from scipy.optimize import linprog, nnls
 
+from planner.explanation import irreducible_infeasible_set
 from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.programs import UNLIMITED
@@ -68,6 +69,24 @@ def test_a_balance_that_no_loads_give_needs_no_barrier():
     parts = system([[1]], [1], ("a",))
     parts.wrench[3] = 1.0
     assert irreducible_set(parts, parts.constraints) == ()
+
+
+def test_rows_that_say_nothing_of_each_other_contradict_only_the_box(monkeypatch):
+    """z1 + z2 is to be half as much again as the box allows, with z2 ≤ 0; five other loads are 0.
+
+    Of SciPy's nnls, some versions of which write beyond their memory then, nothing is asked.
+    """
+
+    def with_equations(A, b):
+        assert A.size
+        return nnls(A, b)
+
+    monkeypatch.setattr(irreducible_infeasible_set, "nnls", with_equations)
+    parts = system([[0, 1, 0, 0, 0, 0, 0]], [0], ("low",), goal=1.5 * UNLIMITED)
+    parts.G[:] = np.delete(np.eye(7), 1, axis=0)
+    parts.G[0, 1] = 1.0
+    assert np.linalg.matrix_rank(np.vstack([parts.G, parts.H])) == 7
+    assert irreducible_set(parts, parts.constraints) == named("low")
 
 
 def test_where_there_are_loads_there_is_no_set():
