@@ -24,7 +24,11 @@ from planner.explanation.infeasibility import (
     HardRowSystem,
     ranked,
 )
-from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
+from planner.explanation.irreducible_infeasible_set import (
+    balance_alone,
+    irreducible_set,
+    sufficient_alone,
+)
 from planner.prepare import FORCE_CAP, TENSION_CHANGE
 from planner.programs import JOINT_TORQUE, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Limits
@@ -81,7 +85,8 @@ def certify(
         Of the program without a plan. Where the nearest loads are too near to prove it, or the time
         is over, its multipliers are the proof.
     explain : bool, optional
-        Whether the irreducible set is sought, too, and what of it would do alone.
+        Whether the irreducible set is sought, too, and what of it would do alone. Else only that
+        it is empty is told.
 
     Returns
     -------
@@ -108,7 +113,10 @@ def certify(
         return None
     direction, multipliers = found
     weights = system.weights(direction, multipliers)
-    irreducible = irreducible_set(system, weights) if explain else None
+    if explain:
+        irreducible = irreducible_set(system, weights)
+    else:
+        irreducible = () if balance_alone(system) else None
     if irreducible is not None:
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(

@@ -22,7 +22,7 @@ from planner.explanation.infeasibility import BODY, WEIGHS, Chosen, HardRowSyste
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
-__all__ = ["irreducible_set", "sufficient_alone"]
+__all__ = ["balance_alone", "irreducible_set", "sufficient_alone"]
 
 BROKEN: Final = 1e-7
 """Rows that must be broken by more than this have no loads, in the program's units."""
@@ -35,6 +35,12 @@ MOST: Final = 24
 
 RANK: Final = 1e-4
 """Relative size below which singular values of rows are none: loads would be beyond the box."""
+
+
+def balance_alone(system: HardRowSystem) -> bool:
+    """Whether the balance alone has no loads, so that the irreducible set is empty."""
+    found = system.least_violation(())
+    return found is not None and found.gain > BROKEN and _prove_alone(system, found, ())
 
 
 def irreducible_set(

@@ -38,6 +38,19 @@ def test_all_but_the_certificate_is_the_same(status):
         assert answer.reason.startswith(alone.reason), label
 
 
+def test_that_hands_have_no_loads_at_all_is_told_without_an_explanation_too():
+    seen = []
+    for label, question, answer in explained("infeasible", FEW):
+        alone = plan(replace(question, explain=False))
+        none_at_all = answer.certificate.irreducible == ()
+        assert ("no loads at all" in alone.reason) == none_at_all, label
+        if none_at_all:
+            assert alone.reason == answer.reason, label
+        seen.append(none_at_all)
+    assert any(seen)
+    assert not all(seen)
+
+
 def test_it_is_not_sought_what_is_not_told(infeasible, monkeypatch):
     def sought(*_):
         raise AssertionError("sought")
