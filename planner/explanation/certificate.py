@@ -45,6 +45,9 @@ CLOSE: Final = 0.1
 CONTRADICTS: Final = 1e-7
 """Rows of a hand that must be broken by more than this contradict each other."""
 
+FINEST: Final = 1e-3
+"""Least unit of what is gained: in a smaller one the box costs more than solvers have digits for."""
+
 DISTANT: Final = 1e-9
 """Distance to the nearest body wrench below which there is nothing to prove."""
 
@@ -264,7 +267,7 @@ def _polished(system: HardRowSystem, missing: Array) -> tuple[Array, Array]:
     """
     length = float(np.linalg.norm(missing))
     if length > DISTANT:
-        found = system.program.near(missing[:BODY] / length, CLOSE * length, length)
+        found = system.program.near(missing[:BODY] / length, CLOSE * length, max(length, FINEST))
         if found is not None:
             size = float(np.linalg.norm(found.direction[:BODY]))
             if size >= BLOCKING:

@@ -36,23 +36,26 @@ def look_again(
     data = found.sets.data
     nearest = programs.nearest(data)
     far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
-    if not nearest.solved or nearest.value > far:
-        if given_wrench(prepared) or not prove:
+    missed = found
+    if nearest.solved and nearest.value <= far:
+        if found.outcome.solved or prepared.hands.floating:
             return found, None
-        given = len(data.wrench) > len(prepared.wrench)
-        proof = _certify(prepared, found, None, None if given else nearest)
-        if proof is not None:
-            found = found._replace(outcome=replace(found.outcome, solved=False))
-            found = found.late(*unexplained(prepared, proof))
-        return found, proof
-    if found.outcome.solved or prepared.hands.floating:
-        return found, None
-    # rounding put the wrench a hair outside: plan for the nearest that can be had
-    inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
-    again = solve_in_two(prepared, checks, inside).late(*found.unfinished)
-    if prepared.question.objective == "min_effort":
-        again = solve_effort(prepared, checks, again, budget)
-    return again, None
+        # rounding put the wrench a hair outside: plan for the nearest that can be had
+        inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
+        missed = solve_in_two(prepared, checks, inside).late(*found.unfinished)
+        if not missed.wrong:
+            if prepared.question.objective == "min_effort":
+                missed = solve_effort(prepared, checks, missed, budget)
+            return missed, None
+        # of next to no wrench a hair is more than rounding
+    if given_wrench(prepared) or not prove:
+        return missed, None
+    given = len(data.wrench) > len(prepared.wrench)
+    proof = _certify(prepared, found, None, None if given else nearest)
+    if proof is None:
+        return missed, None
+    found = found._replace(outcome=replace(found.outcome, solved=False))
+    return found.late(*unexplained(prepared, proof)), proof
 
 
 def given_wrench(prepared: PreparedStance) -> bool:

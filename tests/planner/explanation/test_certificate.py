@@ -127,13 +127,25 @@ def test_the_reason_says_what_is_missing():
 
 @pytest.mark.parametrize(
     ("seed", "times", "status"),
-    [(5117, 0.9, "infeasible"), (5071, 1.0001, "overloaded")],
-    ids=["mN off what one hand can give", "a little over its limits"],
+    [
+        (5117, 0.9, "infeasible"),
+        (5071, 1.0001, "overloaded"),
+        (5013, 1.0001, "overloaded"),
+        (5020, 1.00001, "overloaded"),
+        (5284, 1.00001, "infeasible"),
+    ],
+    ids=[
+        "mN off what one hand can give",
+        "a little over its limits",
+        "a little over those of a weak hand",
+        "a hair over those of two hands",
+        "a hair off, of next to no wrench",
+    ],
 )
 def test_what_is_next_to_what_can_be_had_has_its_proof_too(seed, times, status):
-    """The way to the nearest loads is too short then for a direction; multipliers have one."""
+    """The way to the nearest loads is short then: what proves has a unit of its own."""
     asked = random_question(seed, "load_factor")
-    needed = times * plan(asked).load_factor * asked.body_wrench
+    needed = times * plan(asked).load_factor * asked.needed_wrench()
     answer = plan(replace(asked, body_wrench=needed))
     assert answer.status == status
     assert answer.verified
