@@ -38,7 +38,7 @@ def look_again(
     far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
     missed = found
     if nearest.solved and nearest.value <= far:
-        if found.outcome.solved or prepared.hands.floating:
+        if prepared.hands.floating:
             return found, None
         # rounding put the wrench a hair outside: plan for the nearest that can be had
         inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))

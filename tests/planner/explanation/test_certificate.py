@@ -151,3 +151,12 @@ def test_what_is_next_to_what_can_be_had_has_its_proof_too(seed, times, status):
     assert answer.verified
     assert answer.certificate is not None
     assert answer.certificate.supremum < answer.certificate.needed
+
+
+def test_a_plan_that_the_checks_refuse_by_a_hair_is_sought_next_to_what_is_needed():
+    """Solvers call a few μN off balance solved; of next to no wrench that is too much."""
+    asked = random_question(6006, "load_factor")
+    needed = (1.0 + 3e-6) * plan(asked).load_factor * asked.needed_wrench()
+    answer = plan(replace(asked, body_wrench=needed))
+    assert answer.status == "optimal"
+    assert np.linalg.norm(answer.residual) <= 1e-6
