@@ -14,7 +14,14 @@ from planner.solving import dual_bounds
 from planner.solving.prepared_checks import PreparedChecks, Reading, read_loads
 from planner.solving.unique_plan import is_least, least_utilisation
 
-__all__ = ["Solution", "not_least", "solve_effort", "solve_in_two", "solve_question"]
+__all__ = [
+    "Solution",
+    "not_least",
+    "solve_at_vertex",
+    "solve_effort",
+    "solve_in_two",
+    "solve_question",
+]
 
 
 class Solution(NamedTuple):
@@ -131,14 +138,21 @@ def solve_in_two(prepared: PreparedStance, checks: Overlap[PreparedChecks], sets
     found = Solution(sets, outcome, cap)
     if not outcome.solved:
         return found
-    ready = checks.result()
-    found = _tie_broken(prepared, ready, found)
-    if not found.wrong or deadline.expired():
+    found = _tie_broken(prepared, checks.result(), found)
+    if deadline.expired() or not (found.wrong or not_least(found)):
         return found
-    outcome = programs.vertex(sets.data)
-    if not outcome.solved:
+    exact = solve_at_vertex(prepared, checks, sets)
+    return exact if exact.outcome.solved else found
+
+
+def solve_at_vertex(
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], sets: Sets
+) -> Solution:
+    """Return a plan of least utilisation where as many rows meet as there are loads."""
+    found = Solution(sets, programs.vertex(sets.data), prepared.question.limits.utilisation)
+    if not found.outcome.solved:
         return found
-    return Solution(sets, outcome, cap, read_loads(prepared, ready, sets, outcome.loads))
+    return found._replace(reading=read_loads(prepared, checks.result(), sets, found.outcome.loads))
 
 
 def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:

@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from planner import programs
+from planner import deadline, programs
 from planner.deadline import Budget, Overlap, Unfinished, late
 from planner.explanation import LimitUse, certify, certify_idle
 from planner.prepare import PreparedStance
 from planner.programs import SLACK, Outcome
 from planner.result import Certificate
 from planner.solving.prepared_checks import PreparedChecks
-from planner.solving.solution import Solution, solve_effort, solve_in_two
+from planner.solving.solution import Solution, solve_at_vertex, solve_effort, solve_in_two
 
 __all__ = ["given_wrench", "look_again", "overload", "unexplained"]
 
@@ -42,7 +42,10 @@ def look_again(
             return found, None
         # rounding put the wrench a hair outside: plan for the nearest that can be had
         inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
-        missed = solve_in_two(prepared, checks, inside).late(*found.unfinished)
+        missed = solve_in_two(prepared, checks, inside)
+        if not (missed.outcome.solved or deadline.expired()):
+            missed = solve_at_vertex(prepared, checks, inside)
+        missed = missed.late(*found.unfinished)
         if not missed.wrong:
             if prepared.question.objective == "min_effort":
                 missed = solve_effort(prepared, checks, missed, budget)

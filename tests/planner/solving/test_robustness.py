@@ -77,6 +77,20 @@ def surface(shear_limit: float) -> Surface:
     return Surface.from_values({"shear_limit": shear_limit})
 
 
+def weak_and_strong():
+    """Two hands on a wide cylinder, tiles of one a millinewton strong, of the other 30 N."""
+    stance = on_wall(
+        Cylinder(1.68),
+        surface(30.0),
+        limbs=("front_left", "rear_right"),
+        outer_rotation=2.76,
+        closing_tension=1.8,
+        palm=False,
+    )
+    weak = replace(stance.hands[0], surface=surface(1e-3))
+    return replace(stance, hands=(weak, stance.hands[1]))
+
+
 ANSWERED = {
     # stance or question: the statuses that are right
     "no rock within reach": (with_all(hold_in_hand=FAR), "infeasible"),
@@ -110,6 +124,24 @@ ANSWERED = {
         "optimal",
     ),
     "ten thousand tonnes": (ask(on_wall(), load=Load(mass=1e7)), "overloaded"),
+    "a hundred tonnes on tiles of a millinewton": (
+        ask(
+            on_wall(
+                Cylinder(0.12),
+                surface(1e-3),
+                overhang=0.5,
+                limbs=("front_left", "rear_left"),
+                outer_rotation=2.76,
+                closing_tension=34.7,
+            ),
+            load=Load(mass=1e5),
+        ),
+        "overloaded",
+    ),
+    "a hundred tonnes on a weak and a strong hand": (
+        ask(weak_and_strong(), load=Load(mass=1e5)),
+        "overloaded",
+    ),
     "far from the origin of the world": (
         moved(on_wall(), Pose(np.array([1e6, -1e6, 1e6]), np.eye(3))),
         "optimal",
