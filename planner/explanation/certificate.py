@@ -46,7 +46,7 @@ CONTRADICTS: Final = 1e-7
 """Rows of a hand that must be broken by more than this contradict each other."""
 
 FINEST: Final = 1e-3
-"""Least unit of what is gained: in a smaller one the box costs more than solvers have digits for."""
+"""Least unit of what is gained: in smaller ones the box costs more than solvers have digits for."""
 
 DISTANT: Final = 1e-9
 """Distance to the nearest body wrench below which there is nothing to prove."""

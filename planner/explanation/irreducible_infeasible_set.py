@@ -72,7 +72,7 @@ def irreducible_set(
 def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...] | None:
     """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
-    needed = _needed(system, proof, kept)
+    needed = _needed(system, kept, proof.multipliers > WEIGHS, kept)
     for name in reversed(ranked(kept)):
         if name not in kept or name in needed:
             continue
@@ -83,7 +83,7 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
         if trial.gain > BROKEN:
             proof = trial
             kept = system.weights(proof.direction, proof.multipliers)
-        elif trial.gain > KEPT:
+        elif trial.gain > KEPT and not _needed(system, kept, np.ones_like(system.h, bool), [name]):
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
 
@@ -143,21 +143,18 @@ def _prove_alone(system: HardRowSystem, proof: Multipliers, kept: Collection[Lim
 
 
 def _needed(
-    system: HardRowSystem, proof: Multipliers, kept: Collection[LimitName]
+    system: HardRowSystem, kept: Collection[LimitName], counted: Chosen, names: Iterable[LimitName]
 ) -> set[LimitName]:
-    """Return constraints without which the others kept have loads, as far as guesses show that.
+    """Return those of some names without which the others kept have loads, as guesses show that.
 
-    Guessed are loads that keep to what the proof weighs of the others, then to all their rows.
+    Guessed are loads that keep to the hard rows that are counted, shape (n,); they count if they
+    keep to all rows of the others.
     """
-    places = {system.constraints.index(name): name for name in kept}
+    places = {system.constraints.index(name): name for name in names}
     _, mine = system.rows_of(kept)
     whole = _Rows.of(system, kept, mine)
-    found: set[LimitName] = set()
-    for rows in (mine & (proof.multipliers > WEIGHS), mine):
-        left = [place for place, name in places.items() if name not in found]
-        guesses = _Rows.of(system, kept, rows).loads_without(left)
-        found.update(places[place] for place, loads in guesses if whole.hold(loads, place))
-    return found
+    guesses = _Rows.of(system, kept, mine & counted).loads_without(places)
+    return {places[place] for place, loads in guesses if whole.hold(loads, place)}
 
 
 class _Rows(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,8 +15,10 @@ from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.programs import UNLIMITED
 from planner.result import LimitName
+from planner.solving import plan
 from tests.suite.helpers.named_rows import have_loads, named_rows
 from tests.suite.helpers.random_questions import explained, few_and_all
+from tests.suite.helpers.stances import random_question
 
 LIMB = "front_left"
 
@@ -198,6 +201,18 @@ def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_
             assert have_loads(parts, others), f"{label}: {name} is not needed"
     sizes = [len(answer.certificate.irreducible) for _, _, answer in explained(status, seeds)]
     assert max(sizes) > 3
+
+
+@pytest.mark.parametrize("seed", [7028, 7103])
+def test_what_programs_leave_undecided_is_guessed_at(seed):
+    asked = random_question(seed, "load_factor")
+    question = replace(asked, body_wrench=2.0 * plan(asked).load_factor * asked.needed_wrench())
+    found = plan(question).certificate.irreducible
+    assert found
+    parts = named_rows(question, 1.0)
+    assert not have_loads(parts, found)
+    for name in found:
+        assert have_loads(parts, [other for other in found if other != name]), name
 
 
 @pytest.mark.parametrize("status", ["infeasible", "overloaded"])
