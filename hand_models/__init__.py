@@ -5,6 +5,5 @@ hold + hand parameters → settled finger (q, c) → tile loads as affine maps o
 """
 
 import lazy_loader
-import numpy.typing  # noqa: F401 - whole, before threads load rooms that each ask for parts of it
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

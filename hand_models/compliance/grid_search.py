@@ -14,10 +14,8 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull, QhullError
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
 from hand_models.compliance.grasp import CompliantGrasp
@@ -76,7 +74,7 @@ class WristSearch:
     limiting: tuple[Row | None, ...]
 
     @cached_property
-    def hull(self) -> ConvexHull:
+    def hull(self) -> scipy.spatial.ConvexHull:
         """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
 
         Raises
@@ -86,8 +84,8 @@ class WristSearch:
         """
         components = _components(self.poses.shape[1])
         try:
-            return ConvexHull(self.wrenches[:, components] * SCALE[components])
-        except QhullError:
+            return scipy.spatial.ConvexHull(self.wrenches[:, components] * SCALE[components])
+        except scipy.spatial.QhullError:
             raise EmptySetError(
                 f"the {len(self.wrenches)} wrenches found span no volume: try more poses per axis"
             ) from None
@@ -154,8 +152,8 @@ def _extremes(points: Array, directions: Array | None) -> Indices:
     if directions is not None and len(points):
         return np.unique([int((points @ d).argmax()) for d in directions]).astype(np.intp)
     if len(points) > points.shape[1]:
-        with contextlib.suppress(QhullError):
-            return np.asarray(ConvexHull(points).vertices, dtype=np.intp)
+        with contextlib.suppress(scipy.spatial.QhullError):
+            return np.asarray(scipy.spatial.ConvexHull(points).vertices, dtype=np.intp)
     return np.arange(len(points))
 
 
@@ -229,6 +227,6 @@ def _pushed(grasp: CompliantGrasp, box: SearchBox, t: Array, tried: int, held: i
 
 def _sphere(n: int, d: int) -> Array:
     """Return n unit vectors in d dimensions, evenly spread and always the same."""
-    uniform = qmc.Halton(d, scramble=False).random(n + 1)[1:]
-    normal = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
+    uniform = scipy.stats.qmc.Halton(d, scramble=False).random(n + 1)[1:]
+    normal = scipy.special.ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))

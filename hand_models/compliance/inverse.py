@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from hand_models.base import Array, finite_vector
 from hand_models.compliance.compliant_hand import CompliantHand
@@ -117,7 +117,7 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | 
 
     at = first
     if np.abs(residual(first / units)).max() > TOLERANCE:
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             residual,
             first / units,
             jacobian,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy.optimize import brentq, linprog
+import scipy
 
 from hand_models.base import Array, EmptySetError, Indices, SolverError
 from hand_models.compliance import (
@@ -155,7 +155,7 @@ def limit(points: Array, measure: Measure) -> Limit:
     goal = np.array(GOALS[measure])
     ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
     planes = np.array([[1.0, 0.0, -ratio]] if measure == "shear" else np.zeros((0, 3)))
-    result = linprog(
+    result = scipy.optimize.linprog(
         -points @ goal,
         A_eq=np.vstack([planes @ points.T, np.ones(len(points))]),
         b_eq=np.append(np.zeros(len(planes)), 1.0),
@@ -266,5 +266,5 @@ def unloaded_pose(grasp: Gripper) -> Array | None:
     lost = np.flatnonzero(~np.isfinite(pushes))
     if not len(crossed) or (len(lost) and lost[0] <= crossed[0]):
         return None
-    root = brentq(push, way[crossed[0]], way[crossed[0] + 1])
+    root = scipy.optimize.brentq(push, way[crossed[0]], way[crossed[0] + 1])
     return np.array([0.0, float(root), 0.0])

@@ -6,8 +6,8 @@ import math
 from typing import Final, Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose, finite_vector
 from hand_models.fixed_wrist.seat_search import BEST, PULL_OFF, best_seats
@@ -68,7 +68,9 @@ def approach_frame(
         )
     y = across / np.linalg.norm(across)
     axes = np.column_stack([np.cross(y, z), y, z])
-    turn = Rotation.from_rotvec([0.0, 0.0, math.remainder(wrist_angle, math.tau)]).as_matrix()
+    turn = scipy.spatial.transform.Rotation.from_rotvec(
+        [0.0, 0.0, math.remainder(wrist_angle, math.tau)]
+    ).as_matrix()
     return Pose(finite_vector(point, 3, "point"), axes @ turn)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on
 from hand_models.fixed_wrist.space import wrench_spaces
@@ -134,7 +134,10 @@ def scattered_hands(
                 each.hold,
                 each.surface,
                 each.grasp,
-                Pose(position * by[:3], Rotation.from_rotvec(angle * by[3:]).as_matrix()).inverse()
+                Pose(
+                    position * by[:3],
+                    scipy.spatial.transform.Rotation.from_rotvec(angle * by[3:]).as_matrix(),
+                ).inverse()
                 @ each.seating.pose,
             )
             for one in drawn[start : start + step]

@@ -19,8 +19,8 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from hand_models.base import (
     Array,
@@ -65,8 +65,10 @@ class _Move(NamedTuple):
     def of(self, hand: SpinyHand) -> Pose:
         """Return the frame of a hand that has moved, in that where it was seated."""
         about = [hand.seat_tilt * self.tilt[0], hand.seat_tilt * self.tilt[1]]
-        tilted = Rotation.from_rotvec([*about, 0.0])
-        turned = Rotation.from_rotvec([0.0, 0.0, hand.seat_turn * self.turn])
+        tilted = scipy.spatial.transform.Rotation.from_rotvec([*about, 0.0])
+        turned = scipy.spatial.transform.Rotation.from_rotvec(
+            [0.0, 0.0, hand.seat_turn * self.turn]
+        )
         position = np.array([0.0, 0.0, -hand.back_off * self.off])
         return Pose(position, (turned * tilted).as_matrix())
 

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hand_models.base import Array, EmptySetError
 from hand_models.fixed_wrist.space import wrench_space
@@ -137,4 +137,6 @@ def _tile_tension_limit(settled: SettledHand, t: int) -> float:
     else:
         first = beyond[0]
     low, high = tensions[first - 1], tensions[first]
-    return float(brentq(lambda f: float(excess(np.array([f]))[0]), low, high, xtol=1e-12))
+    return float(
+        scipy.optimize.brentq(lambda f: float(excess(np.array([f]))[0]), low, high, xtol=1e-12)
+    )

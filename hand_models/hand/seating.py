@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hand_models.base import Array, Pose
 from hand_models.hand.grasp import Grasp
@@ -206,7 +206,7 @@ def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
     if not len(turns):
         return None
     first = int(turns[0])
-    root = brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
+    root = scipy.optimize.brentq(miss, float(angles[first]), float(angles[first + 1]), xtol=1e-13)
     return place(float(root))
 
 

@@ -20,7 +20,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from hand_models.base import Array, InvalidInputError, within
 from hand_models.parameters.own import own_hand, own_surfaces
@@ -273,9 +273,9 @@ def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable
             strength, source = tile * (least + (most - least) * u), "ranges.rock_ratio"
         else:
             scatter = table.scalar(name, "scatter_ratio")
-            cut = ndtr((floor - 1.0) / scatter)
+            cut = scipy.special.ndtr((floor - 1.0) / scatter)
             strength = table.scalar(name, "shear_limit") * (
-                1.0 + scatter * float(ndtri(cut + (1.0 - cut) * u))
+                1.0 + scatter * float(scipy.special.ndtri(cut + (1.0 - cut) * u))
             )
             source = "scatter_ratio"
         found.setdefault(name, {})["shear_limit"] = Quantity(

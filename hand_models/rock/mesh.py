@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
@@ -53,6 +52,8 @@ def read_mesh(path: Path) -> tuple[Array, Indices]:
     InvalidInputError
         If it cannot be read, or has no triangles; the field is ``file``.
     """
+    import trimesh
+
     if path.suffix.lower() not in ENDINGS:
         raise InvalidInputError(f"{path}: a mesh file ends in {', '.join(ENDINGS)}", field="file")
     try:

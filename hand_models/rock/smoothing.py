@@ -23,10 +23,8 @@ from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
-from scipy.signal import savgol_coeffs
-from scipy.spatial import cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
@@ -141,7 +139,9 @@ def _fitted(curve: Array, part: int, closed: bool) -> Array:
     This is `scipy.signal.savgol_filter`, which works its weights out anew each time.
     """
     weights = _weights(part)
-    fitted = correlate1d(curve, weights[part], axis=0, mode="wrap" if closed else "nearest")
+    fitted = scipy.ndimage.correlate1d(
+        curve, weights[part], axis=0, mode="wrap" if closed else "nearest"
+    )
     if not closed and part:
         fitted[:part] = weights[:part] @ curve[: 2 * part + 1]
         fitted[-part:] = weights[part + 1 :] @ curve[-2 * part - 1 :]
@@ -153,7 +153,10 @@ def _weights(part: int) -> Array:
     """Return the weights of 2 part + 1 points with which a parabola is fitted at each of them."""
     length = 2 * part + 1
     return np.array(
-        [savgol_coeffs(length, min(2, 2 * part), pos=i, use="dot") for i in range(length)]
+        [
+            scipy.signal.savgol_coeffs(length, min(2, 2 * part), pos=i, use="dot")
+            for i in range(length)
+        ]
     )
 
 
@@ -162,16 +165,16 @@ def _raised(curve: Array, raw: Array, half: int, closed: bool) -> Array:
     mode: Literal["wrap", "nearest"] = "wrap" if closed else "nearest"
     for _ in range(RAISES):
         outward = _outward(curve, closed)
-        nearest: Indices = np.asarray(cKDTree(curve).query(raw)[1], dtype=np.intp)
+        nearest: Indices = np.asarray(scipy.spatial.cKDTree(curve).query(raw)[1], dtype=np.intp)
         excess = np.zeros(len(curve))
         out = np.einsum("ij,ij->i", raw - curve[nearest], outward[nearest])
         np.maximum.at(excess, nearest, out)
         if excess.max() <= STANDS_OUT:
             break
-        rise = maximum_filter1d(excess, 2 * half + 1, mode=mode)
+        rise = scipy.ndimage.maximum_filter1d(excess, 2 * half + 1, mode=mode)
         # two moving means whose widths add up to that of the maximum leave no point below it
         for size in (2 * (half // 2) + 1, 2 * (half - half // 2) + 1):
-            rise = uniform_filter1d(rise, size, mode=mode)
+            rise = scipy.ndimage.uniform_filter1d(rise, size, mode=mode)
         curve = curve + rise[:, None] * outward
     return curve
 

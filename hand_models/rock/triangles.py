@@ -11,11 +11,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import trimesh
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError
 
@@ -49,6 +46,8 @@ def edges_of(faces: Indices) -> Indices:
 
 def weld(triangles: Triangles) -> Triangles:
     """Return triangles that share vertices where these coincide, without those of no area."""
+    import trimesh
+
     mesh = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
     mesh.merge_vertices()
     mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
@@ -79,8 +78,8 @@ def wound_alike(triangles: Triangles) -> Triangles:
     turned = np.where(alike, 0, count)
     rows = np.concatenate([first, first + count])
     columns = np.concatenate([second + turned, second + count - turned])
-    graph = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
-    _, part = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
+    _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     as_is, over = part[:count], part[count:]
     if (as_is == over).any():
         raise InvalidInputError("the surface has only one side", field="faces")
@@ -123,7 +122,7 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     vertices, faces = triangles
     count = len(vertices)
     ends = edges_of(faces)
-    used = sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
+    used = scipy.sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
     used = used + used.T
     border = np.zeros(count, dtype=bool)
     border[used.tocoo().row[used.tocoo().data == 1.0]] = True
@@ -145,8 +144,8 @@ def borders(triangles: Triangles, gap: float) -> Array:
     ends, count = edges_of(faces), len(vertices)
     names, number = np.unique(_edge_names(ends[:, 0], ends[:, 1], count), return_counts=True)
     edges = np.column_stack(np.divmod(names[number == 1], count))
-    graph = sparse.coo_matrix((np.ones(len(edges)), edges.T), shape=(count, count))
-    _, part = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_matrix((np.ones(len(edges)), edges.T), shape=(count, count))
+    _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     low, high = np.full((2, part.max() + 1, 3), np.inf) * np.array([1.0, -1.0])[:, None, None]
     np.minimum.at(low, part, vertices)
     np.maximum.at(high, part, vertices)
@@ -254,7 +253,9 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
     if not pieces:
         return closed
     begins, ends = np.array([p[0] for p in pieces]), np.array([p[-1] for p in pieces])
-    near = cKDTree(ends).sparse_distance_matrix(cKDTree(begins), gap, output_type="ndarray")
+    near = scipy.spatial.cKDTree(ends).sparse_distance_matrix(
+        scipy.spatial.cKDTree(begins), gap, output_type="ndarray"
+    )
     after = np.full(len(pieces), -1)
     led = np.zeros(len(pieces), dtype=bool)
     for pair in near[np.argsort(near["v"], kind="stable")]:

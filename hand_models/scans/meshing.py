@@ -12,10 +12,8 @@ import math
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, Progress
 from hand_models.parameters import scan_table
@@ -85,8 +83,8 @@ def mesh_scan(
     tell(1, STEPS)
     _check_spread(points)
     try:
-        flat = Delaunay(points[:, :2])
-    except QhullError as error:
+        flat = scipy.spatial.Delaunay(points[:, :2])
+    except scipy.spatial.QhullError as error:
         raise InvalidInputError(
             f"no triangles: {str(error).splitlines()[0]}", field="file"
         ) from None
@@ -158,7 +156,7 @@ def _spacing(points: Array) -> float:
     """Return the median distance of a point to the nearest one across the view [m]."""
     across = np.unique(points[:, :2], axis=0)
     some = across[:: max(1, len(across) // SAMPLE)]
-    distance = np.asarray(cKDTree(across).query(some, k=2)[0])
+    distance = np.asarray(scipy.spatial.cKDTree(across).query(some, k=2)[0])
     return float(np.median(distance[:, 1]))
 
 
@@ -205,8 +203,10 @@ def _holes(
     """Return width and middle of each hole that the outline does not reach, the widest first."""
     count = len(triangles)
     rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
-    graph = sparse.coo_matrix((np.ones(len(rows)), (rows, beside[rows, side])), (count, count))
-    number, part = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_matrix(
+        (np.ones(len(rows)), (rows, beside[rows, side])), (count, count)
+    )
+    number, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     outside = np.zeros(number, dtype=bool)
     outside[part[(beside < 0).any(axis=1)]] = True
     inside = np.flatnonzero(open_ & ~outside[part])

@@ -1,5 +1,6 @@
 """Rock in a finger's plane: where a face that turns first meets it, one face or many at once."""
 
 import lazy_loader
+import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

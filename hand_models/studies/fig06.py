@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
+import scipy
 from matplotlib.figure import Figure
-from scipy.optimize import brentq
 
 from hand_models.base import Progress
 from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
@@ -96,7 +96,7 @@ def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[Pair]) -> flo
     softest, stiffest = SPRING_RANGE[0], SPRING_RANGE[-1]
     if excess(softest) < 0.0 or excess(stiffest) > 0.0:
         return None
-    return float(brentq(excess, softest, stiffest))
+    return float(scipy.optimize.brentq(excess, softest, stiffest))
 
 
 def _claims(experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any]) -> Iterator[Claim]:

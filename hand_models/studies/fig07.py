@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+import scipy
 from matplotlib.figure import Figure
-from scipy.stats import spearmanr
 
 from hand_models.base import Progress
 from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
@@ -155,7 +155,7 @@ def _discrepancy_correlations(
     }
     if np.ptp(gains) <= ALIKE:
         return dict.fromkeys(measures, (0.0, 1.0))
-    answers = {what: spearmanr(values, gains) for what, values in measures.items()}
+    answers = {what: scipy.stats.spearmanr(values, gains) for what, values in measures.items()}
     return {what: (answer.statistic, answer.pvalue) for what, answer in answers.items()}
 
 

@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+import scipy
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull
 
 from hand_models.base import Array, Progress
 from hand_models.experiments import SANDPAPER, Claim, StudyResult, panels
@@ -190,7 +190,7 @@ def hull_over_surface(surface: Surface) -> float:
     points = radius[..., None] * _directions(angle, azimuth)
     rows = np.trapezoid(radius**3 * np.cos(angle) / 3.0, angle, axis=1)
     own = float(np.trapezoid(rows, azimuth[:, 0]))
-    return float(ConvexHull(points.reshape(-1, 3)).volume) / own
+    return float(scipy.spatial.ConvexHull(points.reshape(-1, 3)).volume) / own
 
 
 def _claims(surface: Surface, array: SpineArray, data: dict[str, Any]) -> Iterator[Claim]:

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
+import scipy
 from matplotlib.figure import Figure
-from scipy.optimize import bisect
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
@@ -150,7 +150,7 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
     first = over.index(True)
     if first == 0:
         return float(tried[0])
-    return float(bisect(excess, tried[first - 1], tried[first], xtol=CLOSE))
+    return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=CLOSE))
 
 
 def _claims(tried: Array, curves: list[dict[str, Any]]) -> Iterator[Claim]:

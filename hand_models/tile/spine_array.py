@@ -34,8 +34,8 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import ndtr, ndtri
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import spine_table
@@ -262,10 +262,12 @@ class SpineArray:
 
     def _drag_forces(self, rng: np.random.Generator, size: tuple[int, int]) -> Array:
         """Return F_i of every spine of every trial [N]."""
-        low = ndtr(-self.strength_mean / self.strength_deviation)
-        high = ndtr((self.shaft_strength - self.strength_mean) / self.strength_deviation)
+        low = scipy.special.ndtr(-self.strength_mean / self.strength_deviation)
+        high = scipy.special.ndtr(
+            (self.shaft_strength - self.strength_mean) / self.strength_deviation
+        )
         within = low + (high - low) * rng.random(size)
-        limits = self.strength_mean + self.strength_deviation * ndtri(within)
+        limits = self.strength_mean + self.strength_deviation * scipy.special.ndtri(within)
         limits = np.where(rng.random(size) < self.asperity_fraction, limits, np.inf)
         return spine_forces(limits, self.backlash * rng.random(size), self.contact_stiffness)
 

@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from hand_models.base import Array, Indices, LimitError
 from hand_models.wrench_spaces.half_spaces import SCALE, Facets, affine_hull
@@ -51,8 +50,8 @@ def coupled_columns(used: NDArray[np.bool_]) -> list[Indices]:
     """Return the columns in groups that rows couple, from which row (k, m) uses which column."""
     if not used.shape[1]:
         return []
-    incidence = csr_array((used.T.astype(int) @ used.astype(int)) > 0)
-    count, labels = connected_components(incidence, directed=False)
+    incidence = scipy.sparse.csr_array((used.T.astype(int) @ used.astype(int)) > 0)
+    count, labels = scipy.sparse.csgraph.connected_components(incidence, directed=False)
     return [np.flatnonzero(labels == label) for label in range(count)]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.sparse import csr_array, hstack, vstack
+import scipy
 
 from hand_models.base import Array, Indices, LimitError
 from hand_models.wrench_spaces.half_spaces import Facets
@@ -83,8 +83,8 @@ def clipped(
                 f"{len(vertices)} vertices after a cut are too many (at most {most_vertices})"
             )
         on_cut = np.append(height[kept] >= -slack, np.ones(len(crossings)))[:, None]
-        lies = vstack([lies[kept], _incidence(crossings, faces, slack)])
-        lies = hstack([lies, csr_array(on_cut)], format="csr")
+        lies = scipy.sparse.vstack([lies[kept], _incidence(crossings, faces, slack)])
+        lies = scipy.sparse.hstack([lies, scipy.sparse.csr_array(on_cut)], format="csr")
         met = np.asarray(lies.sum(axis=0)).ravel() >= vertices.shape[1]
         lies = lies[:, met]
         normals, offsets = np.vstack([faces.normals, normal]), np.append(faces.offsets, offset)
@@ -93,7 +93,7 @@ def clipped(
 
 
 def _edges(
-    lies: csr_array, starts: Indices, ends: Indices, faces: Facets, most_pairs: int
+    lies: scipy.sparse.csr_array, starts: Indices, ends: Indices, faces: Facets, most_pairs: int
 ) -> tuple[Indices, Indices]:
     """Return the ends of all edges that lead from some vertices to some others."""
     r = faces.normals.shape[1]
@@ -113,12 +113,14 @@ def _edges(
     return starts[i[edge]], ends[j[edge]]
 
 
-def _incidence(points: Array, faces: Facets, slack: float) -> csr_array:
+def _incidence(points: Array, faces: Facets, slack: float) -> scipy.sparse.csr_array:
     """Return which points (rows) lie on which facets (columns), as ones."""
     chunk = max(1, 2_000_000 // len(faces.offsets))
     parts = [
-        csr_array((points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack).astype(float))
+        scipy.sparse.csr_array(
+            (points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack).astype(float)
+        )
         for k in range(0, max(len(points), 1), chunk)
     ]
-    lies: csr_array = vstack(parts, format="csr")
+    lies: scipy.sparse.csr_array = scipy.sparse.vstack(parts, format="csr")
     return lies

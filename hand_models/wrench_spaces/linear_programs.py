@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from hand_models.base import Array, SolverError, UnsupportedError
 
@@ -54,7 +54,7 @@ def linear_program(
         }
     more = {"bounds": [(None, None)] * len(cost), **more}
     for presolve in PRESOLVED:
-        found: Any = linprog(
+        found: Any = scipy.optimize.linprog(
             cost, A_ub=A, b_ub=b, method="highs", options=options | {"presolve": presolve}, **more
         )
         if found.status == SOLVED and found.x is not None:

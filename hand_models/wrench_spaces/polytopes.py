@@ -6,8 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
+import scipy
 
 from hand_models.base import Array, Indices, SolverError
 from hand_models.wrench_spaces.linear_programs import linear_program
@@ -85,7 +84,7 @@ def polytope(A: Array, b: Array) -> Polytope:
     ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
     if ball is None or ball[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
-    cut = HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
+    cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
 
 
@@ -159,7 +158,7 @@ def _irredundant(A: Array, b: Array) -> Indices:
     rows = list(np.flatnonzero(np.abs(A).sum(axis=1) >= b - BEYOND))
     for row in list(rows):
         others = [k for k in rows if k != row]
-        result = linprog(
+        result = scipy.optimize.linprog(
             -A[row],
             A_ub=A[others],
             b_ub=b[others],
@@ -179,13 +178,13 @@ def distinct(points: Array, slack: float) -> Array:
     cells = np.round(points / (10.0 * slack))
     _, first = np.unique(cells, axis=0, return_index=True)
     points = points[np.sort(first)]
-    pairs = KDTree(points).query_pairs(10.0 * slack, p=np.inf, output_type="ndarray")
+    pairs = scipy.spatial.KDTree(points).query_pairs(10.0 * slack, p=np.inf, output_type="ndarray")
     keep = np.ones(len(points), dtype=bool)
     keep[pairs[:, 1]] = False
     return points[keep]
 
 
-def hull(points: Array, options: str | None = None) -> ConvexHull:
+def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
     """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
 
     Raises
@@ -197,8 +196,8 @@ def hull(points: Array, options: str | None = None) -> ConvexHull:
     # not merged where they are wide (Q12), which costs vertices and makes facets that are none
     for tried in (options, JOGGLED):
         try:
-            return ConvexHull(points, qhull_options=tried)
-        except QhullError as error:
+            return scipy.spatial.ConvexHull(points, qhull_options=tried)
+        except scipy.spatial.QhullError as error:
             failed = str(error).splitlines()[0]
     raise SolverError(f"convex hull: {failed}")
 
@@ -208,15 +207,15 @@ def hull_facets(points: Array) -> tuple[Array, Array]:
     if points.shape[1] == 1:
         return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
     try:
-        equations = ConvexHull(points).equations
-    except QhullError:
+        equations = scipy.spatial.ConvexHull(points).equations
+    except scipy.spatial.QhullError:
         equations = _planes(points, hull(points, JOGGLED))
     _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
     equations = equations[np.sort(first)]
     return equations[:, :-1], -equations[:, -1]
 
 
-def _planes(points: Array, found: ConvexHull) -> Array:
+def _planes(points: Array, found: scipy.spatial.ConvexHull) -> Array:
     """Return the facets' equations of points of which a hull was found joggled.
 
     Each by the points themselves; slivers, whose corners span no plane of their own or one that

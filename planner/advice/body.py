@@ -21,8 +21,7 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import Array, Pose
 from planner import programs
@@ -95,7 +94,9 @@ class _Tilt(NamedTuple):
 
     @property
     def turn(self) -> Array:
-        return Rotation.from_rotvec(self.angle * np.eye(3)[self.axis]).as_matrix()
+        return scipy.spatial.transform.Rotation.from_rotvec(
+            self.angle * np.eye(3)[self.axis]
+        ).as_matrix()
 
 
 class BodySearch:
@@ -240,7 +241,9 @@ class BodySearch:
         bounds = [(-most, most)] * 3 + [(0.0, None)] * (len(cost) - 3)
         for _ in range(TANGENTS):
             table = np.array(rows).reshape(-1, len(cost) + 1)
-            found = linprog(cost, table[:, :-1], table[:, -1], bounds=bounds, method="highs")
+            found = scipy.optimize.linprog(
+                cost, table[:, :-1], table[:, -1], bounds=bounds, method="highs"
+            )
             if found.x is None:
                 return None
             away = found.x[:3] - centres

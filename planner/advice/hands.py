@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.hand import Grasp
@@ -165,7 +165,10 @@ def placed(
     """Yield one hand moved along x and y of its palm [m], and turned about z [rad]."""
     hand = prepared.question.stance.hands[index]
     for x, y, turn in motions:
-        motion = Pose(np.array([x, y, 0.0]), Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix())
+        motion = Pose(
+            np.array([x, y, 0.0]),
+            scipy.spatial.transform.Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix(),
+        )
         changes = _moved(prepared, index, hand.pose @ motion)
         if changes is None:
             return

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import Array, Pose
 from planner.advice.changes import Change, hand_path, pose_message
@@ -125,7 +125,7 @@ class NewHold:
         """Return the limb holding at a place as another hand does, but for its turn and grasp."""
         stance, new = self.prepared.question.stance, self.index
         hand = stance.hands[hold.like]
-        motion = Rotation.from_rotvec([0.0, 0.0, hold.turn]).as_matrix()
+        motion = scipy.spatial.transform.Rotation.from_rotvec([0.0, 0.0, hold.turn]).as_matrix()
         changes: dict[str, Any] = {
             hand_path(new): hand_path(hold.like),
             hand_path(new, "limb"): self.limb,

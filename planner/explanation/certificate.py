@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
@@ -161,7 +161,7 @@ def _system(
         G=np.hstack([hand.G for hand in data.hands]),
         g=np.asarray(sum(hand.g for hand in data.hands)),
         wrench=data.wrench,
-        H=block_diag(*(hand.H for hand in data.hands)),
+        H=scipy.linalg.block_diag(*(hand.H for hand in data.hands)),
         h=np.concatenate([hand.h for hand in data.hands]),
         names=tuple(
             limit_name(limb, row)

@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from hand_models.base import Array, Indices
 from planner.explanation.farkas_program import Multipliers
@@ -207,7 +207,7 @@ class _Rows(NamedTuple):
         for place in places:
             (freed,) = (self.whose == place).nonzero()
             try:
-                shares, _ = nnls(np.hstack([above, -N[:, freed]]), missing)
+                shares, _ = scipy.optimize.nnls(np.hstack([above, -N[:, freed]]), missing)
             except RuntimeError:  # it has come to no end
                 continue
             if not np.isfinite(shares).all():

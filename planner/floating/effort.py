@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from hand_models.base import Array
 from planner import programs
@@ -102,7 +102,7 @@ class LeastEffort(Goal):
             # each binds a hand by itself: the balance alone couples hands
             rows = np.vstack([hand.L[limit > BINDING], hand.H[hard > BINDING]])
             roots.append(bent_root(0.5 * part, rows, NEAR))
-        return block_diag(*roots)
+        return scipy.linalg.block_diag(*roots)
 
     def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
         hands, at = [], 0

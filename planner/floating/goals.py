@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from hand_models.base import Array
 from planner import programs
@@ -135,9 +135,9 @@ class LeastUse(Goal):
         weights: Outcome,
     ) -> Array:
         parts = sets.data.hands
-        limits = block_diag(*(hand.L for hand in parts))
+        limits = scipy.linalg.block_diag(*(hand.L for hand in parts))
         shares = np.concatenate(weights.limit_duals)
-        hard = block_diag(*(hand.H for hand in parts))
+        hard = scipy.linalg.block_diag(*(hand.H for hand in parts))
         binding = np.concatenate(weights.hard_duals) > BINDING
         rows = np.vstack(
             [
@@ -146,7 +146,9 @@ class LeastUse(Goal):
                 hard[binding],
             ]
         )
-        return bent_root(block_diag(*hands.curvature(point, within, weights)), rows, NEAR)
+        return bent_root(
+            scipy.linalg.block_diag(*hands.curvature(point, within, weights)), rows, NEAR
+        )
 
     def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
         return programs.curved(data, root, near)

@@ -26,7 +26,7 @@ from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from hand_models.base import Array
 from hand_models.wrench_spaces import SCALE, WrenchSpace
@@ -231,7 +231,7 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
     rows = np.vstack(
         [
             np.hstack([hand.G for hand in data.hands]),
-            block_diag(*(hand.H for hand in data.hands))[those],
+            scipy.linalg.block_diag(*(hand.H for hand in data.hands))[those],
         ]
     )
     missing = data.wrench - programs.body_wrench(data, loads)

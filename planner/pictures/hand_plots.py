@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import scipy
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from scipy.spatial import ConvexHull, QhullError
 
 from hand_models.base import Array, whole_file
 from hand_models.finger import PHALANGES, SettledFinger
@@ -368,8 +368,8 @@ def _outline(space: WrenchSpace, i: int, j: int) -> Array:
 
 def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     try:
-        outline = points[ConvexHull(points).vertices]
-    except QhullError:
+        outline = points[scipy.spatial.ConvexHull(points).vertices]
+    except scipy.spatial.QhullError:
         outline = points[np.lexsort(points.T)][[0, -1]]
     axes.fill(*outline.T, alpha=0.35, color="tab:blue")
     axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")

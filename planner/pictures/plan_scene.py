@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
@@ -238,8 +238,8 @@ def _torso(points: Array) -> Array:
     axes = np.linalg.svd(off)[2]
     for dimensions in (3, 2):
         try:
-            hull = ConvexHull(off @ axes[:dimensions].T)
-        except (QhullError, ValueError):
+            hull = scipy.spatial.ConvexHull(off @ axes[:dimensions].T)
+        except (scipy.spatial.QhullError, ValueError):
             continue
         if dimensions == 3:
             return np.asarray(points[hull.simplices])

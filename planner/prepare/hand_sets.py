@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from hand_models.base import Array
 from hand_models.compliance import FloatingWrist, PalmMode
@@ -316,7 +316,9 @@ def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
     space, error = spaces[best], 0.0
     for direction in np.vstack([np.eye(6), -np.eye(6)]):
         slope = -(direction @ space.generators) * TWIST_UNIT
-        result = linprog(slope, A_ub=space.A * TWIST_UNIT, b_ub=space.b, bounds=(None, None))
+        result = scipy.optimize.linprog(
+            slope, A_ub=space.A * TWIST_UNIT, b_ub=space.b, bounds=(None, None)
+        )
         if result.status != 0 or result.x is None:
             continue
         twist = result.x * TWIST_UNIT
@@ -332,5 +334,7 @@ def _room(space: WrenchSpace) -> float:
     sizes = np.linalg.norm(rows, axis=1)[:, None]
     goal = np.append(np.zeros(rows.shape[1]), -1.0)
     bounds = [*[(None, None)] * rows.shape[1], (0.0, None)]
-    result = linprog(goal, A_ub=np.hstack([rows, sizes]), b_ub=space.b, bounds=bounds)
+    result = scipy.optimize.linprog(
+        goal, A_ub=np.hstack([rows, sizes]), b_ub=space.b, bounds=bounds
+    )
     return -math.inf if result.fun is None else -float(result.fun)

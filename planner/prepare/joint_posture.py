@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import Array, InvalidInputError, Pose
 from planner.prepare.stance_constraints import JointLoads
@@ -178,7 +178,11 @@ def _off(
     return {
         limb: (
             float(np.linalg.norm(pose.position - there[limb].position)),
-            float(Rotation.from_matrix(there[limb].rotation.T @ pose.rotation).magnitude()),
+            float(
+                scipy.spatial.transform.Rotation.from_matrix(
+                    there[limb].rotation.T @ pose.rotation
+                ).magnitude()
+            ),
         )
         for limb, pose in poses.items()
     }

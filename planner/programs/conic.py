@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 import clarabel
 import numpy as np
-from scipy.sparse import csc_matrix
+import scipy
 
 from hand_models.base import Array
 from planner import deadline
@@ -139,12 +139,12 @@ class Solver:
         self.pattern = Pattern.of(program)
         self._numbers = _numbers(program)
         rows, columns = len(program.b), len(program.q)
-        A = csc_matrix(Columns.beside(program.A), shape=(rows, columns))
+        A = scipy.sparse.csc_matrix(Columns.beside(program.A), shape=(rows, columns))
         # a program without a quadratic term begins elsewhere
         diagonal = np.arange(columns + 1)
-        P = csc_matrix((columns, columns))
+        P = scipy.sparse.csc_matrix((columns, columns))
         if self.pattern.quadratic:
-            P = csc_matrix((program.P, diagonal[:-1], diagonal), shape=P.shape)
+            P = scipy.sparse.csc_matrix((program.P, diagonal[:-1], diagonal), shape=P.shape)
         between = rows - program.zero - program.second_order
         cones = [clarabel.ZeroConeT(program.zero), clarabel.NonnegativeConeT(between)]
         if program.second_order:

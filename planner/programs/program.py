@@ -31,9 +31,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-import cvxpy as cp
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
@@ -66,6 +65,8 @@ class Margin(StanceProgram):
     """min u: the least utilisation; ``value`` is that utilisation."""
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         u, z = cp.Variable(), self.loads()
         rows = self.rows(z, u)
         return Definition(cp.Problem(cp.Minimize(u), [*rows]), (u, z), rows)
@@ -106,6 +107,8 @@ class Unique(StanceProgram):
         self.weights = tie_weight(len(data.hands)) * share * data.rows.tie
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         u, z = cp.Variable(), self.loads()
         rows = self.rows(z, u)
         ties = cp.sum(cp.multiply(self.weights, cp.square(z)))
@@ -147,6 +150,8 @@ class Curved(StanceProgram):
         self.root, self.centre = root, root @ (np.concatenate(near) / data.rows.unit)
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         u, z = cp.Variable(), self.loads()
         rows = self.rows(z, u)
         bent = cp.sum_squares(self.root @ z - self.centre)
@@ -174,6 +179,8 @@ class TieBreak(StanceProgram):
         self.cap, self.weights = cap, data.rows.tie / data.rows.tie.max()
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         z = self.loads()
         rows = self.rows(z, self.cap)
         effort = cp.sum(cp.multiply(self.weights, cp.square(z)))
@@ -195,11 +202,13 @@ class Effort(StanceProgram):
     def __init__(self, data: StanceData, cap: float) -> None:
         super().__init__(data)
         self.cap = cap
-        self.E = block_diag(*(hand.E for hand in data.hands))
+        self.E = scipy.linalg.block_diag(*(hand.E for hand in data.hands))
         self.e0 = np.concatenate([hand.e0 for hand in data.hands])
         self.weights = np.concatenate([hand.rest for hand in data.hands])
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         z = self.loads()
         rows = self.rows(z, self.cap)
         rest = cp.sum(cp.multiply(self.weights, cp.square(z)))
@@ -235,6 +244,8 @@ class LoadFactor(StanceProgram):
         self.wrench = body / self.unit
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         s, z = cp.Variable(), self.loads()
         _, limits, hard = self.rows(z, 1.0)
         rows = self.G @ z == self.data.offset + self.wrench * s, limits, hard
@@ -284,6 +295,8 @@ class Reach(StanceProgram):
         self.wanted = len(goal)
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         t, z = cp.Variable(len(self.goal)), self.loads()
         balance = self.G @ z == self.data.offset + self.B @ t
         _, limits, hard = self.rows(z, self.cap - self.K @ t)
@@ -326,6 +339,8 @@ class Nearest(StanceProgram):
         self.L, self.l0 = self.L[:0], self.l0[:0]
 
     def define(self) -> Definition:
+        import cvxpy as cp
+
         missing, z = cp.Variable(len(self.G)), self.loads()
         balance = self.G @ z + missing == self.data.offset
         _, limits, hard = self.rows(z, 0.0)

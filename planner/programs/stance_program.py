@@ -12,9 +12,8 @@ import threading
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
-import cvxpy as cp
 import numpy as np
 
 from hand_models.base import Array
@@ -31,6 +30,9 @@ from planner.programs.conic import (
     Solver,
 )
 from planner.programs.stance_data import Columns, StanceData, parted
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 __all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "VERTEX", "Definition", "StanceProgram"]
 
@@ -54,11 +56,11 @@ SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel":
 REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
 """For a second try."""
 
-CAREFUL: Final[dict[str, Any]] = {"solver": cp.CLARABEL, "max_threads": 1}
+CAREFUL: Final[dict[str, Any]] = {"solver": "CLARABEL", "max_threads": 1}
 """The solver's own defaults, for a third."""
 
 VERTEX: Final[dict[str, Any]] = {
-    "solver": cp.SCIPY,
+    "solver": "SCIPY",
     "scipy_options": {
         "method": "highs-ds",
         "primal_feasibility_tolerance": 1e-10,
@@ -134,6 +136,8 @@ class StanceProgram(ABC):
 
     def loads(self) -> cp.Variable:
         """Return z."""
+        import cvxpy as cp
+
         return cp.Variable(self.size)
 
     def rows(
@@ -212,6 +216,8 @@ class StanceProgram(ABC):
 
     def by_definition(self, careful: Mapping[str, Any] = CAREFUL) -> tuple[Outcome, Array | None]:
         """Let CVXPY solve it, with these options."""
+        import cvxpy as cp
+
         left = deadline.left()
         options = dict(careful)
         if left is not None and careful is CAREFUL:

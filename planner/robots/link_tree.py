@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import Array, Pose
 from planner.robots.robot import Robot
@@ -69,7 +69,9 @@ class LinkTree:
         where = {**self.robot.locked, **angles}
         moved = np.array([where.get(joint.name, 0.0) * joint.axis for joint in self._joints])
         slides = np.array([[joint.type == "prismatic"] for joint in self._joints])
-        turns = Rotation.from_rotvec(np.where(slides, 0.0, moved)).as_matrix()
+        turns = scipy.spatial.transform.Rotation.from_rotvec(
+            np.where(slides, 0.0, moved)
+        ).as_matrix()
         for joint, turn, shift in zip(self._joints, turns, moved * slides, strict=True):
             at = joint.place @ Pose(shift, turn)
             found[joint.child] = found[joint.parent] @ at

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
+import scipy
 
 from hand_models.base import Array
 from planner import deadline
@@ -172,7 +172,10 @@ def _ends(limb: LimbBatch, starts: Sequence[Array], weights: Array) -> list[_App
 
 
 def _followed(
-    limb: LimbBatch, start: Array, weights: Array, limits: Sequence[NonlinearConstraint] = ()
+    limb: LimbBatch,
+    start: Array,
+    weights: Array,
+    limits: Sequence[scipy.optimize.NonlinearConstraint] = (),
 ) -> _Approach:
     """Return where a start leads, by the weighed sum of squares, within limits."""
     deadline.check("it was known how near a hand comes to its pose")
@@ -182,12 +185,12 @@ def _followed(
         squares, slopes = _squares(limb, angles)
         return float(weights @ squares), weights @ slopes
 
-    end = minimize(
+    end = scipy.optimize.minimize(
         measured,
         np.clip(start, low, high),
         jac=True,
         method="SLSQP",
-        bounds=Bounds(low, high),
+        bounds=scipy.optimize.Bounds(low, high),
         constraints=limits,
         options={"maxiter": STEPS, "ftol": CONVERGED},
     )
@@ -199,7 +202,7 @@ def _followed(
 def _bounded(limb: LimbBatch, end: _Approach, most: Array) -> _Approach:
     """Return where distance and angle are within their tolerances, and the measure least."""
     largest = (most * (1.0 - INSIDE)) ** 2
-    limits = NonlinearConstraint(
+    limits = scipy.optimize.NonlinearConstraint(
         lambda angles: _squares(limb, angles)[0] / largest,
         -np.inf,
         1.0,

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from hand_models.base import Array, Pose
 from planner import deadline
@@ -157,7 +157,7 @@ def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
         poses = robot.hand_poses({limb: angles[k] for limb, angles in samples.items()})
         for limb, pose in poses.items():
             places[limb][k] = _place(pose, robot.chains[limb].reach)
-    return {limb: (samples[limb], cKDTree(places[limb])) for limb in robot.limbs}
+    return {limb: (samples[limb], scipy.spatial.cKDTree(places[limb])) for limb in robot.limbs}
 
 
 def _place(pose: Pose, reach: float) -> Array:

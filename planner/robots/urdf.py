@@ -13,7 +13,6 @@ from typing import Final
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hand_models.base import Array, InvalidInputError, Pose
 
@@ -231,7 +230,19 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
         _numbers(owner, origin, name, 3, most) if name in origin.attrib else [0.0, 0.0, 0.0]
         for name, most in (("xyz", LONGEST), ("rpy", WIDEST))
     )
-    return Pose(np.array(position), Rotation.from_euler("xyz", angles).as_matrix())
+    return Pose(np.array(position), _turned(*angles))
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
+    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+            [-sy, sx * cy, cx * cy],
+        ]
+    )
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:

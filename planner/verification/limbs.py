@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
@@ -114,7 +114,11 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
         off = float(np.linalg.norm(pose.position - there.position))
-        turned = float(Rotation.from_matrix(there.rotation.T @ pose.rotation).magnitude())
+        turned = float(
+            scipy.spatial.transform.Rotation.from_matrix(
+                there.rotation.T @ pose.rotation
+            ).magnitude()
+        )
         told_off, told_turned = where.off.get(place.limb, (0.0, 0.0))
         near = off <= most_off and turned <= most_turned
         told = abs(off - told_off) <= TOLD and abs(turned - told_turned) <= TOLD

@@ -15,9 +15,7 @@ from planner.deadline import DeadlineError
 from planner.question import Question
 from planner.result import Plan
 from service.answering.answers import brief_plan_reply, plan_reply
-from service.answering.body_space import explore
 from service.answering.hand_answers import placed_poses
-from service.answering.hand_spaces import wrench_space
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import ROBOTS, Robots, over_default
 from service.answering.questions import question
@@ -117,6 +115,18 @@ def with_advice(answer: Planned) -> Planned:
     return Planned(answer.question, found, reply)
 
 
+def _wrench_space(asked: WrenchSpaceRequest, robots: Robots, _: Streams) -> Reply:
+    from service.answering.hand_spaces import wrench_space
+
+    return wrench_space(asked, robots)
+
+
+def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
+    from service.answering.body_space import explore
+
+    return explore(asked, robots).reply
+
+
 class _Service(NamedTuple):
     """What is asked at a key, and who answers, given the request, the robots and the streams."""
 
@@ -126,10 +136,8 @@ class _Service(NamedTuple):
 
 SERVICES: Final[dict[str, _Service]] = {
     PLAN: _Service(PlanRequest, lambda asked, robots, _: plan(asked, robots)),
-    WRENCH_SPACE: _Service(
-        WrenchSpaceRequest, lambda asked, robots, _: wrench_space(asked, robots)
-    ),
-    BODY_SPACE: _Service(BodySpaceRequest, lambda asked, robots, _: explore(asked, robots).reply),
+    WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
+    BODY_SPACE: _Service(BodySpaceRequest, _body_space),
     STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
     SET_POINTS: _Service(SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)),
 }

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, Literal, cast
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -28,10 +28,12 @@ from planner.question import (
     Question,
     Stance,
 )
-from planner.route import Move, Route
 from service import requests
 from service.answering.holds import Rocks, placed, pose_of, rocks_of
 from service.answering.own_models import ROBOTS, Robots, builder_of
+
+if TYPE_CHECKING:
+    from planner.route import Route
 
 __all__ = ["question", "route", "stance"]
 
@@ -90,6 +92,8 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     InvalidInputError
         If a part of it is impossible; the field is relative to the file.
     """
+    from planner.route import Move, Route
+
     start, rocks = _stance(request.stance, robots)
     kind = start.robot.hand
     moved = [_hand(move, kind.table, rocks, f"moves[{i}]") for i, move in enumerate(request.moves)]

@@ -15,24 +15,9 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from hand_models.base import CruxError, InvalidInputError
-from hand_models.parameters import ParameterTable
-from service.bulk import (
-    LOCAL,
-    Column,
-    Lines,
-    ReplyLines,
-    Sink,
-    Table,
-    Tally,
-    chosen_columns,
-    evaluate,
-    new_manifest,
-    rows_at,
-    table_at,
-)
 from service.commands.interruption import Interrupted
 from service.commands.options import hand_option, json_option, robot_option
-from service.commands.terminal import (
+from service.tables import (
     BAD_INPUT,
     DONE,
     EXIT_STATUS,
@@ -43,12 +28,12 @@ from service.commands.terminal import (
     say,
     writing,
 )
-from service.processes import worth
-from service.tables import console, table_of
 from service.wire import REQUEST_KINDS
 
 if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
+    from service.bulk import Column, Lines, Sink, Table, Tally
 
 __all__ = ["batch"]
 
@@ -116,6 +101,9 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
+    from service.bulk import LOCAL, Lines, ReplyLines, evaluate, new_manifest, rows_at, table_at
+    from service.processes import worth
+
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
     kind = None if file is None else table_at(file)
@@ -210,6 +198,7 @@ def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | N
 def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tuple[Column, ...]:
     """Return the columns of a table about a robot."""
     from planner.robots import RobotFile
+    from service.bulk import chosen_columns
 
     limbs = (RobotFile.bundled() if robot is None else robot).limbs
     try:
@@ -252,6 +241,8 @@ def _summary(tally: Tally, elapsed: float) -> dict[str, object]:
 
 
 def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None:
+    from service.tables import console, table_of
+
     out = console()
     table = table_of("answer", numbers=("requests", "median ms", "longest ms"))
     for status in (*EXIT_STATUS, "failed"):

@@ -1,7 +1,10 @@
-"""The ``crux`` command.
+"""The ``crux`` command: what it is called with, and how it ends.
 
 Exit status: 0 done and feasible; 3 done, but infeasible or overloaded; 2 bad input, with one line
 on standard error; 1 anything else.
+
+Nothing is loaded here but what ``--help``, ``--version`` and completion need; a command's module is
+loaded when that command is called for.
 """
 
 from __future__ import annotations
@@ -9,64 +12,107 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from importlib import import_module
+from typing import Final, NamedTuple
 
 import click
-import msgspec
 
-from hand_models import studies
-from hand_models.base import CruxError, InvalidInputError
-from hand_models.parameters import ParameterTable, own_hand
-from service.commands.batch import batch
-from service.commands.holds import holds
-from service.commands.network import demo, query, serve
-from service.commands.options import (
-    asked,
-    draws_option,
-    explain_option,
-    folder_option,
-    hand_option,
-    json_option,
-    robot_option,
-    with_extras,
-)
-from service.commands.rock import rock
-from service.commands.spaces import body_space, wrench_space
-from service.commands.stances import read_request, read_route
-from service.commands.stream import stream
-from service.commands.studies import (
-    NAMES as STUDY_NAMES,
-    chosen_study,
-    print_study,
-    sweep_options,
-)
-from service.commands.sweep import sweep
-from service.commands.terminal import (
-    BAD_INPUT,
-    DONE,
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    draw_plan,
-    filling_folder,
-    note,
-    progress,
-    say,
-    waiting,
-)
-from service.replies import BriefPlanReply, PlanReply
-from service.requests import Draw, PlanRequest, Want
-from service.tables import console, print_plan
-from service.wire import REQUEST_KINDS, schema as message_schema
-
-if TYPE_CHECKING:
-    from planner.robots import RobotFile
-    from service.answering import Robots
-
-__all__ = ["crux", "run"]
+__all__ = ["COMMANDS", "crux", "run"]
 
 NAME: Final = "crux"
+
+BAD_INPUT: Final = 2
+FAILED: Final = 1
+
+
+class Entry(NamedTuple):
+    """Where a command is, and what it does in a few words: the beginning of its own help."""
+
+    module: str
+    words: str
+
+
+COMMANDS: Final = {
+    "batch": Entry(
+        "batch",
+        "Answer many plan requests: one a line in, one reply, row or error out, in order.",
+    ),
+    "body-space": Entry(
+        "spaces",
+        "Show what the body can bear: which wrenches, and which accelerations.",
+    ),
+    "demo": Entry(
+        "network",
+        "Start the service, ask it for a plan of a real stance, and draw the answer.",
+    ),
+    "holds": Entry(
+        "holds",
+        "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
+    ),
+    "plan": Entry("plans", "Make one plan, without the network."),
+    "query": Entry("network", "Ask a running service for a plan."),
+    "rock": Entry(
+        "rock",
+        "Make a mesh hold of a scan: a point cloud, or a grid of heights.",
+    ),
+    "route": Entry(
+        "plans",
+        "Evaluate a climb: every stance, and every one with a limb in the air.",
+    ),
+    "schema": Entry("network", "Print the JSON Schema of every message."),
+    "serve": Entry(
+        "network",
+        "Answer questions on zenoh until SIGTERM or Ctrl-C.",
+    ),
+    "stream": Entry(
+        "stream",
+        "Give set-points for one body wrench after another: one a line in, one a line out.",
+    ),
+    "study": Entry(
+        "studies",
+        "Run an experiment of the paper again, and hold its claims against the model.",
+    ),
+    "sweep": Entry(
+        "sweep",
+        "Plan a stance over varied fields: a table, a picture, and where it stops holding.",
+    ),
+    "wrench-space": Entry("spaces", "Show what one hand can carry."),
+}
+
+
+class Commands(click.Group):
+    """The commands, which are loaded one by one."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"service.commands.{COMMANDS[cmd_name].module}")
+        command: click.Command = getattr(module, cmd_name.replace("-", "_"))
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what each command does, without loading it."""
+        limit = formatter.width - 6 - max(map(len, COMMANDS))
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [
+                    (name, click.Command(name, help=COMMANDS[name].words).get_short_help_str(limit))
+                    for name in self.list_commands(ctx)
+                ]
+            )
+
+    def shell_complete(
+        self, ctx: click.Context, incomplete: str
+    ) -> list[click.shell_completion.CompletionItem]:
+        """Return commands and options that begin so, without loading the commands."""
+        from click.shell_completion import CompletionItem
+
+        names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
+        commands = [CompletionItem(name, help=COMMANDS[name].words) for name in names]
+        return commands + click.Command.shell_complete(self, ctx, incomplete)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -74,12 +120,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         status = crux.main(args=arguments, prog_name=NAME, standalone_mode=False)
         sys.stdout.flush()
-        return status if isinstance(status, int) else DONE
+        return status if isinstance(status, int) else 0
     except click.ClickException as error:
         return _complain(error.format_message().rstrip(".") + _hint(error), BAD_INPUT)
-    except CruxError as error:
-        bad = isinstance(error, InvalidInputError) or error.kind in REQUEST_KINDS
-        return _complain(str(error), BAD_INPUT if bad else FAILED)
     except click.Abort:
         return _complain("interrupted", FAILED)
     except BrokenPipeError:
@@ -91,6 +134,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
             return _complain(str(error), FAILED)
         _drop_output()
         return _complain(f"cannot write standard output: {error.strerror or error}", FAILED)
+    except Exception as error:
+        return _complain(str(error), _status_of(error))
+
+
+def _status_of(error: Exception) -> int:
+    """Return the exit status of an error that is meant; others are raised again."""
+    from hand_models.base import CruxError, InvalidInputError
+    from service.wire import REQUEST_KINDS
+
+    if not isinstance(error, CruxError):
+        raise error
+    bad = isinstance(error, InvalidInputError) or error.kind in REQUEST_KINDS
+    return BAD_INPUT if bad else FAILED
 
 
 def _drop_output() -> None:
@@ -99,7 +155,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str, status: int) -> int:
-    note(message)
+    click.echo(f"{NAME}: {' '.join(message.split())}", err=True)
     return status
 
 
@@ -111,7 +167,10 @@ def _hint(error: click.ClickException) -> str:
     return f"; see {name} --help"
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
+@click.group(
+    cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False
+)
+@click.version_option(package_name=NAME, message="%(prog)s %(version)s")
 def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
@@ -125,212 +184,6 @@ def crux() -> None:
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.
     """
-
-
-@crux.command()
-@click.argument("stance")
-@click.option(
-    "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
-)
-@click.option(
-    "--robust",
-    is_flag=True,
-    help="And the least load factor where every hand is a little elsewhere.",
-)
-@click.option(
-    "--spread",
-    is_flag=True,
-    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
-)
-@click.option(
-    "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
-)
-@click.option(
-    "--advice",
-    "advice_folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Write what would make it hold there, each advice as a STANCE of its own.",
-)
-@draws_option
-@explain_option
-@hand_option
-@robot_option
-@json_option
-def plan(
-    stance: str,
-    picture: Path | None,
-    robust: bool,
-    spread: bool,
-    clearance: bool,
-    advice_folder: Path | None,
-    draws: list[Draw] | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    as_json: bool,
-) -> int:
-    """Make one plan, without the network."""
-    from planner import deadline
-    from service import answering
-    from service.answering import robots_of
-
-    extras: list[Want] = ["robust"] if robust else []
-    extras += ["spread"] if spread or draws else []
-    extras += ["clearance"] if clearance else []
-    extras += ["advice"] if advice_folder is not None else []
-    request = asked(read_request(stance), hand, robot)
-    if draws:
-        request = msgspec.structs.replace(request, draws=draws)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    request = with_extras(request, *extras, whole=not as_json)
-    if advice_folder is not None and request.detail != "full":
-        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
-    robots = robots_of(robot)
-    with waiting(f"planning {stance}", request):
-        with deadline.within(request.deadline):
-            answer = answering.planned(request, robots)
-            if not as_json and answer.reply.status in ("overloaded", "infeasible"):
-                answer = answering.with_advice(answer)
-            bare = _without_palms(request, robots) if request.detail == "full" else None
-        if picture is not None:
-            draw_plan(answer, picture)
-    written: list[Path] = []
-    if advice_folder is not None:
-        assert isinstance(answer.reply, PlanReply)  # of a whole request
-        written = _write_advice(request, answer.reply, advice_folder)
-    if isinstance(answer.reply, BriefPlanReply):
-        say(answer.reply)
-    elif as_json:
-        without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
-        say(msgspec.to_builtins(answer.reply) | without)
-    else:
-        print_plan(answer.reply, console(), without_palm=bare)
-        if written:
-            last = f" to {written[-1].name}, the best first" if len(written) > 1 else ""
-            click.echo(f"advice: {written[0]}{last}")
-    return EXIT_STATUS.get(answer.reply.status, FAILED)
-
-
-def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[Path]:
-    """Write each advice as a request whose plan gives what it promises, and none of another.
-
-    Returns their paths.
-    """
-    from service import answering
-
-    written = []
-    with filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.glob("advice-*.json"):
-            if old.stem.removeprefix("advice-").isdecimal():
-                old.unlink()
-        for i, advice in enumerate(reply.advice or ()):
-            text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
-            written.append(folder / f"advice-{i + 1}.json")
-            written[-1].write_bytes(text)
-    return written
-
-
-def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
-    """Return how much could be carried if no palm did; None if the time is over before."""
-    from planner.deadline import DeadlineError
-    from service import answering
-
-    replace = msgspec.structs.replace
-    hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
-    stance = replace(request.stance, hands=hands)
-    alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
-    try:
-        reply = answering.plan(alone, robots)
-    except DeadlineError:
-        return None
-    assert isinstance(reply, PlanReply)  # of a whole request
-    return reply
-
-
-@crux.command()
-@click.argument("route")
-@folder_option("Where the table, the picture and the summary go.")
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
-)
-@explain_option
-@hand_option
-@robot_option
-@json_option
-def route(
-    route: str,
-    folder: Path,
-    workers: int | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    as_json: bool,
-) -> int:
-    """Evaluate a climb: every stance, and every one with a limb in the air.
-
-    ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
-    """
-    from planner.pictures import summary, write_report
-    from planner.route import evaluate
-    from service import answering
-    from service.answering import robots_of
-    from service.tables import print_route
-
-    request = asked(read_route(route), hand, robot)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    climb = answering.route(request, robots_of(robot))
-    with progress(f"planning {climb.name}") as tell:
-        result = evaluate(climb, workers, tell)
-    with filling_folder():
-        files = write_report(result, folder)
-    if as_json:
-        say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
-    else:
-        print_route(result, files, console())
-    if result.feasible:
-        return DONE
-    return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
-
-
-@crux.command(epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
-@click.argument("name")
-@folder_option("Where result.json and the pictures go.")
-@sweep_options
-@hand_option
-@json_option
-def study(
-    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **options: Any
-) -> None:
-    """Run an experiment of the paper again, and hold its claims against the model.
-
-    The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
-    The exit status is 0 whatever the claims say.
-    """
-    chosen = chosen_study(name, **options)
-    numbers = None if hand is None else own_hand(hand)
-    line = None if as_json else f"study {name}: started; it may take minutes"
-    with filling_folder(), progress(name, line=line) as tell:
-        result, files = studies.run_study(chosen, folder, tell, numbers)
-    if as_json:
-        say(studies.as_json(result) | {"files": [str(path) for path in files]})
-    else:
-        print_study(result, files, console())
-
-
-@crux.command()
-@json_option
-def schema(as_json: bool) -> None:
-    """Print the JSON Schema of every message."""
-    text = msgspec.json.encode(message_schema())
-    click.echo(text if as_json else msgspec.json.format(text))
-
-
-for command in (batch, sweep, stream, rock, holds, wrench_space, body_space, serve, query, demo):
-    crux.add_command(command)
 
 
 if __name__ == "__main__":

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 import msgspec
-import numpy as np
-from rich.console import Console
 
 from hand_models.base import InvalidInputError, whole_file
-from hand_models.parameters import ParameterTable
 from service.commands.interruption import Interrupted
 from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
-from service.commands.terminal import progress, say, writing
-from service.tables import console, table_of
+from service.tables import progress, say, writing
 
 if TYPE_CHECKING:
+    import numpy as np
+    from rich.console import Console
+
     from hand_models.fixed_wrist import FoundHold, Trial
+    from hand_models.parameters import ParameterTable
 
     Outcome = FoundHold | InvalidInputError
     Pair = tuple[Trial, FoundHold]
@@ -125,6 +125,7 @@ def holds(
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
     from service.processes import try_everywhere
+    from service.tables import console
 
     Surface.named(surface)
     numbers = hand_table() if hand is None else own_hand(hand)
@@ -259,6 +260,8 @@ def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:
 
 
 def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: str) -> None:
+    import numpy as np
+
     from hand_models.scans import plot_holds
 
     most: dict[tuple[float, float, float], float] = {}
@@ -284,6 +287,8 @@ def _print(
     out: Console,
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
+    from service.tables import table_of
+
     numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst")
     table = table_of("x, y, z mm", numbers=numbers)
     for trial, each in found[:SHOWN]:

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 import msgspec
-import zenoh
 
-from hand_models.parameters import ParameterTable
 from service.commands.interruption import kill_children
 from service.commands.options import (
     PICTURES,
@@ -25,10 +23,8 @@ from service.commands.options import (
     with_extras,
 )
 from service.commands.stances import read_request
-from service.commands.terminal import draw_plan, note, say, show
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving import (
-    CruxClient,
     ended_in_time,
     listening,
     open_session,
@@ -36,13 +32,16 @@ from service.serving import (
     zenoh_config,
     zenoh_options,
 )
-from service.tables import console
+from service.tables import draw_plan, note, say, show
 from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
 
 if TYPE_CHECKING:
+    import zenoh
+
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
 
-__all__ = ["demo", "query", "serve"]
+__all__ = ["demo", "query", "schema", "serve"]
 
 PATIENCE: Final = 120.0
 """How long the demo waits for its own service, however busy the machine [s]."""
@@ -188,6 +187,8 @@ def query(
 
     It has to serve the robot that the stance or --robot names.
     """
+    from service.serving import CruxClient
+
     request = with_extras(asked(read_request(stance), hand, robot), whole=not as_json)
     start_zenoh_log()
     with CruxClient(config, request.stance.robot or DEFAULT_ROBOT, timeout=timeout) as client:
@@ -217,7 +218,8 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
     """
     from service import answering
     from service.answering import robots_of
-    from service.serving import PlanService
+    from service.serving import CruxClient, PlanService
+    from service.tables import console
 
     request = with_extras(asked(read_request(DEMO_STANCE), hand, robot))
     start_zenoh_log()
@@ -238,3 +240,13 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
     if not as_json:
         console().print(f"picture: {picture}", markup=False)
     return status
+
+
+@click.command()
+@json_option
+def schema(as_json: bool) -> None:
+    """Print the JSON Schema of every message."""
+    from service.wire import schema as message_schema
+
+    text = msgspec.json.encode(message_schema())
+    click.echo(text if as_json else msgspec.json.format(text))

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 import msgspec
 
-from hand_models.parameters import ParameterTable
-from service.answering import read_draws, read_hand, with_hand
 from service.requests import Draw, PlanRequest, RouteRequest, Want
 from service.serving import TIMEOUT
 
 if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
 
 __all__ = [
@@ -61,7 +60,7 @@ class FiniteRange(click.FloatRange):
 
 def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
     """Return a request for a hand and a robot of the caller's own."""
-    from service.answering import with_robot
+    from service.answering import with_hand, with_robot
 
     return with_robot(with_hand(request, hand), robot)
 
@@ -97,6 +96,8 @@ def output_in(
 def _read_hand(
     _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
 ) -> ParameterTable | None:
+    from service.answering import read_hand
+
     if not paths:
         return None
     if len(paths) > 1:
@@ -109,6 +110,8 @@ def _read_hand(
 
 
 def _read_draws(_: click.Context, __: click.Parameter, path: Path | None) -> list[Draw] | None:
+    from service.answering import read_draws
+
     return None if path is None else read_draws(path)
 
 
@@ -124,6 +127,8 @@ def _limb_and_hand(
     _: click.Context, __: click.Parameter, given: tuple[str, ...]
 ) -> tuple[str, ParameterTable | None]:
     """Tell the limb, which the contract calls a hand, from the file of one."""
+    from service.answering import read_hand
+
     files = [value for value in given if value.endswith(HAND_FILE)]
     limbs = [value for value in given if not value.endswith(HAND_FILE)]
     if len(limbs) != 1 or len(files) > 1:

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 from click.core import ParameterSource
-from rich.console import Console
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import scan_table
 from hand_models.scans import ENDINGS, UNITS, UPS
 from service.commands.options import json_option, output_in, plot_option
-from service.commands.terminal import progress, say, writing
-from service.tables import console, table_of
+from service.tables import progress, say, writing
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from hand_models.scans import ScannedRock
 
 __all__ = ["rock"]
@@ -130,6 +130,7 @@ def rock(
     own; the table tells its pose in the file's axes, turned so that z is up, in metres.
     """
     from hand_models.scans import mesh_scan, plot_rock, read_scan, write_rock
+    from service.tables import console
 
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
@@ -175,6 +176,8 @@ def _print_rock(
     made: ScannedRock, hole: float, up: str, assumed: bool, output: Path, out: Console
 ) -> None:
     """Print how many points and triangles there are, how large the rock is, and what is open."""
+    from service.tables import table_of
+
     table = table_of("")
     table.show_header = False
     table.add_column("", justify="right")

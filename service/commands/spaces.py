@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, get_args
 import click
 import msgspec
 
-from hand_models.parameters import ParameterTable
 from service.commands.options import (
     asked,
     hand_option,
@@ -18,21 +17,11 @@ from service.commands.options import (
     robot_option,
 )
 from service.commands.stances import read_request
-from service.commands.terminal import (
-    DONE,
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    progress,
-    say,
-    waiting,
-    writing,
-)
-from service.replies import RobustCapability
 from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest, about_the_same
-from service.tables import console, print_body_space, print_wrench_space
+from service.tables import DONE, EXIT_STATUS, FAILED, OVERLOADED, progress, say, waiting, writing
 
 if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
 
 __all__ = ["body_space", "wrench_space"]
@@ -68,7 +57,8 @@ def wrench_space(
     from planner.capability import survey
     from service import answering
     from service.answering import robots_of
-    from service.tables import print_robust, print_survey, survey_json
+    from service.replies import RobustCapability
+    from service.tables import console, print_robust, print_survey, print_wrench_space, survey_json
 
     limb, hand = limb_and_hand
     robots = robots_of(robot)
@@ -153,6 +143,8 @@ def body_space(
     as_json: bool,
 ) -> int:
     """Show what the body can bear: which wrenches, and which accelerations."""
+    from service.tables import console, print_body_space
+
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
     from service.answering import explore, robots_of

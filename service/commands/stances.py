@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from hand_models.base import InvalidInputError
-from service.answering import MeshFiles
 from service.requests import PlanRequest, Request, RouteRequest
-from service.wire import decode_request
 
 __all__ = ["bundled", "read_request", "read_route"]
 
@@ -54,6 +52,9 @@ def _folder(kind: type[Request]) -> Traversable:
 
 
 def _read(source: str, kind: type[R], field: str, noun: str) -> R:
+    from service.answering import MeshFiles
+    from service.wire import decode_request
+
     if source == "-":
         return MeshFiles(Path()).whole(decode_request(sys.stdin.buffer.read(), kind))
     path = Path(source)

@@ -12,18 +12,16 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError, UnsupportedError
-from hand_models.hand import FINGERS
-from hand_models.parameters import ParameterTable
 from service.commands.options import FiniteRange, asked, hand_option, json_option, robot_option
 from service.commands.stances import read_request
-from service.commands.terminal import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
-from service.replies import ErrorDetail, ErrorReply, SetPointsReply
 from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
-from service.wire import MalformedError
+from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
 
 if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
     from planner.streaming import WrenchStream
+    from service.replies import ErrorReply, SetPointsReply
 
 __all__ = ["stream"]
 
@@ -111,6 +109,8 @@ def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
 
 def _body_wrench(line: bytes) -> Wrench:
     """Return the body wrench of a line of JSON."""
+    from service.wire import MalformedError
+
     try:
         wrench: Wrench = msgspec.json.decode(line, type=Wrench)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -121,12 +121,16 @@ def _body_wrench(line: bytes) -> Wrench:
 
 def _refused(error: InvalidInputError, number: int) -> ErrorReply:
     """Return what is said in place of a line's set-points."""
+    from service.replies import ErrorDetail, ErrorReply
+
     field = f"line {number}" if error.field is None else f"line {number}: {error.field}"
     return ErrorReply(error=ErrorDetail(error.kind, field, error.message))
 
 
 def _say_columns(stream: WrenchStream) -> None:
     """Write the header, and on standard error what the lines have in common."""
+    from hand_models.hand import FINGERS
+
     radius = stream.interpolates
     how = "solved one by one about"
     if radius is not None:

@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
-from rich.console import Console
-from rich.markup import escape
 
 from hand_models.base import InvalidInputError
-from hand_models.experiments import Claim, StudyResult
-from hand_models.studies import STUDIES, Study
-from hand_models.tile import surface_names
-from service.tables import table_of
+from service.commands.options import folder_option, hand_option, json_option
+from service.tables import filling_folder, progress, say
 
-__all__ = ["NAMES", "chosen_study", "print_study", "sweep_options"]
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from hand_models.experiments import Claim, StudyResult
+    from hand_models.parameters import ParameterTable
+    from hand_models.studies import Study
+
+__all__ = ["NAMES", "chosen_study", "print_study", "study", "sweep_options"]
 
 SWEEP: Final = "sweep"
 """The one study that takes options."""
@@ -25,8 +28,23 @@ SWEEP: Final = "sweep"
 MEASURE: Final = "measure"
 """The study that asks the planner, and so is not among those of one hand."""
 
-NAMES: Final = (*STUDIES, MEASURE)
-"""Of all studies."""
+NAMES: Final = (
+    "fig06",
+    "fig07",
+    "fig10",
+    "fig12",
+    "fig13",
+    "fig14",
+    "fig15",
+    "fig16",
+    "calibrate",
+    SWEEP,
+    MEASURE,
+)
+"""Of all studies; here, so that completion need not load them."""
+
+SURFACES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
+"""Of the bundled surfaces; likewise."""
 
 AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
 
@@ -45,7 +63,7 @@ def sweep_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--surface",
             metavar="NAME",
-            help=f"Of a sweep: {', '.join(surface_names())}; by default that of Fig. 16.",
+            help=f"Of a sweep: {', '.join(SURFACES)}; by default that of Fig. 16.",
         ),
         click.option(
             "--tension", type=float, help="Of a sweep: of both tendons [N]; by default Fig. 16's."
@@ -107,6 +125,35 @@ def _measurements() -> Study:
     return MeasurementStudy(fixed)
 
 
+@click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
+@click.argument("name")
+@folder_option("Where result.json and the pictures go.")
+@sweep_options
+@hand_option
+@json_option
+def study(
+    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **options: Any
+) -> None:
+    """Run an experiment of the paper again, and hold its claims against the model.
+
+    The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
+    The exit status is 0 whatever the claims say.
+    """
+    from hand_models.parameters import own_hand
+    from hand_models.studies import as_json as study_json, run_study
+    from service.tables import console
+
+    chosen = chosen_study(name, **options)
+    numbers = None if hand is None else own_hand(hand)
+    line = None if as_json else f"study {name}: started; it may take minutes"
+    with filling_folder(), progress(name, line=line) as tell:
+        result, files = run_study(chosen, folder, tell, numbers)
+    if as_json:
+        say(study_json(result) | {"files": [str(path) for path in files]})
+    else:
+        print_study(result, files, console())
+
+
 def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> None:
     """Print what was claimed, what came out, and where the files are."""
     out.print(f"{result.name}: {result.title}", style="bold", markup=False)
@@ -121,6 +168,10 @@ def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> Non
 
 
 def _print_claims(result: StudyResult, out: Console) -> None:
+    from rich.markup import escape
+
+    from service.tables import table_of
+
     table = table_of("")
     for name in ("claim", "claimed", "got"):
         table.add_column(name, overflow="fold")
@@ -141,4 +192,6 @@ def _verdict(claim: Claim) -> str:
 
 
 def _cell(value: str | float) -> str:
+    from rich.markup import escape
+
     return escape(value) if isinstance(value, str) else f"{value:.4g}"

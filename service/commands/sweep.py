@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from hand_models.base import InvalidInputError
-from hand_models.parameters import ParameterTable
 from service.commands.interruption import Interrupted
 from service.commands.options import (
     FiniteRange,
@@ -19,11 +18,11 @@ from service.commands.options import (
     robot_option,
 )
 from service.commands.stances import read_request
-from service.commands.terminal import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
 from service.sweeping import TOLERANCE
-from service.tables import console, print_sweep
+from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
 
 if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
     from planner.robots import RobotFile
     from service.sweeping import Design, Row, Sweep
 
@@ -93,6 +92,7 @@ def sweep(
     """
     from service.answering import robots_of
     from service.sweeping import Design, Variation, plot_sweep
+    from service.tables import console, print_sweep
 
     if seed is not None and samples is None:
         raise InvalidInputError("is of samples: give --samples, too", field="--seed")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from service.wire import Answer
@@ -15,6 +16,16 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
 
 __all__ = ["Job", "answering"]
+
+LATER: Final = (
+    "cvxpy",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.spatial",
+    "scipy.stats",
+    "trimesh",
+)
+"""What one plan may do without and so loads only when it is needed; a service has it at once."""
 
 
 class Job(NamedTuple):
@@ -60,6 +71,8 @@ def answering(
     from planner import deadline
     from service.answering import MeshFiles, Streams, handle, robots_of
 
+    for name in LATER:
+        import_module(name)
     robots = robots_of(robot)
     files = None if folder is None else MeshFiles(folder)
     streams = Streams()

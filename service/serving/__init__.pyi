@@ -1,5 +1,6 @@
-from .client import TIMEOUT as TIMEOUT, CruxClient as CruxClient
+from .client import CruxClient as CruxClient
 from .config import (
+    TIMEOUT as TIMEOUT,
     closed as closed,
     ended_in_time as ended_in_time,
     exposed as exposed,

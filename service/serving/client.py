@@ -31,7 +31,7 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
-from service.serving.config import open_session
+from service.serving.config import TIMEOUT, open_session
 from service.wire import (
     BODY_SPACE,
     CLIENTS,
@@ -48,15 +48,12 @@ from service.wire import (
     service_key,
 )
 
-__all__ = ["TIMEOUT", "CruxClient"]
+__all__ = ["CruxClient"]
 
 R = TypeVar("R", bound=Reply)
 
 IN_TIME: Final = 0.9
 """Part of a client's time in which a question without a deadline is to be answered."""
-
-TIMEOUT: Final = 10.0
-"""How long a client waits at least by default [s]."""
 
 SECOND_TRY_AFTER: Final = 0.3
 """Pause before an empty answer is believed: a service that has just come back needs it [s]."""

@@ -24,6 +24,7 @@ from service.wire import NoServiceError
 
 __all__ = [
     "MODES",
+    "TIMEOUT",
     "closed",
     "ended_in_time",
     "exposed",
@@ -35,6 +36,9 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
+
+TIMEOUT: Final = 10.0
+"""How long a client waits at least by default [s]."""
 
 CLOSES: Final = 0.5
 """How long a session may take to close [s]."""

@@ -8,3 +8,19 @@ from .plans import (
 from .routes import print_route as print_route
 from .surveys import print_survey as print_survey, survey_json as survey_json
 from .sweeps import print_sweep as print_sweep
+from .terminal import (
+    BAD_INPUT as BAD_INPUT,
+    DONE as DONE,
+    EXIT_STATUS as EXIT_STATUS,
+    FAILED as FAILED,
+    OVERLOADED as OVERLOADED,
+    bulk_progress as bulk_progress,
+    draw_plan as draw_plan,
+    filling_folder as filling_folder,
+    note as note,
+    progress as progress,
+    say as say,
+    show as show,
+    waiting as waiting,
+    writing as writing,
+)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 __all__ = ["console", "show", "table_of", "unit_of"]
 
 
 def console(stderr: bool = False) -> Console:
     """Return the console on standard output, or on standard error."""
+    from rich.console import Console
+
     return Console(highlight=False, stderr=stderr)
 
 
@@ -24,6 +27,9 @@ def show(title: str, table: Table, out: Console) -> None:
 
 def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
     """Return a table with columns of names, then of numbers, then of words, which may wrap."""
+    from rich import box
+    from rich.table import Table
+
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for name in names:
         table.add_column(name, no_wrap=True)

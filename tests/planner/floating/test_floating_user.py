@@ -22,10 +22,10 @@ from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
 from service.answering.questions import question
-from service.commands import terminal
 from service.commands.cli import run
 from service.commands.stances import read_request
 from service.requests import PlanRequest
+from service.tables import terminal
 from tests.suite.helpers.commands import DONE, OVERLOADED
 
 REAR = ("rear_right", "rear_left")

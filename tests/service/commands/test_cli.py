@@ -17,7 +17,7 @@ from rich.console import Console
 
 from service import answering
 from service.answering import dispatch
-from service.commands.cli import crux, run
+from service.commands.cli import COMMANDS, run
 from service.commands.stances import bundled
 from service.requests import PlanRequest
 from service.tables import print_plan
@@ -640,7 +640,7 @@ def test_wrong_usage_leads_to_the_commands_own_help(
 def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["--help"]) == DONE
     out = capfd.readouterr().out
-    for name in crux.commands:
+    for name in COMMANDS:
         assert f"  {name} " in out
 
 

@@ -12,12 +12,12 @@ import click
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError
-from service.replies import BriefPlanReply, PlanReply
 from service.requests import PlanRequest
-from service.tables import console, print_plan
+from service.tables.layout import console
 
 if TYPE_CHECKING:
     from service.answering import Planned
+    from service.replies import BriefPlanReply, PlanReply
 
 __all__ = [
     "BAD_INPUT",
@@ -60,6 +60,9 @@ def say(result: object) -> None:
 
 def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
     """Write a plan, and return its exit status; what is brief is not for a person."""
+    from service.replies import BriefPlanReply
+    from service.tables.plans import print_plan
+
     if as_json or isinstance(reply, BriefPlanReply):
         say(reply)
     else:
@@ -154,10 +157,7 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
 @contextmanager
 def waiting(title: str, request: PlanRequest) -> Iterator[None]:
     """Show on a terminal's standard error that hands with floating wrists take a while."""
-    screen = console(stderr=True)
     slow = any(hand.wrist == "floating" for hand in request.stance.hands)
-    if slow and screen.is_terminal:
-        with screen.status(title):
-            yield
-    else:
+    screen = console(stderr=True) if slow else None
+    with nullcontext() if screen is None or not screen.is_terminal else screen.status(title):
         yield

@@ -1,0 +1,215 @@
+"""Commands that plan without the network: one stance, or a climb."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from hand_models.base import InvalidInputError
+from service.commands.options import (
+    asked,
+    draws_option,
+    explain_option,
+    folder_option,
+    hand_option,
+    json_option,
+    robot_option,
+    with_extras,
+)
+from service.commands.stances import read_request, read_route
+from service.requests import Draw, PlanRequest, Want
+from service.tables import (
+    DONE,
+    EXIT_STATUS,
+    FAILED,
+    OVERLOADED,
+    draw_plan,
+    filling_folder,
+    progress,
+    say,
+    waiting,
+)
+
+if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
+    from planner.robots import RobotFile
+    from service.answering import Robots
+    from service.replies import PlanReply
+
+__all__ = ["plan", "route"]
+
+
+@click.command()
+@click.argument("stance")
+@click.option(
+    "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
+)
+@click.option(
+    "--robust",
+    is_flag=True,
+    help="And the least load factor where every hand is a little elsewhere.",
+)
+@click.option(
+    "--spread",
+    is_flag=True,
+    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
+)
+@click.option(
+    "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
+)
+@click.option(
+    "--advice",
+    "advice_folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write what would make it hold there, each advice as a STANCE of its own.",
+)
+@draws_option
+@explain_option
+@hand_option
+@robot_option
+@json_option
+def plan(
+    stance: str,
+    picture: Path | None,
+    robust: bool,
+    spread: bool,
+    clearance: bool,
+    advice_folder: Path | None,
+    draws: list[Draw] | None,
+    unexplained: bool,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Make one plan, without the network."""
+    from planner import deadline
+    from service import answering
+    from service.answering import robots_of
+    from service.replies import BriefPlanReply, PlanReply
+
+    extras: list[Want] = ["robust"] if robust else []
+    extras += ["spread"] if spread or draws else []
+    extras += ["clearance"] if clearance else []
+    extras += ["advice"] if advice_folder is not None else []
+    request = asked(read_request(stance), hand, robot)
+    if draws:
+        request = msgspec.structs.replace(request, draws=draws)
+    if unexplained:
+        request = msgspec.structs.replace(request, explain=False)
+    request = with_extras(request, *extras, whole=not as_json)
+    if advice_folder is not None and request.detail != "full":
+        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
+    robots = robots_of(robot)
+    with waiting(f"planning {stance}", request):
+        with deadline.within(request.deadline):
+            answer = answering.planned(request, robots)
+            if not as_json and answer.reply.status in ("overloaded", "infeasible"):
+                answer = answering.with_advice(answer)
+            bare = _without_palms(request, robots) if request.detail == "full" else None
+        if picture is not None:
+            draw_plan(answer, picture)
+    written: list[Path] = []
+    if advice_folder is not None:
+        assert isinstance(answer.reply, PlanReply)  # of a whole request
+        written = _write_advice(request, answer.reply, advice_folder)
+    if isinstance(answer.reply, BriefPlanReply):
+        say(answer.reply)
+    elif as_json:
+        without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
+        say(msgspec.to_builtins(answer.reply) | without)
+    else:
+        from service.tables import console, print_plan
+
+        print_plan(answer.reply, console(), without_palm=bare)
+        if written:
+            last = f" to {written[-1].name}, the best first" if len(written) > 1 else ""
+            click.echo(f"advice: {written[0]}{last}")
+    return EXIT_STATUS.get(answer.reply.status, FAILED)
+
+
+def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[Path]:
+    """Write each advice as a request whose plan gives what it promises, and none of another.
+
+    Returns their paths.
+    """
+    from service import answering
+
+    written = []
+    with filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("advice-*.json"):
+            if old.stem.removeprefix("advice-").isdecimal():
+                old.unlink()
+        for i, advice in enumerate(reply.advice or ()):
+            text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
+            written.append(folder / f"advice-{i + 1}.json")
+            written[-1].write_bytes(text)
+    return written
+
+
+def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
+    """Return how much could be carried if no palm did; None if the time is over before."""
+    from planner.deadline import DeadlineError
+    from service import answering
+    from service.replies import PlanReply
+
+    replace = msgspec.structs.replace
+    hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
+    stance = replace(request.stance, hands=hands)
+    alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
+    try:
+        reply = answering.plan(alone, robots)
+    except DeadlineError:
+        return None
+    assert isinstance(reply, PlanReply)  # of a whole request
+    return reply
+
+
+@click.command()
+@click.argument("route")
+@folder_option("Where the table, the picture and the summary go.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
+)
+@explain_option
+@hand_option
+@robot_option
+@json_option
+def route(
+    route: str,
+    folder: Path,
+    workers: int | None,
+    unexplained: bool,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    as_json: bool,
+) -> int:
+    """Evaluate a climb: every stance, and every one with a limb in the air.
+
+    ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
+    """
+    from planner.pictures import summary, write_report
+    from planner.route import evaluate
+    from service import answering
+    from service.answering import robots_of
+    from service.tables import console, print_route
+
+    request = asked(read_route(route), hand, robot)
+    if unexplained:
+        request = msgspec.structs.replace(request, explain=False)
+    climb = answering.route(request, robots_of(robot))
+    with progress(f"planning {climb.name}") as tell:
+        result = evaluate(climb, workers, tell)
+    with filling_folder():
+        files = write_report(result, folder)
+    if as_json:
+        say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
+    else:
+        print_route(result, files, console())
+    if result.feasible:
+        return DONE
+    return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED
