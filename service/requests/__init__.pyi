@@ -34,6 +34,7 @@ from .request import (
     LONGEST_DEADLINE as LONGEST_DEADLINE,
     Detail as Detail,
     Identifier as Identifier,
+    Later as Later,
     Name as Name,
     Pose as Pose,
     Query as Query,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from msgspec import inspect
+
+from service.requests import Later
 
 __all__ = ["Place", "Step", "entered", "field_names", "places_at"]
 
@@ -56,18 +58,21 @@ def entered(places: Iterable[Place], step: Step) -> list[Place]:
 
 
 def field_names(types: Iterable[inspect.Type]) -> list[str]:
-    """Return the fields of the structs that may be meant, each once."""
-    names = [
-        name
-        for kind in types
-        if isinstance(kind, inspect.StructType)
-        for name in (*([kind.tag_field] if kind.tag_field else []), *(f.name for f in kind.fields))
-    ]
+    """Return the fields of the structs that may be meant, each once, but none not yet taken."""
+    names: list[str] = []
+    for kind in types:
+        if isinstance(kind, inspect.StructType):
+            names += [kind.tag_field] if kind.tag_field else []
+            names += [field.name for field in kind.fields if not _comes_later(field.type)]
     return list(dict.fromkeys(names))
 
 
+def _comes_later(kind: inspect.Type) -> bool:
+    return kind == _known(Later)
+
+
 @cache
-def _known(kind: type) -> inspect.Type:
+def _known(kind: Any) -> inspect.Type:
     """Return what is known of a message, which takes milliseconds to find out."""
     return inspect.type_info(kind)
 

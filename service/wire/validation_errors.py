@@ -61,12 +61,15 @@ def validation_error(
     steps = _steps(path)
     places = places_at(kind, steps)
     types = [place.kind for place in places]
-    field = _with_keys(path, steps, document, decode)
+    where = _with_keys(path, steps, document, decode)
+    field = path if where is None else _dotted(where)
     if of_field := OF_FIELD.fullmatch(complaint):
         unknown, name = of_field.groups()
         field = f"{field}.{name}"
-        known = ", ".join(field_names(types))
-        message = f"unknown field; known are {known}" if unknown else "missing"
+        message = "missing"
+        if unknown:
+            known = field_names(types if where is None else _tagged(types, document(), where))
+            message = f"unknown field; known are {', '.join(known)}"
     elif complaint.startswith(("Invalid value ", "Invalid enum value ")):
         value = complaint.partition("value ")[2]
         message = f"{_clip(value)} is not known; valid: {', '.join(_values(types))}"
@@ -97,18 +100,44 @@ def _clip(text: str) -> str:
 
 def _with_keys(
     path: str, steps: Sequence[Step], document: Callable[[], Any], decode: Decoder
-) -> str:
-    """Return a path with the keys that msgspec leaves open, if all of them can be told."""
-    known: list[Step] = []
+) -> list[str | int] | None:
+    """Return the steps of a path with the keys that msgspec leaves open, if all can be told."""
+    known: list[str | int] = []
     for step in steps:
         try:
             known.append(_key_to_blame(document(), known, path, decode) if step is None else step)
         except (LookupError, TypeError, AttributeError, RecursionError):
-            return path
-    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in known)
+            return None
+    return known
 
 
-def _key_to_blame(document: Any, place: list[Step], path: str, decode: Decoder) -> str:
+def _dotted(steps: Iterable[str | int]) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
+
+
+def _tagged(
+    types: list[inspect.Type], document: Any, steps: Iterable[str | int]
+) -> list[inspect.Type]:
+    """Return those of the types that an object of a document names; all where it names none."""
+    try:
+        given = _at(document, steps)
+        named: list[inspect.Type] = [
+            kind
+            for kind in types
+            if isinstance(kind, inspect.StructType) and given.get(kind.tag_field) == kind.tag
+        ]
+    except (LookupError, TypeError, AttributeError):
+        return types
+    return named or types
+
+
+def _at(document: Any, steps: Iterable[str | int]) -> Any:
+    for step in steps:
+        document = document[step]
+    return document
+
+
+def _key_to_blame(document: Any, place: Sequence[str | int], path: str, decode: Decoder) -> str:
     """Return the key whose value is wrong in an object of a document.
 
     Values are read in order up to the first that is wrong, so it is the last of the shortest
@@ -119,10 +148,7 @@ def _key_to_blame(document: Any, place: list[Step], path: str, decode: Decoder) 
     LookupError
         If none can be told.
     """
-    whole = document
-    for step in place:
-        whole = whole[step]
-    keys = list(whole)
+    keys = list(_at(document, place))
 
     def refused(count: int) -> bool:
         try:
@@ -134,7 +160,7 @@ def _key_to_blame(document: Any, place: list[Step], path: str, decode: Decoder) 
     return str(keys[bisect_left(range(1, len(keys) + 1), True, key=refused)])
 
 
-def _beginning(document: Any, steps: Sequence[Step], count: int) -> Any:
+def _beginning(document: Any, steps: Sequence[str | int], count: int) -> Any:
     """Return a document with only the first few entries of the object at a place."""
     if not steps:
         return dict(islice(document.items(), count))

@@ -57,6 +57,41 @@ def test_an_unknown_field_is_named_wherever_it_is() -> None:
 
 
 @pytest.mark.parametrize("form", [JSON, MSGPACK])
+@pytest.mark.parametrize(
+    ("hold", "known"),
+    [
+        ({"shape": "cylinder", "diameter": 0.3}, "diameter"),
+        ({"shape": "edge", "fillet_radius": 0.1, "angle": 1.0}, "fillet_radius, angle"),
+        ({"diameter": 0.3, "radius": 0.15, "shape": "sphere"}, "diameter"),
+        ({"shape": "plane"}, None),
+    ],
+)
+def test_an_unknown_field_of_a_hold_is_told_those_of_its_shape(
+    hold: dict, known: str | None, form: str
+) -> None:
+    request = put(wall_request(), (*FRONT, "hold"), hold | {"radius": 0.15})
+    where, message = refusal(request, form=form)[1:]
+    assert where == "stance.hands[0].hold.radius"
+    own = f", {known}" if known else ""
+    assert message == f"unknown field; known are shape, pose, pose_in_hand{own}"
+
+
+def test_an_unknown_field_of_a_shared_rock_is_told_those_of_its_shape() -> None:
+    rocks = {"floor": {"shape": "plane"}, "log": {"shape": "cylinder", "radius": 0.1}}
+    where, message = refusal(put(wall_request(), ("stance", "rocks"), rocks))[1:]
+    assert where == "stance.rocks.log.radius"
+    assert message == "unknown field; known are shape, pose, pose_in_hand, diameter"
+
+
+def test_no_field_that_is_refused_is_offered() -> None:
+    where, message = refusal(wall_request() | {"colour": 1})[1:]
+    offered = message.removeprefix("unknown field; known are ").split(", ")
+    assert where == "colour"
+    assert "objective" in offered
+    assert "confidence" not in offered
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
 def test_limbs_are_names_too_and_have_to_be_limbs(form: str) -> None:
     request = request_with_joints()
     places = [path for path in paths(request) if path and path[-1] == "front_left"]
