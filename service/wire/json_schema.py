@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -25,8 +26,17 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
+from service.wire.keys import (
+    BODY_SPACE,
+    HEALTH,
+    PLAN,
+    SET_POINTS,
+    STREAM,
+    WRENCH_SPACE,
+    service_key,
+)
 
-__all__ = ["MESSAGES", "schema"]
+__all__ = ["KEYS", "MESSAGES", "schema"]
 
 MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanRequest,
@@ -46,11 +56,30 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
 )
 
 
+KEYS: Final[dict[str, tuple[type[msgspec.Struct] | None, tuple[type[msgspec.Struct], ...]]]] = {
+    PLAN: (PlanRequest, (PlanReply, BriefPlanReply)),
+    WRENCH_SPACE: (WrenchSpaceRequest, (WrenchSpaceReply,)),
+    BODY_SPACE: (BodySpaceRequest, (BodySpaceReply,)),
+    STREAM: (StreamRequest, (StreamReply,)),
+    SET_POINTS: (SetPointsRequest, (SetPointsReply,)),
+    HEALTH: (None, (HealthReply,)),
+}
+"""What is asked at each key, if anything, and what may come back."""
+
+REPLIES: Final = "service.replies."
+"""Where parts of replies are, which may be named as parts of requests are."""
+
+
 def schema() -> dict[str, Any]:
-    """Return one schema whose ``$defs`` hold every message; a valid document is one of them."""
+    """Return one schema whose ``$defs`` hold every message; a valid document is one of them.
+
+    ``keys`` tells for each key the request, null where it takes none, and the reply.
+    """
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
     )
+    names = {name: _plain_name(name) for name in parts}
+    assert len({*names.values()}) == len(parts)
     for part in parts.values():
         # of a docstring that says more, its first sentence
         if "description" in part:
@@ -59,5 +88,34 @@ def schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Messages of crux, version 1",
         "anyOf": list(wholes[: len(MESSAGES)]),
-        "$defs": parts,
+        "keys": {service_key("<robot>", name): _exchange(*each) for name, each in KEYS.items()},
+        "$defs": {names[name]: _renamed(part, names) for name, part in parts.items()},
+    }
+
+
+def _plain_name(name: str) -> str:
+    """Return a part's name without its module; of two alike, the reply's is told apart."""
+    return name.rpartition(".")[2] + ("Reply" if name.startswith(REPLIES) else "")
+
+
+def _renamed(part: Any, names: Mapping[str, str]) -> Any:
+    """Return a part of the schema whose references are by those names."""
+    if isinstance(part, dict):
+        return {
+            key: f"#/$defs/{names[value.removeprefix('#/$defs/')]}"
+            if key == "$ref"
+            else _renamed(value, names)
+            for key, value in part.items()
+        }
+    return [_renamed(each, names) for each in part] if isinstance(part, list) else part
+
+
+def _exchange(
+    request: type[msgspec.Struct] | None, replies: Sequence[type[msgspec.Struct]]
+) -> dict[str, Any]:
+    told = [{"$ref": f"#/$defs/{reply.__name__}"} for reply in replies]
+    return {
+        "request": None if request is None else {"$ref": f"#/$defs/{request.__name__}"},
+        "reply": told[0] if len(told) == 1 else {"anyOf": told},
+        "error": {"$ref": f"#/$defs/{ErrorReply.__name__}"},
     }

@@ -37,6 +37,28 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     assert "not supported" in request["properties"]["confidence"]["description"]
 
 
+def test_names_are_of_messages_and_not_of_modules() -> None:
+    defined = schema()["$defs"]
+    assert all(name.isidentifier() for name in defined)
+    assert "limb" in defined["Hand"]["properties"]
+    assert "fingers" in defined["HandReply"]["properties"]
+    hands = defined["PlanReply"]["properties"]["hands"]
+    assert "#/$defs/HandReply" in json.dumps(hands)
+
+
+def test_every_key_has_its_request_and_reply() -> None:
+    whole = schema()
+    told = whole["keys"]
+    for name, service in dispatch.SERVICES.items():
+        assert told[f"crux/<robot>/{name}"]["request"] == {
+            "$ref": f"#/$defs/{service.request.__name__}"
+        }
+    assert told["crux/<robot>/health"]["request"] is None
+    wanted = {ref.split('"')[0] for ref in json.dumps(told).split("#/$defs/")[1:]}
+    assert wanted <= set(whole["$defs"])
+    assert {"BriefPlanReply", "HealthReply", "SetPointsReply", "ErrorReply"} <= wanted
+
+
 @pytest.mark.parametrize("asked", [wall_request, flat_request, full_request, request_with_joints])
 def test_requests_and_replies_are_of_the_schema(asked: Callable[[], dict]) -> None:
     Draft202012Validator.check_schema(schema())
