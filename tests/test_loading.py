@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -58,6 +59,25 @@ with contextlib.suppress(SystemExit):
     {COMMAND.replace("; ", chr(10) + "    ")}
 """
     assert not {*HEAVY, "numpy", "msgspec", "zenoh", "rich"} & loaded(code, *arguments)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "crux pl",
+        "crux plan wall",
+        "crux study f",
+        "crux route s",
+        "crux query --h",
+        "crux wrench-space wall-300 --hand f",
+        "crux stream w",
+        "crux serve --",
+    ],
+)
+def test_completion_waits_for_no_numbers(words: str) -> None:
+    last = len(words.split()) - 1
+    asked = {"_CRUX_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(last)}
+    assert not {*HEAVY, "numpy", "rich"} & loaded(COMMAND, env=os.environ | asked)
 
 
 def test_one_plan_loads_what_it_needs() -> None:

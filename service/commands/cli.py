@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import click
 
@@ -23,6 +24,9 @@ NAME: Final = "crux"
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
+
+VERBOSITY: Final = "crux.verbosity"
+"""In a context's ``meta``; `service.tables.verbosity` reads it."""
 
 
 class Entry(NamedTuple):
@@ -80,6 +84,32 @@ COMMANDS: Final = {
 }
 
 
+def _verbosity(context: click.Context, option: click.Parameter, given: bool) -> None:
+    if given:
+        context.meta[VERBOSITY] = 1 if option.name == "verbose" else -1
+
+
+def _say_more_or_less(command: click.Command) -> click.Command:
+    """Add the options that every command has, before or after its name."""
+    command.params += [
+        click.Option(
+            ["-v", "--verbose"],
+            is_flag=True,
+            expose_value=False,
+            callback=_verbosity,
+            help="Say more: how a plan was found, the time taken; serve: a line a question.",
+        ),
+        click.Option(
+            ["-q", "--quiet"],
+            is_flag=True,
+            expose_value=False,
+            callback=_verbosity,
+            help="Say less: the outcome and errors; no tables of a plan, progress or remarks.",
+        ),
+    ]
+    return command
+
+
 class Commands(click.Group):
     """The commands, which are loaded one by one."""
 
@@ -91,7 +121,20 @@ class Commands(click.Group):
             return None
         module = import_module(f"service.commands.{COMMANDS[cmd_name].module}")
         command: click.Command = getattr(module, cmd_name.replace("-", "_"))
+        if not any(option.name == "verbose" for option in command.params):
+            _say_more_or_less(command)
         return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command, and say how long it took if more is to be said."""
+        start, used = time.perf_counter(), time.process_time()
+        try:
+            return super().invoke(ctx)
+        finally:
+            if ctx.meta.get(VERBOSITY, 0) > 0:
+                took, used = time.perf_counter() - start, time.process_time() - used
+                told = f"took {took:.2f} s, {used:.2f} s of this process's time"
+                click.echo(f"{NAME}: {told}", err=True)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what each command does, without loading it."""
@@ -185,6 +228,8 @@ def crux() -> None:
     standard error names the field), 1 anything else.
     """
 
+
+_say_more_or_less(crux)
 
 if __name__ == "__main__":
     from service.commands import main

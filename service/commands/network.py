@@ -19,6 +19,7 @@ from service.commands.options import (
     json_option,
     output_in,
     robot_option,
+    stance_argument,
     timeout_option,
     with_extras,
 )
@@ -32,7 +33,7 @@ from service.serving import (
     zenoh_config,
     zenoh_options,
 )
-from service.tables import draw_plan, note, say, show
+from service.tables import draw_plan, note, remark, say, show, verbosity
 from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
     from planner.robots import RobotFile
 
 __all__ = ["demo", "query", "schema", "serve"]
+
+LEVELS: Final = {-1: logging.ERROR, 0: logging.WARNING, 1: logging.INFO}
+"""Of what is logged, by what is to be said: with more, a line a question."""
 
 PATIENCE: Final = 120.0
 """How long the demo waits for its own service, however busy the machine [s]."""
@@ -77,7 +81,6 @@ DEMO_STANCE: Final = "wall-300-joints"
     type=click.IntRange(1, 65535),
     help="Give Prometheus its text over HTTP on this port of this machine.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Log a line a question.")
 @click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
 @json_option
 def serve(
@@ -87,7 +90,6 @@ def serve(
     workers: int | None,
     seconds: float,
     metrics_port: int | None,
-    verbose: bool,
     log_format: str,
     as_json: bool,
 ) -> None:
@@ -105,7 +107,7 @@ def serve(
     handler = LogThread()
     form = logging.Formatter("crux: %(levelname)s: %(message)s")
     handler.setFormatter(JsonLines() if log_format == "json" else form)
-    logging.basicConfig(handlers=[handler], level=logging.INFO if verbose else logging.WARNING)
+    logging.basicConfig(handlers=[handler], level=LEVELS[verbosity()])
     start_zenoh_log()
     closed(config)
     endpoints = listening(config)
@@ -123,7 +125,7 @@ def serve(
             if as_json:
                 say({"v": 1, "keys": service.keys, "listen": endpoints})
             where = ", ".join(endpoints) or "no address"
-            note(f"serving {', '.join(service.keys)}; listening on {where}")
+            remark(f"serving {', '.join(service.keys)}; listening on {where}")
             if open_to := exposed(config):
                 note(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh tells "
@@ -169,7 +171,7 @@ def _leave(*_: object) -> None:
 
 
 @click.command()
-@click.argument("stance")
+@stance_argument
 @zenoh_options
 @timeout_option
 @hand_option
@@ -231,7 +233,7 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
         except ServiceError as error:
             if error.kind != UNREACHABLE:
                 raise
-            note(f"planned without joints: {error.message}")
+            remark(f"planned without joints: {error.message}")
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 import msgspec
+from click.shell_completion import CompletionItem
 
+from service.commands.stances import bundled, limbs_of
 from service.requests import Draw, PlanRequest, RouteRequest, Want
 from service.serving import TIMEOUT
 
@@ -21,6 +23,7 @@ __all__ = [
     "PICTURES",
     "FiniteRange",
     "asked",
+    "beginning_so",
     "draws_option",
     "explain_option",
     "folder_option",
@@ -30,6 +33,8 @@ __all__ = [
     "output_in",
     "plot_option",
     "robot_option",
+    "route_argument",
+    "stance_argument",
     "timeout_option",
     "with_extras",
 ]
@@ -96,8 +101,6 @@ def output_in(
 def _read_hand(
     _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
 ) -> ParameterTable | None:
-    from service.answering import read_hand
-
     if not paths:
         return None
     if len(paths) > 1:
@@ -106,13 +109,17 @@ def _read_hand(
         raise click.BadParameter(
             f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
         )
+    from service.answering import read_hand
+
     return read_hand(paths[0])
 
 
 def _read_draws(_: click.Context, __: click.Parameter, path: Path | None) -> list[Draw] | None:
+    if path is None:
+        return None
     from service.answering import read_draws
 
-    return None if path is None else read_draws(path)
+    return read_draws(path)
 
 
 def _read_robot(_: click.Context, __: click.Parameter, path: Path | None) -> RobotFile | None:
@@ -127,17 +134,42 @@ def _limb_and_hand(
     _: click.Context, __: click.Parameter, given: tuple[str, ...]
 ) -> tuple[str, ParameterTable | None]:
     """Tell the limb, which the contract calls a hand, from the file of one."""
-    from service.answering import read_hand
-
     files = [value for value in given if value.endswith(HAND_FILE)]
     limbs = [value for value in given if not value.endswith(HAND_FILE)]
     if len(limbs) != 1 or len(files) > 1:
         raise click.BadParameter(
             f"one LIMB and at most one FILE that ends in {HAND_FILE}, got {', '.join(given)}"
         )
-    return limbs[0], read_hand(Path(files[0])) if files else None
+    if not files:
+        return limbs[0], None
+    from service.answering import read_hand
+
+    return limbs[0], read_hand(Path(files[0]))
 
 
+def beginning_so(
+    names: Iterable[str], *, files: bool = False
+) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
+    """Return what completes one of these names in a shell, or the path of a file if that may be."""
+
+    def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+        found = [CompletionItem(name) for name in names if name.startswith(begun)]
+        return [*found, CompletionItem(begun, type="file")] if files else found
+
+    return complete
+
+
+def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Complete the limbs that hold on in the stance, as far as it is given and can be read."""
+    # what stands before an option that lacks its value is not yet told apart
+    given = [context.params.get("stance"), *context.args]
+    return beginning_so(limbs_of(next(filter(None, given), None)), files=True)(context, _, begun)
+
+
+stance_argument = click.argument("stance", shell_complete=beginning_so(bundled(), files=True))
+route_argument = click.argument(
+    "route", shell_complete=beginning_so(bundled(RouteRequest), files=True)
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
     "--hand",
@@ -166,6 +198,7 @@ limb_option = click.option(
     required=True,
     multiple=True,
     callback=_limb_and_hand,
+    shell_complete=_limbs,
     metavar="LIMB",
     help="Whose wrench space. A second --hand FILE, ending in .toml, has numbers of a hand of your "
     "own; all others are the bundled hand's.",

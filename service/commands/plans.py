@@ -17,6 +17,8 @@ from service.commands.options import (
     hand_option,
     json_option,
     robot_option,
+    route_argument,
+    stance_argument,
     with_extras,
 )
 from service.commands.stances import read_request, read_route
@@ -30,6 +32,8 @@ from service.tables import (
     filling_folder,
     progress,
     say,
+    tell_solver,
+    verbosity,
     waiting,
 )
 
@@ -43,7 +47,7 @@ __all__ = ["plan", "route"]
 
 
 @click.command()
-@click.argument("stance")
+@stance_argument
 @click.option(
     "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
 )
@@ -109,7 +113,8 @@ def plan(
             answer = answering.planned(request, robots)
             if not as_json and answer.reply.status in ("overloaded", "infeasible"):
                 answer = answering.with_advice(answer)
-            bare = _without_palms(request, robots) if request.detail == "full" else None
+            whole = request.detail == "full" and verbosity() >= 0
+            bare = _without_palms(request, robots) if whole or as_json else None
         if picture is not None:
             draw_plan(answer, picture)
     written: list[Path] = []
@@ -124,7 +129,8 @@ def plan(
     else:
         from service.tables import console, print_plan
 
-        print_plan(answer.reply, console(), without_palm=bare)
+        print_plan(answer.reply, console(), without_palm=bare, brief=verbosity() < 0)
+        tell_solver(answer.reply)
         if written:
             last = f" to {written[-1].name}, the best first" if len(written) > 1 else ""
             click.echo(f"advice: {written[0]}{last}")
@@ -170,7 +176,7 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
 
 
 @click.command()
-@click.argument("route")
+@route_argument
 @folder_option("Where the table, the picture and the summary go.")
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."

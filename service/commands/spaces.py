@@ -15,6 +15,7 @@ from service.commands.options import (
     limb_option,
     plot_option,
     robot_option,
+    stance_argument,
 )
 from service.commands.stances import read_request
 from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest, about_the_same
@@ -28,7 +29,7 @@ __all__ = ["body_space", "wrench_space"]
 
 
 @click.command("wrench-space")
-@click.argument("stance")
+@stance_argument
 @limb_option
 @plot_option("Draw it there.")
 @click.option(
@@ -113,7 +114,7 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]
 
 
 @click.command("body-space")
-@click.argument("stance")
+@stance_argument
 @click.option(
     "--axes",
     default="fx,fz",

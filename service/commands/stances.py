@@ -9,12 +9,17 @@ import sys
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
+
+import msgspec
 
 from hand_models.base import InvalidInputError
 from service.requests import PlanRequest, Request, RouteRequest
 
-__all__ = ["bundled", "read_request", "read_route"]
+__all__ = ["bundled", "limbs_of", "read_request", "read_route"]
+
+LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
+"""Of the bundled robot."""
 
 R = TypeVar("R", bound=Request)
 
@@ -44,6 +49,16 @@ def read_request(source: str) -> PlanRequest:
 def read_route(source: str) -> RouteRequest:
     """Return the route that a command was given; as `read_request`."""
     return _read(source, RouteRequest, "ROUTE", "route")
+
+
+def limbs_of(source: str | None) -> tuple[str, ...]:
+    """Return the limbs that hold on in a stance; the bundled robot's where that cannot be told."""
+    path = _folder(PlanRequest) / f"{source}.json" if source in bundled() else Path(source or "")
+    try:
+        asked = msgspec.json.decode(path.read_bytes())
+        return tuple(str(hand["limb"]) for hand in asked["stance"]["hands"])
+    except (OSError, msgspec.DecodeError, LookupError, TypeError):
+        return LIMBS
 
 
 def _folder(kind: type[Request]) -> Traversable:

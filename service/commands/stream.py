@@ -12,10 +12,17 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError, UnsupportedError
-from service.commands.options import FiniteRange, asked, hand_option, json_option, robot_option
+from service.commands.options import (
+    FiniteRange,
+    asked,
+    hand_option,
+    json_option,
+    robot_option,
+    stance_argument,
+)
 from service.commands.stances import read_request
 from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
-from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, say
+from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, remark, say
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
@@ -36,7 +43,7 @@ HANDS_A_LINE: Final = 4
 
 
 @click.command()
-@click.argument("stance")
+@stance_argument
 @click.option(
     "--radius",
     type=FiniteRange(min=0.0, min_open=True, max=1e4),
@@ -136,7 +143,7 @@ def _say_columns(stream: WrenchStream) -> None:
     if radius is not None:
         how = f"mixed within {radius:g} N, {radius / 10.0:g} N·m of"
     centre = ", ".join(f"{round(part, 1) + 0.0:.1f}" for part in stream.first)
-    note(
+    remark(
         f"plans are {how} the first centre [{centre}] N, N·m; "
         f"a hand's tensions are those of {', '.join(FINGERS)}"
     )

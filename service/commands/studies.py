@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from hand_models.base import InvalidInputError
-from service.commands.options import folder_option, hand_option, json_option
+from service.commands.options import beginning_so, folder_option, hand_option, json_option
 from service.tables import filling_folder, progress, say
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def _measurements() -> Study:
 
 
 @click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
-@click.argument("name")
+@click.argument("name", shell_complete=beginning_so(NAMES))
 @folder_option("Where result.json and the pictures go.")
 @sweep_options
 @hand_option

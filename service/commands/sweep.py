@@ -16,6 +16,7 @@ from service.commands.options import (
     hand_option,
     json_option,
     robot_option,
+    stance_argument,
 )
 from service.commands.stances import read_request
 from service.sweeping import TOLERANCE
@@ -33,7 +34,7 @@ PICTURE: Final = "sweep.png"
 
 
 @click.command()
-@click.argument("stance")
+@stance_argument
 @click.option(
     "--vary",
     "variations",

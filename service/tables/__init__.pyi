@@ -19,8 +19,11 @@ from .terminal import (
     filling_folder as filling_folder,
     note as note,
     progress as progress,
+    remark as remark,
     say as say,
     show as show,
+    tell_solver as tell_solver,
+    verbosity as verbosity,
     waiting as waiting,
     writing as writing,
 )

@@ -12,7 +12,7 @@ from planner.capability import COMPONENTS, OTHERS
 from planner.result import LimitName
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.layout import show, table_of, unit_of
+from service.tables.layout import in_colour, show, table_of, unit_of
 
 __all__ = ["print_body_space"]
 
@@ -23,7 +23,9 @@ FINEST: Final = 1e-3
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     """Print what a stance can hold."""
     used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
-    out.print(f"[bold]{reply.status.upper()}[/bold]{used}   {1e3 * reply.time.total:.0f} ms")
+    out.print(
+        f"{in_colour(reply.status, reply.status.upper())}{used}   {1e3 * reply.time.total:.0f} ms"
+    )
     out.print(reply.reason, markup=False)
     for warning in reply.warnings:
         out.print(f"[bold]warning:[/bold] {escape(warning)}")

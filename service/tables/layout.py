@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["console", "show", "table_of", "unit_of"]
+__all__ = ["console", "in_colour", "show", "table_of", "unit_of"]
 
 
 def console(stderr: bool = False) -> Console:
@@ -17,6 +17,20 @@ def console(stderr: bool = False) -> Console:
     from rich.console import Console
 
     return Console(highlight=False, stderr=stderr)
+
+
+COLOURS: Final = {
+    "optimal": "green",
+    "overloaded": "red",
+    "infeasible": "red",
+    "failed": "red",
+}
+"""Of a plan's status, where the terminal has them and ``NO_COLOR`` is not set."""
+
+
+def in_colour(status: str, word: str | None = None) -> str:
+    """Return a status, or a word in its place, as markup in bold and in its colour."""
+    return f"[bold {COLOURS.get(status, 'default')}]{word or status}[/]"
 
 
 def show(title: str, table: Table, out: Console) -> None:

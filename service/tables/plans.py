@@ -31,7 +31,7 @@ from service.replies import (
 )
 from service.tables.advice import print_advice
 from service.tables.clearances import print_clearance
-from service.tables.layout import show, table_of, unit_of
+from service.tables.layout import in_colour, show, table_of, unit_of
 from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = ["print_plan", "print_robust", "print_wrench_space"]
@@ -54,7 +54,13 @@ CARRIES: Final[Mapping[str, str]] = {
 """What a palm does in each of its modes."""
 
 
-def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None = None) -> None:
+def print_plan(
+    reply: PlanReply,
+    out: Console,
+    *,
+    without_palm: PlanReply | None = None,
+    brief: bool = False,
+) -> None:
     """Print a plan.
 
     Parameters
@@ -63,12 +69,16 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
     out : Console
     without_palm : PlanReply, optional
         The same question's answer with every palm left out.
+    brief : bool, optional
+        Whether its status and reason are all.
     """
     spread = reply.spread if isinstance(reply.spread, Spread) else None
     out.print("   ".join(_first_line(reply, spread)))
     if spread is not None:
         out.print(spread_sentence(spread), markup=False)
     out.print(reply.reason, markup=False)
+    if brief:
+        return
     for warning in reply.warnings:
         out.print(f"[bold]warning:[/bold] {escape(warning)}")
     for limb, pose in (reply.poses or {}).items():
@@ -111,7 +121,7 @@ def print_plan(reply: PlanReply, out: Console, *, without_palm: PlanReply | None
 
 def _first_line(reply: PlanReply, spread: Spread | None) -> Iterator[str]:
     """Yield what is most to be known of a plan; intervals of it in place of lesser things."""
-    yield f"[bold]{reply.status.upper()}[/bold]"
+    yield in_colour(reply.status, reply.status.upper())
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     if reply.utilisation is not None:
         yield f"utilisation {within(reply.utilisation, used)}"

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from planner.pictures import summary
 from planner.route import RouteResult
-from service.tables.layout import table_of
+from service.tables.layout import in_colour, table_of
 
 __all__ = ["print_route"]
 
@@ -24,7 +24,7 @@ def print_route(result: RouteResult, files: Mapping[str, Path], out: Console) ->
     for stage, plan in zip(result.stages, result.plans, strict=True):
         of_plan = (plan.utilisation, plan.load_factor, plan.joint_utilisation)[: 2 + joints]
         shown = ("-" if number is None else f"{number:.2f}" for number in of_plan)
-        cells = (str(stage.move), stage.phase, stage.limb or "-", plan.status, *shown)
+        cells = (str(stage.move), stage.phase, stage.limb or "-", in_colour(plan.status), *shown)
         hard = stage.index == result.crux
         table.add_row("crux" if hard else "", *cells, style="bold" if hard else "")
     out.print(table)

@@ -30,8 +30,11 @@ __all__ = [
     "filling_folder",
     "note",
     "progress",
+    "remark",
     "say",
     "show",
+    "tell_solver",
+    "verbosity",
     "waiting",
     "writing",
 ]
@@ -46,6 +49,23 @@ EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": O
 
 NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What is no fault of the file's name."""
+
+
+VERBOSITY: Final = "crux.verbosity"
+"""In the context of a command: 1 where more is to be said, -1 where less."""
+
+
+def verbosity() -> int:
+    """Return whether more (1) or less (-1) is to be said than by default (0)."""
+    context = click.get_current_context(silent=True)
+    level: int = 0 if context is None else context.meta.get(VERBOSITY, 0)
+    return level
+
+
+def remark(message: str) -> None:
+    """Write one line on standard error, unless less is to be said."""
+    if verbosity() >= 0:
+        note(message)
 
 
 def note(message: str) -> None:
@@ -66,8 +86,20 @@ def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
     if as_json or isinstance(reply, BriefPlanReply):
         say(reply)
     else:
-        print_plan(reply, console())
+        print_plan(reply, console(), brief=verbosity() < 0)
+        tell_solver(reply)
     return EXIT_STATUS.get(reply.status, FAILED)
+
+
+def tell_solver(reply: PlanReply) -> None:
+    """Say how a plan was found, where more is to be said."""
+    if verbosity() > 0:
+        solver, time = reply.solver, reply.time
+        note(
+            f"{solver.name}: {solver.status} after {solver.iterations} iterations; "
+            f"model {1e3 * time.model:.1f} ms, solve {1e3 * time.solve:.1f} ms, "
+            f"in all {1e3 * time.total:.1f} ms"
+        )
 
 
 def draw_plan(answer: Planned, picture: Path) -> None:
@@ -115,15 +147,16 @@ def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, 
     from rich.progress import Progress
 
     screen = console(stderr=True)
+    shown = screen.is_terminal and verbosity() >= 0
     lines = [line] if line is not None and not screen.is_terminal else []
-    bar = Progress(console=screen, transient=True, disable=not screen.is_terminal)
+    bar = Progress(console=screen, transient=True, disable=not shown)
     # before rich 14.3 a bar that is not shown leaves an empty line behind
-    with bar if screen.is_terminal else nullcontext():
+    with bar if shown else nullcontext():
         task = bar.add_task(title, total=None)
 
         def tell(done: int, total: int) -> None:
             if lines:
-                note(lines.pop())
+                remark(lines.pop())
             bar.update(task, completed=done, total=total)
 
         yield tell
@@ -141,6 +174,7 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
     )
 
     screen = console(stderr=True)
+    shown = screen.is_terminal and verbosity() >= 0
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -148,8 +182,8 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[words]}", markup=False),
     )
-    bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
-    with bar if screen.is_terminal else nullcontext():
+    bar = Progress(*columns, console=screen, transient=True, disable=not shown)
+    with bar if shown else nullcontext():
         task = bar.add_task(title, total=None, words="")
         yield lambda done, total, words: bar.update(task, completed=done, total=total, words=words)
 
@@ -157,7 +191,7 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
 @contextmanager
 def waiting(title: str, request: PlanRequest) -> Iterator[None]:
     """Show on a terminal's standard error that hands with floating wrists take a while."""
-    slow = any(hand.wrist == "floating" for hand in request.stance.hands)
+    slow = verbosity() >= 0 and any(hand.wrist == "floating" for hand in request.stance.hands)
     screen = console(stderr=True) if slow else None
     with nullcontext() if screen is None or not screen.is_terminal else screen.status(title):
         yield

@@ -1,0 +1,168 @@
+"""What every command has: a version, completion, more or less said, and a status in its colour."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+import pytest
+from click.shell_completion import ShellComplete
+from rich.console import Console
+
+from hand_models.studies import STUDIES
+from hand_models.tile import surface_names
+from service.answering import planned
+from service.commands.cli import COMMANDS, crux, run
+from service.commands.stances import LIMBS, bundled, limbs_of, read_request
+from service.commands.studies import MEASURE, NAMES, SURFACES
+from service.requests import RouteRequest
+from service.tables import print_plan
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED
+from tests.suite.helpers.requests import HEAVY, put, wall_request
+
+
+def completed(*words: str) -> list[str]:
+    """Complete the last word as a shell would; what completes to a file is left out."""
+    *before, begun = words
+    items = ShellComplete(crux, {}, "crux", "_CRUX_COMPLETE").get_completions(before, begun)
+    return [item.value for item in items if item.type == "plain"]
+
+
+def test_the_version_is_that_of_the_distribution(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == DONE
+    assert capfd.readouterr().out == f"crux {version('crux')}\n"
+
+
+@pytest.mark.parametrize("command", ["plan", "query", "wrench-space", "body-space", "stream"])
+def test_names_of_stances_are_completed(command: str) -> None:
+    assert completed(command, "") == list(bundled())
+    assert completed(command, "wall-300-") == ["wall-300-floating", "wall-300-joints"]
+
+
+def test_names_of_commands_routes_and_studies_are_completed() -> None:
+    assert completed("") == sorted(COMMANDS)
+    assert completed("s") == ["schema", "serve", "stream", "study", "sweep"]
+    assert completed("route", "") == list(bundled(RouteRequest))
+    assert completed("study", "fig1") == [name for name in NAMES if name.startswith("fig1")]
+
+
+def test_names_that_completion_knows_are_all_there_are() -> None:
+    assert (*STUDIES, MEASURE) == NAMES
+    assert surface_names() == SURFACES
+
+
+def test_limbs_are_those_of_the_stance(stance_file) -> None:
+    assert completed("wrench-space", "wall-300", "--hand", "") == [*limbs_of("wall-300")]
+    assert set(limbs_of("wall-300")) == set(LIMBS)
+    limbs = ("nose", "tail")
+    request = wall_request()
+    for i, limb in enumerate(limbs):
+        request = put(request, ("stance", "hands", i, "limb"), limb)
+    del request["stance"]["hands"][2:]
+    assert completed("wrench-space", stance_file(request), "--hand", "") == ["nose", "tail"]
+    assert completed("wrench-space", "no-such-file", "--hand", "rear") == [
+        "rear_right",
+        "rear_left",
+    ]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_less_is_said_where_asked(
+    place: int, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", stance_file(wall_request(HEAVY))]
+    assert run(words) == OVERLOADED
+    whole = capfd.readouterr().out.splitlines()
+    assert run([*words[:place], "--quiet", *words[place:]]) == OVERLOADED
+    out, error = capfd.readouterr()
+    assert out.startswith("OVERLOADED ")
+    assert len(out.splitlines()) < 5 < len(whole)
+    assert error == ""
+    # an error is said all the same
+    assert run(["-q", "plan", "nowhere"]) == BAD_INPUT
+    assert len(capfd.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_more_is_said_where_asked(
+    place: int, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", stance_file(wall_request())]
+    assert run(words) == DONE
+    assert capfd.readouterr().err == ""
+    assert run([*words[:place], "-v", *words[place:]]) == DONE
+    solver, time = capfd.readouterr().err.splitlines()
+    assert "iterations" in solver
+    assert solver.startswith("crux: ")
+    assert time.startswith("crux: took ")
+
+
+RED, GREEN = "\x1b[1;31m", "\x1b[1;32m"
+
+
+@pytest.mark.parametrize(
+    ("status", "colour"),
+    [("optimal", GREEN), ("overloaded", RED), ("infeasible", RED), ("failed", RED)],
+)
+def test_a_status_has_its_colour(status: str, colour: str) -> None:
+    reply = planned(read_request("wall-300")).reply
+    reply = msgspec.structs.replace(reply, status=status)
+    out = Console(file=io.StringIO(), force_terminal=True, color_system="standard", no_color=False)
+    print_plan(reply, out, brief=True)
+    assert out.file.getvalue().startswith(f"{colour}{status.upper()}\x1b[0m")
+
+
+def on_a_terminal(arguments: Sequence[str], stream: str = "stdout", **more: str) -> str:
+    """What a command writes to a terminal that one of its streams is."""
+    ours, theirs = pty.openpty()
+    env = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
+    subprocess.run(
+        [sys.executable, "-c", "from service.commands import main; main()", *arguments],
+        cwd=ROOT,
+        env=env | {"TERM": "xterm", "COLUMNS": "80"} | more,
+        check=True,
+        **{"stdout": subprocess.DEVNULL, stream: theirs},
+    )
+    os.close(theirs)
+    told = b""
+    try:
+        while part := os.read(ours, 1 << 16):
+            told += part
+    except OSError:
+        # Linux says so where nothing more can come
+        pass
+    os.close(ours)
+    return told.decode()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
+def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
+    words = ["-q", "plan", "wall-300"]
+    assert f"{GREEN}OPTIMAL" in on_a_terminal(words)
+    assert "\x1b[1;32m" not in on_a_terminal(words, NO_COLOR="1")
+    piped = subprocess.run(
+        [sys.executable, "-c", "from service.commands import main; main()", *words],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert piped.stdout.startswith("OPTIMAL ")
+    assert "\x1b" not in piped.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
+def test_a_study_shows_how_far_it_is(tmp_path: Path) -> None:
+    words = ["study", "fig06", "-o", str(tmp_path)]
+    told = on_a_terminal(words, stream="stderr")
+    assert "fig06" in told
+    assert "%" in told
+    assert on_a_terminal(["-q", *words], stream="stderr") == ""
