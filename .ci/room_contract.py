@@ -29,3 +29,29 @@ class RoomContract(Contract):
         """Print those imports."""
         for line in check.metadata["found"]:
             output.print_error(line)
+
+
+class FaceContract(Contract):
+    """Modules of ``importer`` import from ``package`` itself, its index, and from no room of it."""
+
+    type_name = "face"
+
+    importer = fields.StringField()
+    package = fields.StringField()
+    besides = fields.SetField(subfield=fields.StringField(), required=False)
+
+    def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
+        """Return the imports that reach past the index."""
+        allowed = {self.package, *(self.besides or ())}
+        found = [
+            f"{importer} imports {imported}: import it from {self.package}"
+            for importer in sorted(graph.find_descendants(self.importer) | {self.importer})
+            for imported in sorted(graph.find_modules_directly_imported_by(importer))
+            if imported.split(".")[0] == self.package and imported not in allowed
+        ]
+        return ContractCheck(kept=not found, metadata={"found": found})
+
+    def render_broken_contract(self, check: ContractCheck) -> None:
+        """Print those imports."""
+        for line in check.metadata["found"]:
+            output.print_error(line)

@@ -1,12 +1,94 @@
-from .advice import plan as plan
-from .prepare import hand_space as hand_space
+from . import deadline as deadline
+from .advice import (
+    HAND_PATH as HAND_PATH,
+    hand_path as hand_path,
+    plan as plan,
+    with_advice as with_advice,
+)
+from .capability import (
+    COMPONENTS as COMPONENTS,
+    OTHERS as OTHERS,
+    BodySection as BodySection,
+    BodySpace as BodySpace,
+    End as End,
+    MeasurementStudy as MeasurementStudy,
+    Survey as Survey,
+    survey as survey,
+)
+from .deadline import (
+    DeadlineError as DeadlineError,
+)
+from .explanation import (
+    constraint_words as constraint_words,
+)
+from .pictures import (
+    plot_body_space as plot_body_space,
+    plot_plan as plot_plan,
+    plot_wrench_space as plot_wrench_space,
+    summary as summary,
+    write_report as write_report,
+)
+from .prepare import (
+    floating_wrist as floating_wrist,
+    hand_space as hand_space,
+    resting_hand as resting_hand,
+    settle_each as settle_each,
+)
+from .processes import (
+    OUT_OF_MEMORY as OUT_OF_MEMORY,
+    Lane as Lane,
+    Lost as Lost,
+    Make as Make,
+    Station as Station,
+    Workers as Workers,
+    cores as cores,
+    resident as resident,
+)
 from .question import (
+    EARTH as EARTH,
+    BodyRange as BodyRange,
+    ForceCap as ForceCap,
     HandOnHold as HandOnHold,
     Limits as Limits,
     Load as Load,
+    Objective as Objective,
     Question as Question,
     Stance as Stance,
 )
-from .result import Plan as Plan
-from .solving import KnownStance as KnownStance
-from .streaming import WrenchStream as WrenchStream
+from .result import (
+    Advice as Advice,
+    Clearance as Clearance,
+    Distance as Distance,
+    Finding as Finding,
+    Finger as Finger,
+    HandPlan as HandPlan,
+    LimitName as LimitName,
+    Plan as Plan,
+    Price as Price,
+    Quantiles as Quantiles,
+    RobustLoadFactor as RobustLoadFactor,
+    SetPoints as SetPoints,
+    Solver as Solver,
+    Spread as Spread,
+    TensionPath as TensionPath,
+    Time as Time,
+    WristPlan as WristPlan,
+)
+from .robots import (
+    Robot as Robot,
+    RobotFile as RobotFile,
+    robosimian as robosimian,
+    robot_of as robot_of,
+)
+from .route import (
+    Move as Move,
+    Route as Route,
+    RouteResult as RouteResult,
+    evaluate as evaluate,
+)
+from .solving import (
+    KnownStance as KnownStance,
+)
+from .streaming import (
+    WrenchStream as WrenchStream,
+)

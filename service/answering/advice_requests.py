@@ -9,8 +9,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from planner.advice import HAND_PATH, hand_path
-from planner.result import Advice
+from planner import HAND_PATH, Advice, hand_path
 from service.requests import PlanRequest
 
 __all__ = ["advised"]

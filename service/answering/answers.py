@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from msgspec import UNSET
 
-from planner.result import Plan
+from planner import Plan
 from service import replies
 from service.answering.hand_answers import hand_reply, plain, told, wrench_set_reply
 

@@ -9,8 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from planner.capability import COMPONENTS, BodySection, BodySpace, End
-from planner.result import Time
+from planner import COMPONENTS, BodySection, BodySpace, End, Time
 from service import replies
 from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_models import ROBOTS, Robots

@@ -8,12 +8,10 @@ from typing import Any, Final, NamedTuple
 
 from msgspec.structs import replace
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner import advice, deadline
-from planner.deadline import DeadlineError
-from planner.question import Question
-from planner.result import Plan
+from planner import DeadlineError, Plan, Question, deadline
 from service.answering.answers import brief_plan_reply, plan_reply
 from service.answering.hand_answers import placed_poses
 from service.answering.mesh_files import MeshFiles
@@ -88,7 +86,7 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
         wanted = [want for want in request.want if want in told]
         request = replace(request, want=wanted, draws=[])
     asked = question(request, robots)
-    answer = advice.plan(asked)
+    answer = planner.plan(asked)
     reply: PlanReply | BriefPlanReply
     if request.detail == "full":
         reply = plan_reply(answer, request.id, model="model" in request.want)
@@ -103,7 +101,7 @@ def with_advice(answer: Planned) -> Planned:
     """Return an answer with advice, if its reply is whole and there is none yet."""
     if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
         return answer
-    found = advice.with_advice(answer.question, answer.plan)
+    found = planner.with_advice(answer.question, answer.plan)
     told = plan_reply(found, answer.reply.id, model=False)
     reply = replace(
         answer.reply,

@@ -12,8 +12,7 @@ from msgspec import UNSET, Struct, UnsetType
 from hand_models.base import Pose
 from hand_models.hand import Seating
 from hand_models.wrench_spaces import WrenchSpace
-from planner.question import Stance
-from planner.result import HandPlan, WristPlan
+from planner import HandPlan, Stance, WristPlan
 from service import replies
 
 __all__ = [

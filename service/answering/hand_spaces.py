@@ -12,8 +12,7 @@ from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, robustness, tension_limits
 from hand_models.hand import FINGERS, SettledHand, Tile, closing_sequence, nearby_closures
 from hand_models.wrench_spaces import WrenchSpace
-from planner import deadline, prepare
-from planner.result import WristPlan
+from planner import WristPlan, deadline, resting_hand
 from service import replies
 from service.answering.hand_answers import (
     placed_poses,
@@ -59,7 +58,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     """
     asked = stance(request.stance, robots)
     deadline.check(KNOWN)
-    hand = prepare.resting_hand(asked, request.limb)
+    hand = resting_hand(asked, request.limb)
     settled = hand.settled
     deadline.check(KNOWN)
     views = _views(hand.space, request.want)

@@ -20,7 +20,7 @@ import msgspec
 from hand_models.base import InvalidInputError, within
 from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_hand
-from planner.robots import Robot, RobotFile, robosimian, robot_of
+from planner import Robot, RobotFile, robosimian, robot_of
 from service.requests import (
     BodySpaceRequest,
     Draw,

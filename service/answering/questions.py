@@ -16,8 +16,7 @@ from hand_models.fixed_wrist import UP, approach_frame
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
-from planner.prepare import settle_each
-from planner.question import (
+from planner import (
     EARTH,
     BodyRange,
     ForceCap,
@@ -27,13 +26,14 @@ from planner.question import (
     Objective,
     Question,
     Stance,
+    settle_each,
 )
 from service import requests
 from service.answering.holds import Rocks, placed, pose_of, rocks_of
 from service.answering.own_models import ROBOTS, Robots, builder_of
 
 if TYPE_CHECKING:
-    from planner.route import Route
+    from planner import Route
 
 __all__ = ["question", "route", "stance"]
 
@@ -92,7 +92,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     InvalidInputError
         If a part of it is impossible; the field is relative to the file.
     """
-    from planner.route import Move, Route
+    from planner import Move, Route
 
     start, rocks = _stance(request.stance, robots)
     kind = start.robot.hand

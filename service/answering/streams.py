@@ -9,9 +9,7 @@ from collections import OrderedDict
 from typing import Final
 
 from hand_models.base import InvalidInputError, UnsupportedError
-from planner import deadline
-from planner.result import SetPoints
-from planner.streaming import WrenchStream
+from planner import SetPoints, WrenchStream, deadline
 from service.answering.answers import BRIEF, cut_reason
 from service.answering.hand_answers import placed_poses, plain, told
 from service.answering.own_models import ROBOTS, Robots

@@ -23,7 +23,7 @@ from service.requests import PlanRequest
 from service.wire import PLAN, Answer, Format
 
 if TYPE_CHECKING:
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = [
     "Setting",

@@ -13,7 +13,7 @@ import msgspec
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import FINGERS
-from planner.result import LimitName
+from planner import LimitName
 from service.replies import AXES, ErrorDetail
 from service.wire import Answer, Format
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
 
 from hand_models.base import CruxError, InvalidInputError
-from planner.processes import Lost, cores
+from planner import Lost, cores
 from service.bulk.chunks import answer_chunk
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
-from planner.processes import Lost
+from planner import Lost
 from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_version
 from service.bulk.columns import row_of
 from service.bulk.grouping import about, grouped
@@ -18,7 +18,7 @@ from service.wire import Answer, Format, LostError, MalformedError, encode_error
 if TYPE_CHECKING:
     from distributed import Client
 
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["answered", "evaluate"]
 

@@ -13,7 +13,7 @@ import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
 from hand_models.parameters import ParameterTable
-from planner.robots import RobotFile
+from planner import RobotFile
 from service.bulk.chunks import own_version
 from service.bulk.lines import LineDigest
 

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any, Final, Protocol, Self
 
 from hand_models.base import InvalidInputError
-from planner.processes import Lost, Workers, cores
+from planner import Lost, Workers, cores
 from service.bulk.chunks import Setting, answer_chunk
 
 __all__ = ["Here", "Pool", "Processes", "pool_on"]

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import msgspec
 
 from hand_models.base import InvalidInputError
-from planner.result import Time
+from planner import Time
 from service.bulk.columns import Column, Row
 from service.bulk.lines import LineDigest, Lines
 from service.bulk.manifest import Manifest

@@ -32,7 +32,7 @@ from service.wire import REQUEST_KINDS
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
     from service.bulk import Column, Lines, Sink, Table, Tally
 
 __all__ = ["batch"]
@@ -197,7 +197,7 @@ def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | N
 
 def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tuple[Column, ...]:
     """Return the columns of a table about a robot."""
-    from planner.robots import RobotFile
+    from planner import RobotFile
     from service.bulk import chosen_columns
 
     limbs = (RobotFile.bundled() if robot is None else robot).limbs

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import zenoh
 
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["demo", "query", "schema", "serve"]
 

@@ -17,7 +17,7 @@ from service.serving import TIMEOUT
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = [
     "PICTURES",

@@ -39,7 +39,7 @@ from service.tables import (
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
     from service.answering import Robots
     from service.replies import PlanReply
 
@@ -159,7 +159,7 @@ def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[
 
 def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
     """Return how much could be carried if no palm did; None if the time is over before."""
-    from planner.deadline import DeadlineError
+    from planner import DeadlineError
     from service import answering
     from service.replies import PlanReply
 
@@ -198,8 +198,7 @@ def route(
 
     ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
     """
-    from planner.pictures import summary, write_report
-    from planner.route import evaluate
+    from planner import evaluate, summary, write_report
     from service import answering
     from service.answering import robots_of
     from service.tables import console, print_route

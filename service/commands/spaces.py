@@ -23,7 +23,7 @@ from service.tables import DONE, EXIT_STATUS, FAILED, OVERLOADED, progress, say,
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["body_space", "wrench_space"]
 
@@ -54,8 +54,7 @@ def wrench_space(
     as_json: bool,
 ) -> int:
     """Show what one hand can carry."""
-    from planner import prepare
-    from planner.capability import survey
+    from planner import floating_wrist, hand_space, survey
     from service import answering
     from service.answering import robots_of
     from service.replies import RobustCapability
@@ -71,19 +70,19 @@ def wrench_space(
         reply.robust = answering.wrench_space(alone, robots).robust
     found = None
     if per_axis is not None:
-        wrist = prepare.floating_wrist(answering.stance(request.stance, robots), limb)
+        wrist = floating_wrist(answering.stance(request.stance, robots), limb)
         with progress(f"{per_axis}^6 poses of {limb}") as tell:
             found = survey(wrist, per_axis, tell)
     if picture is not None:
-        from planner import pictures
+        from planner import plot_wrench_space
 
         drawn = answering.stance(request.stance, robots)
-        settled, space = prepare.hand_space(drawn, limb)
+        settled, space = hand_space(drawn, limb)
         shown, preload = space if reply.capability else None, None
         if reply.wrist.mode == "floating":
-            preload = prepare.floating_wrist(drawn, limb).hand.preload
+            preload = floating_wrist(drawn, limb).hand.preload
         with writing(picture):
-            pictures.plot_wrench_space(
+            plot_wrench_space(
                 settled,
                 shown,
                 picture,
@@ -161,10 +160,10 @@ def body_space(
     with waiting(f"exploring {stance}", plan):
         found = explore(request, robots_of(robot))
         if picture is not None:
-            from planner import pictures
+            from planner import plot_body_space
 
             with writing(picture):
-                pictures.plot_body_space(found.space, found.section, picture, stance)
+                plot_body_space(found.space, found.section, picture, stance)
     if as_json:
         say(found.reply)
     else:

@@ -26,8 +26,7 @@ from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, not
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
-    from planner.streaming import WrenchStream
+    from planner import RobotFile, WrenchStream
     from service.replies import ErrorReply, SetPointsReply
 
 __all__ = ["stream"]

@@ -112,7 +112,7 @@ def chosen_study(name: str, **options: Any) -> str | Study:
 
 def _measurements() -> Study:
     """Return the study of measurements, over all bundled stances whose wrists are fixed."""
-    from planner.capability import MeasurementStudy
+    from planner import MeasurementStudy
     from service.answering import question
     from service.commands.stances import bundled, read_request
 

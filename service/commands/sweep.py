@@ -24,7 +24,7 @@ from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progre
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner.robots import RobotFile
+    from planner import RobotFile
     from service.sweeping import Design, Row, Sweep
 
 __all__ = ["sweep"]

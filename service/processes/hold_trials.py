@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.processes import Lost, Workers, cores
+from planner import Lost, Workers, cores
 
 if TYPE_CHECKING:
     from hand_models.fixed_wrist import FoundHold, Trial

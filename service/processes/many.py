@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Final, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.processes import Lost, Workers, cores
+from planner import Lost, Workers, cores
 from service.processes.questions import Job, answering
 from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
 
 if TYPE_CHECKING:
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["Planners", "plan_many", "worth"]
 

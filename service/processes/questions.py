@@ -13,7 +13,7 @@ from hand_models.parameters import ParameterTable
 from service.wire import Answer
 
 if TYPE_CHECKING:
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["Job", "answering"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from planner.result import Finding, LimitName, Time
+from planner import Finding, LimitName, Time
 from service.replies.reply import StanceReply, Vector
 
 __all__ = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import Finger
+from planner import Finger
 from service.replies.reply import PlacedFrame, Vector
 
 __all__ = ["Generator", "Hand", "Palm", "Row", "Seating", "WrenchSet", "Wrist"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result import (
+from planner import (
     Advice,
     Clearance,
     Finding,

@@ -6,7 +6,7 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final
 
-from planner.processes import OUT_OF_MEMORY, Lane, Make, Station, resident
+from planner import OUT_OF_MEMORY, Lane, Make, Station, resident
 from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import Question

@@ -22,8 +22,7 @@ from typing import Final, cast
 import zenoh
 
 from hand_models.base import CruxError
-from planner.deadline import DeadlineError
-from planner.processes import Lane, Station
+from planner import DeadlineError, Lane, Station
 from service.processes import Job
 from service.serving.costs import Costs
 from service.serving.crew import Crew

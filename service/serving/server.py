@@ -15,8 +15,7 @@ from zenoh.handlers import Callback
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner.processes import Make, cores
-from planner.robots import RobotFile
+from planner import Make, RobotFile, cores
 from service.answering import SERVICES, robots_of
 from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE

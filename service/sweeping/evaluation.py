@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
-from planner.result import LimitName
+from planner import LimitName
 from service.processes import Planners, worth
 from service.replies import ErrorDetail
 from service.sweeping.design import Design, Point
 from service.wire import REQUEST_KINDS, Answer, Format
 
 if TYPE_CHECKING:
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["Ask", "Row", "State", "asking", "rows_at"]
 

@@ -15,7 +15,7 @@ from msgspec import inspect
 
 from hand_models.base import InvalidInputError
 from hand_models.tile import Surface as Preset
-from planner.question import EARTH
+from planner import EARTH
 from service.requests import PlanRequest, Stance, Surface
 from service.wire import Place, entered, field_names, places_at
 

@@ -20,7 +20,7 @@ from service.sweeping.evaluation import Ask, Row, asking, rows_at
 from service.sweeping.variation import Value, Variation
 
 if TYPE_CHECKING:
-    from planner.robots import RobotFile
+    from planner import RobotFile
 
 __all__ = ["Sweep", "answered", "sweep"]
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from rich.console import Console
 
-from planner.result import Advice
+from planner import Advice
 
 __all__ = ["print_advice"]
 

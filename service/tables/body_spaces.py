@@ -8,8 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
-from planner.capability import COMPONENTS, OTHERS
-from planner.result import LimitName
+from planner import COMPONENTS, OTHERS, LimitName
 from service import replies
 from service.replies import BodySpaceReply
 from service.tables.layout import in_colour, show, table_of, unit_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from planner.result import Clearance, Distance
+from planner import Clearance, Distance
 from service.tables.layout import show, table_of
 
 __all__ = ["print_clearance"]

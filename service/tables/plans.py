@@ -10,14 +10,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from planner.explanation import constraint_words
-from planner.result import (
+from planner import (
     Clearance,
     LimitName,
     Price,
     RobustLoadFactor,
     Spread,
     TensionPath,
+    constraint_words,
 )
 from service.replies import (
     AXES,

@@ -8,8 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from planner.pictures import summary
-from planner.route import RouteResult
+from planner import RouteResult, summary
 from service.tables.layout import in_colour, table_of
 
 __all__ = ["print_route"]

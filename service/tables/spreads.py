@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from planner.result import Quantiles, RobustLoadFactor, Spread
+from planner import Quantiles, RobustLoadFactor, Spread
 
 __all__ = ["robust_sentence", "spread_sentence", "within"]
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
-from planner.capability import Survey
+from planner import Survey
 from service.replies import AXES
 from service.tables.layout import table_of, unit_of
 

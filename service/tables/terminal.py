@@ -104,10 +104,10 @@ def tell_solver(reply: PlanReply) -> None:
 
 def draw_plan(answer: Planned, picture: Path) -> None:
     """Draw a plan in its stance."""
-    from planner import pictures
+    from planner import plot_plan
 
     with writing(picture):
-        pictures.plot_plan(answer.plan, answer.question, picture)
+        plot_plan(answer.plan, answer.question, picture)
 
 
 @contextmanager

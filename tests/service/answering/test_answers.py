@@ -364,7 +364,9 @@ def test_a_plans_spread_over_draws_of_the_callers_own_travels():
 @pytest.mark.parametrize("detail", ["set_points", "hands"])
 def test_what_brief_replies_do_not_tell_is_not_found(monkeypatch, detail):
     asked, planned = [], solving.plan(questions.question(plan_request(flat_request())))
-    monkeypatch.setattr(dispatch.advice, "plan", lambda question: asked.append(question) or planned)
+    monkeypatch.setattr(
+        dispatch.planner, "plan", lambda question: asked.append(question) or planned
+    )
     want = ["load_factor", "spread", "prices"]
     draws = [own_draw(Surface.named("rock").shear_limit)]
     request = flat_request() | {"want": want, "draws": draws, "detail": detail}
