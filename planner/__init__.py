@@ -9,6 +9,5 @@ asked for.
 """
 
 import lazy_loader
-import numpy.typing  # noqa: F401 - whole, before threads load rooms that each ask for parts of it
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

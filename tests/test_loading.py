@@ -38,7 +38,7 @@ atexit.register(lambda: print("\\n" + json.dumps(list(sys.modules))))
 @pytest.mark.parametrize(
     ("statement", "absent"),
     [
-        ("from service import CruxClient", HEAVY),
+        ("from service import CruxClient", (*HEAVY, "numpy", "rich")),
         ("from service import PlanRequest, ServiceError", (*HEAVY, "numpy", "zenoh")),
         ("from hand_models import Pose, Cylinder", HEAVY),
         ("from planner import Load, Limits", ("scipy.optimize", "trimesh", "cvxpy", "clarabel")),

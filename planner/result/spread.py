@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
 from msgspec import Struct
 
-from hand_models.base import Array
+if TYPE_CHECKING:
+    from hand_models.base import Array
 
 __all__ = ["MANY", "VARIES", "DrawnPlan", "Influence", "Quantiles", "Spread"]
 
@@ -56,6 +56,8 @@ class Quantiles(Struct, frozen=True):
     @classmethod
     def of(cls, values: Sequence[float | None]) -> Quantiles | None:
         """Return the quantiles of the numbers that are there; None if none is."""
+        import numpy as np
+
         there = [value for value in values if value is not None]
         percents = PERCENTS if len(there) >= MANY else (0.0, 50.0, 100.0)
         return cls(*np.percentile(there, percents).tolist()) if there else None
@@ -155,6 +157,8 @@ class Spread(Struct, frozen=True):
 
 def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> list[Influence]:
     """Return the largest shares of the load factor's variation, the largest first."""
+    import numpy as np
+
     there = [k for k, factor in enumerate(factors) if factor is not None]
     found = np.array([factors[k] for k in there], dtype=float)
     if len(found) < FEWEST or np.ptp(found) <= VARIES * np.abs(found).max():
@@ -175,6 +179,8 @@ def _centred_ranks(values: Array, least: float = 0.0) -> Array:
 
     Values that differ by no more than ``least`` from the next have their mean rank.
     """
+    import numpy as np
+
     order = values.argsort()
     steps = np.diff(values[order]) > least
     places = np.empty(len(values), dtype=np.intp)
