@@ -12,7 +12,7 @@ from packaging.version import Version
 from tests.suite.helpers.checkout import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-EXTRAS = ("scans", "test", "bench")  # the linters read the newest types
+EXTRAS = ("scans", "test", "bench", "docs")  # the linters read the newest types
 
 
 def only(specifier: SpecifierSet, operator: str) -> Version:

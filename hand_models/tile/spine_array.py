@@ -233,7 +233,7 @@ class SpineArray:
 
         Returns
         -------
-        ndarray, shape (trials, *directions)
+        ndarray, shape (trials, ...)
             Force magnitude [N]; infinite where the friction of pressing holds any load.
         """
         phi, theta = np.broadcast_arrays(np.asarray(angle, float), np.asarray(azimuth, float))

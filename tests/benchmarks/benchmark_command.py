@@ -120,7 +120,7 @@ def _there(name: str) -> bool:
 @click.option("--stances", type=click.IntRange(1), help="Random stances to plan [300].")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count, help="For these.")
 @click.option(
-    "--readme",
+    "--page",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Put the tables between the marks of this file.",
 )
@@ -134,7 +134,7 @@ def main(
     only: tuple[str, ...],
     stances: int | None,
     workers: int,
-    readme: Path | None,
+    page: Path | None,
     plot: Path | None,
 ) -> None:
     """Measure crux beside its peers, and print the table."""
@@ -164,5 +164,5 @@ def main(
     print_tables(tables, console)
     note = f"Medians of {size.rounds} rounds on {machine()}"
     console.print(note)
-    if readme is not None:
-        into(readme, f"{note}\n\n{markdown(tables)}")
+    if page is not None:
+        into(page, f"{note}\n\n{markdown(tables)}")

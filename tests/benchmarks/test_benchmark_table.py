@@ -59,9 +59,9 @@ def test_tables_are_put_between_the_marks_and_nowhere_else(tmp_path):
 def test_the_command_measures_every_part(tmp_path):
     pytest.importorskip("qoco")
     pytest.importorskip("pycapacity")
-    readme, plot = tmp_path / "README.md", tmp_path / "growth.png"
-    readme.write_text(f"# crux\n\n{BEGIN}\n{END}\n")
-    options = ["--quick", "--workers", "1", "--readme", str(readme), "--plot", str(plot)]
+    page, plot = tmp_path / "performance.md", tmp_path / "growth.png"
+    page.write_text(f"# crux\n\n{BEGIN}\n{END}\n")
+    options = ["--quick", "--workers", "1", "--page", str(page), "--plot", str(plot)]
     done = subprocess.run(
         [sys.executable, "-m", "tests.benchmarks", *options],
         cwd=ROOT,
@@ -71,7 +71,7 @@ def test_the_command_measures_every_part(tmp_path):
         timeout=240,
     )
     assert done.returncode == 0, done.stderr
-    text = readme.read_text()
+    text = page.read_text()
     for line in (
         "parsed request",
         "plan_many",

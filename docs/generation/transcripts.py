@@ -1,0 +1,248 @@
+"""A page for each key of the service, with bytes that a real service answered with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any, Final, NamedTuple
+
+import msgspec
+import zenoh
+
+from generation.messages import anchor
+from service.serving import PlanService, open_session, zenoh_config
+from service.wire import most_bytes, service_key
+from service.wire.json_schema import MESSAGES
+
+__all__ = ["key_pages"]
+
+ROBOT: Final = "robosimian"
+
+SHOWN: Final = 1024
+"""Bytes of a payload that a page shows; the whole of it is a file beside it."""
+
+ENCODINGS: Final = {"json": "application/json", "msgpack": "application/msgpack"}
+
+TIMEOUT: Final = 60.0
+"""Of a question, of which the first waits for processes that start [s]."""
+
+KINDS: Final = {kind.__name__: kind for kind in MESSAGES}
+
+
+class _Key(NamedTuple):
+    """What is asked at a key, of which example, and what a reader has to know."""
+
+    name: str
+    request: str
+    reply: str
+    words: str
+    example: Mapping[str, Any]
+
+
+class _Told(NamedTuple):
+    payload: bytes
+    encoding: str
+    good: bool
+
+
+def key_pages() -> dict[str, bytes]:
+    """Return the pages of the keys, the list of them, and their payloads as files."""
+    pages: dict[str, bytes] = {}
+    # nothing but this process hears of this session
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with open_session(config) as session, PlanService(session, workers=1):
+        for key in _keys():
+            _add_page(session, key, pages)
+        pages["keys/errors.md"] = _errors(session).encode()
+        pages["keys/health.md"] = _plain(session, "health", HEALTH).encode()
+        pages["keys/metrics.md"] = _plain(session, "metrics", METRICS).encode()
+    names = [*(key.name for key in _keys()), "health", "metrics", "errors"]
+    pages["keys/index.md"] = BEGINNING.format("\n".join(names)).encode()
+    return pages
+
+
+def _keys() -> tuple[_Key, ...]:
+    file = resources.files("service").joinpath("examples", "wall-300.json")
+    stance = json.loads(file.read_text(encoding="utf-8"))["stance"]
+    asked = {"v": 1, "id": "a", "stance": stance}
+    return (
+        _Key("plan", "PlanRequest", "PlanReply", PLAN, asked | {"detail": "set_points"}),
+        _Key(
+            "wrench_space",
+            "WrenchSpaceRequest",
+            "WrenchSpaceReply",
+            WRENCH_SPACE,
+            asked | {"limb": "front_right", "want": []},
+        ),
+        _Key("body_space", "BodySpaceRequest", "BodySpaceReply", BODY_SPACE, asked),
+        _Key("stream", "StreamRequest", "StreamReply", STREAM, asked),
+        _Key(
+            "set_points",
+            "SetPointsRequest",
+            "SetPointsReply",
+            SET_POINTS,
+            {
+                "v": 1,
+                "stream": "",
+                "body_wrench": [1090, 0, 0, 0, -144, 0],
+                "detail": "set_points",
+            },
+        ),
+    )
+
+
+def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> None:
+    example = dict(key.example)
+    if "stream" in example:
+        # as the reply of the page before names it
+        declared = json.loads(pages["bytes/stream-reply.json"])
+        example["stream"] = declared["stream"]
+    text = [
+        f"# {key.name}\n",
+        f"{key.words}\n",
+        f"- Key: `{service_key('<robot>', key.name)}`",
+        f"- Request: [{key.request}](#{anchor(key.request)}),"
+        f" {most_bytes(KINDS[key.request]):,} bytes at most",
+        f"- Reply: [{key.reply}](#{anchor(key.reply)})",
+        "",
+    ]
+    for form, encoding in ENCODINGS.items():
+        coder = msgspec.json if form == "json" else msgspec.msgpack
+        asked = coder.encode(example)
+        told = _ask(session, key.name, asked, encoding)
+        if not told.good:
+            raise RuntimeError(f"{key.name}: {told.payload.decode()}")
+        text.append(f"## {'JSON' if form == 'json' else 'MessagePack'}\n")
+        for part, payload, named in (
+            ("request", asked, encoding),
+            ("reply", told.payload, told.encoding),
+        ):
+            name = f"bytes/{key.name}-{part}.{form}"
+            pages[name] = payload
+            text += [
+                f"The {part}, {len(payload):,} bytes, encoding `{named}`"
+                f" ({{download}}`the whole of it <../{name}>`):\n",
+                f"```{{code-block}} text\n{_shown(payload, form)}\n```\n",
+            ]
+    pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
+
+
+def _errors(session: zenoh.Session) -> str:
+    told = _ask(session, "plan", b'{"v": 1, "id": "a", "stance": {}}', "application/json")
+    if told.good:
+        raise RuntimeError("a request without hands was answered")
+    return ERRORS.format(told.encoding, told.payload.decode())
+
+
+def _plain(session: zenoh.Session, name: str, words: str) -> str:
+    told = _ask(session, name, b"", "")
+    lines = told.payload.decode().splitlines()
+    shown = "\n".join(lines[:12] + ["…"] * (len(lines) > 12))
+    shown = _shown(told.payload, "json") if len(lines) == 1 else shown
+    return PLAIN.format(name, words, service_key("<robot>", name), told.encoding, shown)
+
+
+def _ask(session: zenoh.Session, name: str, payload: bytes, encoding: str) -> _Told:
+    replies = session.get(
+        service_key(ROBOT, name), payload=payload, encoding=encoding, timeout=TIMEOUT
+    )
+    (reply,) = list(replies)
+    told = reply.ok or reply.err
+    if told is None:
+        raise RuntimeError(f"{name}: an answer that is neither a reply nor an error")
+    return _Told(bytes(told.payload), str(told.encoding), reply.ok is not None)
+
+
+def _shown(payload: bytes, form: str) -> str:
+    """Return the beginning of a payload: text, or bytes in hexadecimal beside their characters."""
+    part, rest = payload[:SHOWN], len(payload) - SHOWN
+    if form == "json":
+        text = part.decode(errors="ignore")
+        lines = [text[i : i + 100] for i in range(0, len(text), 100)]
+    else:
+        lines = [
+            f"{i:06x}  {row.hex(' '):<47}  {''.join(chr(b) if 32 <= b < 127 else '.' for b in row)}"
+            for i, row in ((i, part[i : i + 16]) for i in range(0, len(part), 16))
+        ]
+    return "\n".join([*lines, f"… {rest:,} bytes more"] if rest > 0 else lines)
+
+
+BEGINNING = """# Keys of the service
+
+The service answers zenoh queries at the keys below. These pages are enough to write a client in any
+language that has zenoh.
+
+A question is one `get` on the key `crux/<robot>/<name>`, with the request as its payload and its
+encoding. The reply is one sample on that key.
+
+| encoding of the request | format |
+| --- | --- |
+| none, `zenoh/bytes`, `text/json`, `application/json` | JSON |
+| `application/msgpack` | MessagePack, field names as keys |
+
+A `;schema` after it is not looked at. The reply has the format of the request; its encoding tells
+the message too, such as `application/msgpack;crux.PlanReply@1`. An error comes as zenoh's error
+reply (`reply_err`), in the same format: see [errors](errors.md).
+
+Send `source_info` (the identifier of a querier or publisher of yours, and a number that counts your
+questions): by it the service gives each client its turn. Declare the liveliness token
+`crux/<robot>/clients/<zid>`, with your session's zenoh identifier, and what you asked is dropped
+when you go, also behind a router. Both may be left out.
+
+The service itself holds the liveliness token `crux/<robot>/alive`.
+
+Below, `id` is `"a"`, and line breaks within JSON are those of this page.
+
+```{{toctree}}
+:maxdepth: 1
+
+{}
+```
+"""
+
+PLAN = """Who carries what in a stance. The example asks for `"detail": "set_points"`, which a
+controller reads; the reply is then a [BriefPlanReply](#message-briefplanreply)."""
+
+WRENCH_SPACE = """What one hand of a stance can carry. The example leaves out vertices and
+half-spaces (`"want": []`)."""
+
+BODY_SPACE = """Which body wrenches a stance holds."""
+
+STREAM = """Declares a stance for set-points of many body wrenches. The reply names the `stream`;
+the 16 streams that were used last are kept."""
+
+SET_POINTS = """Set-points of a stream that was declared with [stream](stream.md), for one body
+wrench."""
+
+HEALTH = """What an operator asks for: version, uptime, processes, what waits, the last failure."""
+
+METRICS = """Counts and times, as Prometheus reads them."""
+
+PLAIN = """# {}
+
+{}
+
+- Key: `{}`
+- Request: empty
+
+The reply, encoding `{}`:
+
+```{{code-block}} text
+{}
+```
+"""
+
+ERRORS = """# Errors
+
+An error is zenoh's error reply, of 4,096 bytes at most; long texts end in `…`. The message is an
+[ErrorReply](#message-errorreply). `field` is the path in the request that is wrong, or null. What
+each `kind` means: [the service](../../../how-to/service.md#errors).
+
+A request whose stance has no hands, `{{"v": 1, "id": "a", "stance": {{}}}}`, is answered with an
+error reply, encoding `{}`:
+
+```{{code-block}} text
+{}
+```
+"""
