@@ -26,12 +26,13 @@ def main(table: Path) -> None:
     )
     found.write_table(table)
     print(found.counts)
-    held: dict[float, list[float]] = {}
+    heaviest: dict[str, str] = {}
     for row in found.rows:
-        strength, mass = row.point
-        held.setdefault(strength, []).extend([mass] if row.status == "optimal" else [])
-    for strength, masses in held.items():
-        print(f"{strength:.0f} N a tile: up to {max(masses, default=0.0):.0f} kg of those tried")
+        strength, mass = map(str, row.point)
+        if row.status == "optimal":
+            heaviest[strength] = mass  # masses rise from row to row
+    for strength, mass in heaviest.items():
+        print(f"{strength} N a tile: up to {mass} kg of those tried")
 
 
 if __name__ == "__main__":

@@ -23,9 +23,10 @@ def main(endpoint: str) -> None:
         reply = client.plan(request)
         print(f"{reply.status}: utilisation {reply.utilisation:.2f}")
         stream = client.stream(StreamRequest(v=1, stance=request.stance))
-        fx, *rest = stream.body_wrench  # x of B is up the wall
+        fx, fy, fz, mx, my, mz = stream.body_wrench  # x of B is up the wall
         for step in range(STEPS):
-            wrench = (fx + SWAY * math.sin(2.0 * math.pi * step / STEPS), *rest)
+            sway = SWAY * math.sin(2.0 * math.pi * step / STEPS)
+            wrench = (fx + sway, fy, fz, mx, my, mz)
             asked = SetPointsRequest(
                 v=1, stream=stream.stream, body_wrench=wrench, detail="set_points"
             )

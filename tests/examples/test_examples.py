@@ -58,7 +58,7 @@ def test_a_sweep_becomes_a_table(tmp_path: Path):
     printed = run("sweep_to_table", tmp_path).splitlines()
     with (tmp_path / "sweep.csv").open(encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == 18
-    heaviest = [float(re.findall(r"up to (\d+) kg", line)[0]) for line in printed[1:]]
+    heaviest = [float(re.findall(r"up to ([\d.]+) kg", line)[0]) for line in printed[1:]]
     assert heaviest == sorted(heaviest)
     assert 0.0 < heaviest[0] < heaviest[-1]
 
