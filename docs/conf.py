@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
@@ -33,5 +34,16 @@ add_module_names = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
+
+
+def skip_alias(app: Any, what: str, name: str, value: Any, skip: bool, options: Any) -> bool:
+    """Leave out what Python itself says of the fields of a named tuple."""
+    return skip or (value.__doc__ or "").startswith("Alias for field number")
+
+
+def setup(app: Any) -> None:
+    """Take part in what autodoc does."""
+    app.connect("autodoc-skip-member", skip_alias)
+
 
 write_all(HERE / "reference" / "generated")

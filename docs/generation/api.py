@@ -63,10 +63,14 @@ def _page(module: ModuleType, skipped: list[Any]) -> str:
     name = module.__name__
     text = [name, "=" * len(name), "", f".. automodule:: {name}", "   :no-members:", ""]
     text += [f".. currentmodule:: {name}", ""]
-    for member in module.__all__:
-        value = getattr(module, member)
-        if any(value is other for other in skipped):
-            continue
+    package = name.partition(".")[0]
+    values = {member: getattr(module, member) for member in sorted(module.__all__)}
+    known = [member for member, value in values.items() if any(value is one for one in skipped)]
+    if known:
+        links = ", ".join(f":obj:`{package}.{member}`" for member in known)
+        text += [f"Described with the package: {links}.", ""]
+    for member in [member for member in values if member not in known]:
+        value = values[member]
         if inspect.isclass(value):
             text += [f".. autoclass:: {member}", "   :members:", "   :show-inheritance:", ""]
         elif inspect.isroutine(value):
