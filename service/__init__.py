@@ -1,10 +1,9 @@
 """The outside world: messages, the zenoh service and its client, and the ``crux`` command.
 
-    bytes → request → planner.stance.Question → planner.plan.Plan → reply → bytes
+    bytes → request → planner.question.Question → planner.result.Plan → reply → bytes
 
-``requests`` and ``replies`` say what travels, ``codec`` how; ``questions`` and ``answers`` stand
-between the messages and the planner; ``dispatch`` puts them together, and ``server``, ``client``,
-``command`` and, for many requests at once, ``many`` are ways to reach it.
+``requests`` and ``replies`` say what travels, ``wire`` how; ``answering`` stands between messages
+and the planner; ``serving``, ``bulk``, ``processes`` and ``commands`` are ways to reach it.
 """
 
 import lazy_loader
