@@ -40,7 +40,7 @@ Frames: W world, B body, H hand, see [frames, signs and units](../frames.md).
 
 def anchor(name: str) -> str:
     """Return the label of a message or of a part of one."""
-    return "message-" + name.lower().replace(".", "-")
+    return "message-" + name.lower()
 
 
 def message_page() -> str:
@@ -79,7 +79,9 @@ def _words() -> Iterator[tuple[str, str]]:
     for name, kinds in structs.items():
         for kind in kinds:
             rest = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[2]
-            label = name if len(kinds) == 1 else f"{kind.__module__}.{name}"
+            # of two alike, the reply's is told apart
+            apart = len(kinds) > 1 and kind.__module__.startswith("service.replies.")
+            label = f"{name}Reply" if apart else name
             plain = rest.partition("\nAttributes\n")[0]
             yield label, "" if rest.startswith("Attributes") else plain.replace("``", "`")
 
@@ -90,10 +92,7 @@ def _section(name: str, part: Schema, words: str) -> str:
         (f"`{field}`", _type(entry), _need(field, entry, required), _meaning(entry))
         for field, entry in part.get("properties", {}).items()
     ]
-    shown = name.rpartition(".")[2]
-    if shown != name:
-        shown = f"{shown} of a {'request' if '.requests.' in name else 'reply'}"
-    text = [f"({anchor(name)})=\n### {shown}\n", part.get("description", ""), "", words, ""]
+    text = [f"({anchor(name)})=\n### {name}\n", part.get("description", ""), "", words, ""]
     return "\n".join([*text, table(("field", "type", "needed", "meaning"), rows)])
 
 
@@ -115,7 +114,7 @@ def _type(entry: Schema) -> str:
     """Return the words for a type, with its bounds."""
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
-        return f"[{name.rpartition('.')[2]}](#{anchor(name)})"
+        return f"[{name}](#{anchor(name)})"
     if "anyOf" in entry:
         return " or ".join(dict.fromkeys(map(_type, entry["anyOf"])))
     if "enum" in entry:

@@ -12,7 +12,7 @@ import zenoh
 
 from generation.messages import anchor
 from service.serving import PlanService, open_session, zenoh_config
-from service.wire import most_bytes, service_key
+from service.wire import most_bytes, schema, service_key
 from service.wire.json_schema import MESSAGES
 
 __all__ = ["key_pages"]
@@ -31,11 +31,9 @@ KINDS: Final = {kind.__name__: kind for kind in MESSAGES}
 
 
 class _Key(NamedTuple):
-    """What is asked at a key, of which example, and what a reader has to know."""
+    """What a reader of a key has to know, and what is asked there for example."""
 
     name: str
-    request: str
-    reply: str
     words: str
     example: Mapping[str, Any]
 
@@ -67,20 +65,16 @@ def _keys() -> tuple[_Key, ...]:
     stance = json.loads(file.read_text(encoding="utf-8"))["stance"]
     asked = {"v": 1, "id": "a", "stance": stance}
     return (
-        _Key("plan", "PlanRequest", "PlanReply", PLAN, asked | {"detail": "set_points"}),
+        _Key("plan", PLAN, asked | {"detail": "set_points"}),
         _Key(
             "wrench_space",
-            "WrenchSpaceRequest",
-            "WrenchSpaceReply",
             WRENCH_SPACE,
             asked | {"limb": "front_right", "want": []},
         ),
-        _Key("body_space", "BodySpaceRequest", "BodySpaceReply", BODY_SPACE, asked),
-        _Key("stream", "StreamRequest", "StreamReply", STREAM, asked),
+        _Key("body_space", BODY_SPACE, asked),
+        _Key("stream", STREAM, asked),
         _Key(
             "set_points",
-            "SetPointsRequest",
-            "SetPointsReply",
             SET_POINTS,
             {
                 "v": 1,
@@ -98,13 +92,17 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
         # as the reply of the page before names it
         declared = json.loads(pages["bytes/stream-reply.json"])
         example["stream"] = declared["stream"]
+    named = service_key("<robot>", key.name)
+    exchange = schema()["keys"][named]
+    request = _name(exchange["request"])
+    replies = exchange["reply"].get("anyOf", [exchange["reply"]])
+    told_as = " or ".join(f"[{_name(reply)}](#{anchor(_name(reply))})" for reply in replies)
     text = [
         f"# {key.name}\n",
         f"{key.words}\n",
-        f"- Key: `{service_key('<robot>', key.name)}`",
-        f"- Request: [{key.request}](#{anchor(key.request)}),"
-        f" {most_bytes(KINDS[key.request]):,} bytes at most",
-        f"- Reply: [{key.reply}](#{anchor(key.reply)})",
+        f"- Key: `{named}`",
+        f"- Request: [{request}](#{anchor(request)}), {most_bytes(KINDS[request]):,} bytes at most",
+        f"- Reply: {told_as}",
         "",
     ]
     for form, encoding in ENCODINGS.items():
@@ -114,18 +112,22 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
         if not told.good:
             raise RuntimeError(f"{key.name}: {told.payload.decode()}")
         text.append(f"## {'JSON' if form == 'json' else 'MessagePack'}\n")
-        for part, payload, named in (
+        for part, payload, coded in (
             ("request", asked, encoding),
             ("reply", told.payload, told.encoding),
         ):
             name = f"bytes/{key.name}-{part}.{form}"
             pages[name] = payload
             text += [
-                f"The {part}, {len(payload):,} bytes, encoding `{named}`"
+                f"The {part}, {len(payload):,} bytes, encoding `{coded}`"
                 f" ({{download}}`the whole of it <../{name}>`):\n",
                 f"```{{code-block}} text\n{_shown(payload, form)}\n```\n",
             ]
     pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
+
+
+def _name(reference: Mapping[str, str]) -> str:
+    return reference["$ref"].rpartition("/")[2]
 
 
 def _errors(session: zenoh.Session) -> str:
