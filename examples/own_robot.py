@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hand_models import Cylinder, Grasp, Pose, Surface
-from planner import HandOnHold, Question, Stance, plan
-from planner.robots import RobotFile, robot_of
+from planner import HandOnHold, Question, RobotFile, Stance, plan, robot_of
 
 LENGTH = 0.3
 """Of a link [m]."""

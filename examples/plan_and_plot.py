@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hand_models import Cylinder, Grasp, Pose, Surface
-from planner import HandOnHold, Limits, Question, Stance, plan
-from planner.pictures import plot_plan
+from planner import HandOnHold, Limits, Question, Stance, plan, plot_plan
 
 # columns: x, y, z of the frame, in the world, whose z is up
 UP_THE_WALL = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
