@@ -19,7 +19,7 @@ import msgspec
 from hand_models.base import BoundedStore, CruxError
 from hand_models.parameters import ParameterTable
 from service.bulk.columns import row_of
-from service.requests import PlanRequest
+from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format
 
 if TYPE_CHECKING:
@@ -60,6 +60,8 @@ class Setting(NamedTuple):
         Of the rows that answers are told as; with None they are whole replies.
     version : str or None
         Of the distribution that asks.
+    kind : str
+        Of all questions: `service.wire.PLAN` or `ROUTE`.
     """
 
     robot: RobotFile | None = None
@@ -69,6 +71,7 @@ class Setting(NamedTuple):
     explain: bool | None = None
     columns: tuple[str, ...] | None = None
     version: str | None = None
+    kind: str = PLAN
 
 
 def own_version() -> str | None:
@@ -143,7 +146,7 @@ def _answerer(pickled: bytes) -> Answerer:
     def answer(payload: bytes) -> Answer:
         start = time.perf_counter()
         found = handle(
-            PLAN,
+            setting.kind,
             payload,
             setting.form.value,
             setting.hand,
@@ -159,10 +162,10 @@ def _answerer(pickled: bytes) -> Answerer:
     return answer
 
 
-def _revised(setting: Setting, request: PlanRequest) -> PlanRequest:
+def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:
     """Return a request that asks for no more than is told."""
     explain = request.explain if setting.explain is None else setting.explain
-    if setting.columns is None:
+    if setting.columns is None or isinstance(request, RouteRequest):
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(

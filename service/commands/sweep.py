@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from hand_models.base import InvalidInputError
-from service.commands.interruption import Interrupted
 from service.commands.options import (
     FiniteRange,
     asked,
@@ -19,6 +18,7 @@ from service.commands.options import (
     stance_argument,
 )
 from service.commands.stances import read_request
+from service.processes import Interrupted
 from service.sweeping import TOLERANCE
 from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
 

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.commands.cli import run
-from service.commands.interruption import Interrupted
-from service.processes import Planners
+from service.processes import Interrupted, Planners
 from service.wire import LostError, encode_error
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
