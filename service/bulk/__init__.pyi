@@ -1,4 +1,8 @@
-from .chunks import Setting as Setting, answer_chunk as answer_chunk
+from .chunks import (
+    Setting as Setting,
+    answer_chunk as answer_chunk,
+    own_version as own_version,
+)
 from .columns import (
     Column as Column,
     Row as Row,
@@ -11,6 +15,7 @@ from .dask_pools import LOCAL as LOCAL
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
 from .lines import Asked as Asked, Lines as Lines
 from .manifest import Manifest as Manifest, new_manifest as new_manifest
+from .pools import pool_on as pool_on
 from .sinks import ReplyLines as ReplyLines, Sink as Sink, rows_at as rows_at
 from .tables import CSV as CSV, PARQUET as PARQUET, Table as Table, table_at as table_at
 from .tally import Tally as Tally

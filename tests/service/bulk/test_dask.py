@@ -15,7 +15,10 @@ import msgspec
 import pytest
 
 from hand_models.base import CruxError
+from service import sweep
 from service.bulk import evaluate
+from service.commands.stances import read_request, read_route
+from service.wire import ROUTE
 from tests.service.bulk.test_evaluation import CASES, encoded, timeless
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import FAILED
@@ -46,6 +49,17 @@ def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
     assert [timeless(answer.payload) for answer in evaluate(asked, address)] == here
     # the client is its owner's
     assert client.status == "running"
+
+
+def test_routes_and_sweeps_come_to_the_same_on_a_cluster(client):
+    route = read_route("six-moves")
+    asked = [msgspec.structs.replace(route, id=str(i)) for i in range(3)]
+    here, there = (list(evaluate(asked, on, kind=ROUTE)) for on in ("here", client))
+    assert [answer.payload for answer in there] == [answer.payload for answer in here]
+    wall, varied = read_request("wall-300"), ["load.mass=60:120:7"]
+    alone, spread = (sweep(wall, varied, on=on) for on in ("here", client))
+    assert spread.rows == alone.rows
+    assert spread.borders == alone.borders
 
 
 def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):
