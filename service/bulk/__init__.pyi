@@ -1,7 +1,7 @@
 from .chunks import (
     Setting as Setting,
     answer_chunk as answer_chunk,
-    own_version as own_version,
+    own_versions as own_versions,
 )
 from .columns import (
     Column as Column,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_version
+from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
 from service.bulk.columns import row_of
 from service.bulk.grouping import about, grouped
 from service.bulk.pools import Pool, pool_on
@@ -100,7 +100,7 @@ def evaluate(
         If no process can be started, or a cluster is gone: what is not yet answered can be asked
         again.
     """
-    setting = Setting(robot, hand, folder, form, explain, columns, own_version(), kind)
+    setting = Setting(robot, hand, folder, form, explain, columns, own_versions(), kind)
     with pool_on(on, workers, setting) as pool:
         yield from answered(questions, pool, form, columns)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -88,6 +90,37 @@ def test_a_worker_that_is_killed_is_replaced(client):
     assert killed
     assert [reply["id"] for reply in found] == [str(i) for i in range(120)]
     assert {reply["status"] for reply in found} == {"overloaded"}
+
+
+def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
+    monkeypatch.setattr("service.bulk.dask_pools.LOOK", 0.05)
+    asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(60)])
+    told = []
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    )
+    with cluster, distributed.Client(cluster, set_as_default=False) as client:
+
+        class Hire(logging.Handler):
+            def emit(self, record: logging.LogRecord) -> None:
+                told.append(record.getMessage())
+                cluster.scale(1)
+
+        log, hire = logging.getLogger("service.bulk.dask_pools"), Hire()
+        log.addHandler(hire)
+        try:
+            answers = evaluate(asked, client)
+            found = [next(answers)]
+            cluster.scale(0)
+            while client.nthreads():
+                time.sleep(0.01)
+            found += answers
+        finally:
+            log.removeHandler(hire)
+    assert [json.loads(answer.payload)["id"] for answer in found] == [str(i) for i in range(60)]
+    assert told
+    assert "has no worker left: waiting for one" in told[0]
+    assert "--resume" in told[0]
 
 
 def test_no_scheduler_is_told(monkeypatch):
