@@ -109,6 +109,7 @@ class Workers(Generic[T, R]):
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._line.clear()
         for lane in list(self.hands):
             self._dismiss(lane)
 

@@ -29,6 +29,9 @@ Phase = Literal["start", "shift", "lift", "place"]
 WORTH_A_PROCESS: Final = 40
 """Stages below this many are planned faster here than in processes that must first start."""
 
+WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
+"""Statuses of stages, each worse than the one before."""
+
 
 @dataclass(frozen=True, eq=False)
 class Move:
@@ -114,6 +117,7 @@ class OutOfReach:
     status: Literal["unreachable"] = "unreachable"
     utilisation: None = None
     load_factor: None = None
+    load_factor_unbounded: Literal[False] = False
     limiting: None = None
     joint_utilisation: None = None
     warnings: tuple[str, ...] = ()
@@ -137,9 +141,30 @@ class RouteResult:
     plans: tuple[Plan | OutOfReach, ...]
 
     @property
+    def status(self) -> str:
+        """Of the stage that is worst off; ``optimal`` where every one is."""
+        return max((p.status for p in self.plans), key=WORSE.index)
+
+    @property
     def feasible(self) -> bool:
         """Whether every stage is ``optimal``."""
-        return all(p.status == "optimal" for p in self.plans)
+        return self.status == "optimal"
+
+    @property
+    def load_factor(self) -> float | None:
+        """The least of all stages; None where one has none, or where there is no end to any."""
+        factors: list[float] = []
+        for p in self.plans:
+            if p.load_factor is not None:
+                factors.append(p.load_factor)
+            elif not p.load_factor_unbounded:
+                return None
+        return min(factors, default=None)
+
+    @property
+    def load_factor_unbounded(self) -> bool:
+        """Whether there is no end to the load factor of any stage."""
+        return all(p.load_factor_unbounded for p in self.plans)
 
     @property
     def crux(self) -> int:

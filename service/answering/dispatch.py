@@ -23,6 +23,8 @@ from service.requests import (
     BodySpaceRequest,
     PlanRequest,
     Query,
+    Request,
+    RouteRequest,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
@@ -31,6 +33,7 @@ from service.wire import (
     BODY_SPACE,
     PLAN,
     REQUEST_KINDS,
+    ROUTE,
     SET_POINTS,
     STREAM,
     WRENCH_SPACE,
@@ -125,10 +128,16 @@ def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
     return explore(asked, robots).reply
 
 
+def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
+    from service.answering.climbs import climb
+
+    return climb(asked, robots)
+
+
 class _Service(NamedTuple):
     """What is asked at a key, and who answers, given the request, the robots and the streams."""
 
-    request: type[Query]
+    request: type[Request]
     answer: Callable[[Any, Robots, Streams], Reply]
 
 
@@ -139,7 +148,10 @@ SERVICES: Final[dict[str, _Service]] = {
     STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
     SET_POINTS: _Service(SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)),
 }
-"""By the last part of the key."""
+"""What is asked over zenoh, by the last part of the key."""
+
+BULK: Final = SERVICES | {ROUTE: _Service(RouteRequest, _climb)}
+"""What is asked in bulk work, too."""
 
 
 def handle(
@@ -159,7 +171,7 @@ def handle(
     Parameters
     ----------
     key : str
-        Ends in the name of one of `SERVICES`.
+        Ends in the name of one of `SERVICES`, or of `BULK`.
     payload : bytes
     encoding : str, optional
         Zenoh's name of it; the answer's is of the same format.
@@ -185,7 +197,7 @@ def handle(
     form, kind = Format.JSON, None
     try:
         form = Format.named(encoding)
-        service = SERVICES[key.rpartition("/")[2]]
+        service = BULK[key.rpartition("/")[2]]
         kind = service.request
         request: Any = decode_request(payload, kind, form)
         if files is not None:
@@ -194,7 +206,8 @@ def handle(
             request = revised(request)
         if not isinstance(request, SetPointsRequest):
             request = over_default(request, hand)
-        with deadline.within(request.deadline, started=started):
+        within = request.deadline if isinstance(request, Query) else None
+        with deadline.within(within, started=started):
             deadline.check("an answer was begun")
             reply = service.answer(request, robots, streams)
         status: str = getattr(reply, "status", "done")

@@ -1,14 +1,21 @@
-from .chunks import Setting as Setting, answer_chunk as answer_chunk
+from .chunks import (
+    Setting as Setting,
+    answer_chunk as answer_chunk,
+    own_versions as own_versions,
+)
 from .columns import (
     Column as Column,
     Row as Row,
     chosen_columns as chosen_columns,
     columns_of as columns_of,
+    route_columns as route_columns,
+    row_of as row_of,
 )
 from .dask_pools import LOCAL as LOCAL
-from .evaluation import answered as answered, evaluate as evaluate
-from .lines import Lines as Lines
+from .evaluation import Question as Question, answered as answered, evaluate as evaluate
+from .lines import Asked as Asked, Lines as Lines
 from .manifest import Manifest as Manifest, new_manifest as new_manifest
+from .pools import pool_on as pool_on
 from .sinks import ReplyLines as ReplyLines, Sink as Sink, rows_at as rows_at
-from .tables import Table as Table, table_at as table_at
+from .tables import CSV as CSV, PARQUET as PARQUET, Table as Table, table_at as table_at
 from .tally import Tally as Tally

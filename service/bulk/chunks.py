@@ -19,7 +19,7 @@ import msgspec
 from hand_models.base import BoundedStore, CruxError
 from hand_models.parameters import ParameterTable
 from service.bulk.columns import row_of
-from service.requests import PlanRequest
+from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ __all__ = [
 
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
+
+PACKAGES: Final = ("crux", "numpy", "scipy", "clarabel")
+"""On whose versions the last digits of answers hang."""
 
 Answerer = Callable[[bytes], Answer]
 
@@ -58,8 +61,10 @@ class Setting(NamedTuple):
         Whether what keeps a stance from a plan is explained; None: as each request says.
     columns : tuple of str or None
         Of the rows that answers are told as; with None they are whole replies.
-    version : str or None
-        Of the distribution that asks.
+    versions : dict of str to str or None
+        Of `PACKAGES`, where it is asked.
+    kind : str
+        Of all questions: `service.wire.PLAN` or `ROUTE`.
     """
 
     robot: RobotFile | None = None
@@ -68,15 +73,21 @@ class Setting(NamedTuple):
     form: Format = Format.JSON
     explain: bool | None = None
     columns: tuple[str, ...] | None = None
-    version: str | None = None
+    versions: dict[str, str | None] = {}  # noqa: RUF012 - of a named tuple
+    kind: str = PLAN
 
 
-def own_version() -> str | None:
-    """Return the version of the distribution; None where it is not installed."""
+def own_version(package: str = "crux") -> str | None:
+    """Return the version of a distribution; None where it is not installed."""
     try:
-        return version("crux")
+        return version(package)
     except PackageNotFoundError:
         return None
+
+
+def own_versions() -> dict[str, str | None]:
+    """Return the versions of `PACKAGES`."""
+    return {name: own_version(name) for name in PACKAGES}
 
 
 def encode_chunk(payloads: list[bytes]) -> bytes:
@@ -117,7 +128,7 @@ def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
     Raises
     ------
     CruxError
-        If the version that asks is not the one that is to answer.
+        If other versions of `PACKAGES` ask than are to answer.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
     return encode_answers([answer(payload) for payload in decode_chunk(chunk)])
@@ -131,10 +142,13 @@ def _answerer(pickled: bytes) -> Answerer:
     from service.answering import MeshFiles, handle, robots_of
 
     setting: Setting = pickle.loads(pickled)
-    if setting.version != own_version():
+    there, here = setting.versions, own_versions()
+    other = [name for name in PACKAGES if there.get(name) != here[name]]
+    if other:
+        listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
         raise CruxError(
-            f"crux {own_version()} is installed where it is to be answered, and crux "
-            f"{setting.version} where it is asked; install the same version on both"
+            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
+            "to the last digit only with the same versions on both".format(*listed)
         )
     robots = robots_of(setting.robot)
     files = None if setting.folder is None else MeshFiles(setting.folder)
@@ -143,7 +157,7 @@ def _answerer(pickled: bytes) -> Answerer:
     def answer(payload: bytes) -> Answer:
         start = time.perf_counter()
         found = handle(
-            PLAN,
+            setting.kind,
             payload,
             setting.form.value,
             setting.hand,
@@ -159,10 +173,10 @@ def _answerer(pickled: bytes) -> Answerer:
     return answer
 
 
-def _revised(setting: Setting, request: PlanRequest) -> PlanRequest:
+def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:
     """Return a request that asks for no more than is told."""
     explain = request.explain if setting.explain is None else setting.explain
-    if setting.columns is None:
+    if setting.columns is None or isinstance(request, RouteRequest):
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(

@@ -17,7 +17,7 @@ from planner import LimitName
 from service.replies import AXES, ErrorDetail
 from service.wire import Answer, Format
 
-__all__ = ["Column", "Row", "chosen_columns", "columns_of", "row_of"]
+__all__ = ["INDEX", "Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
 Kind = Literal["int", "float", "bool", "text"]
 
@@ -69,6 +69,13 @@ class _Hand(msgspec.Struct):
     fingers: list[_Finger] = []
 
 
+class _Stage(msgspec.Struct):
+    move: int
+    phase: str
+    limb: str | None
+    reason: str
+
+
 class _Certificate(msgspec.Struct):
     irreducible: list[LimitName] | None = None
     sufficient: list[LimitName] | None = None
@@ -87,6 +94,9 @@ class _Told(msgspec.Struct):
     verified: bool | None = None
     warnings: list[str] = []
     certificate: _Certificate | None = None
+    name: str | None = None
+    crux: int | None = None
+    stages: list[_Stage] = []
     error: ErrorDetail | None = None
 
 
@@ -96,14 +106,12 @@ def columns_of(limbs: Sequence[str], explained: bool = False) -> tuple[Column, .
 
 
 def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
-    yield Column(INDEX, "int", "1", "of the request, from zero; blank lines do not count")
-    yield Column("id", "text", "", "the request's")
+    yield from _asked()
     yield Column("status", "text", "", "of the plan; empty for an error")
     yield Column("utilisation", "float", "1", "the largest of any limit")
     yield Column("load_factor", "float", "1", "where the request wants it, and it is bounded")
     yield Column("load_factor_unbounded", "bool", "", "whether there is no end to it")
-    for part in LimitName.__struct_fields__:
-        yield Column(f"limiting_{part}", "text", "", f"{part} of the limit that is used most")
+    yield from _limiting()
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
         yield Column(f"{limb}_utilisation", "float", "1", "the largest of the hand's limits")
@@ -117,6 +125,42 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     if explained:
         yield Column(EXPLAINED[0], "text", "", "limits that together leave no plan")
         yield Column(EXPLAINED[1], "text", "", "those of them of which one less would do")
+    yield from _failed()
+
+
+def route_columns() -> tuple[Column, ...]:
+    """Return all columns of a table of routes."""
+    return tuple(_route_columns())
+
+
+def _route_columns() -> Iterator[Column]:
+    yield from _asked()
+    yield Column("name", "text", "", "the route's")
+    yield Column("status", "text", "", "of the stage that is worst off; empty for an error")
+    yield Column("stages", "int", "1", "stances, those with a limb in the air among them")
+    yield Column("crux", "int", "1", "the hardest stage, from zero")
+    yield Column("crux_move", "int", "1", "its move, from one; zero is the start")
+    for part, what in (("phase", "of the move"), ("limb", "that moves"), ("reason", "in words")):
+        yield Column(f"crux_{part}", "text", "", f"the crux's {part}, {what}")
+    yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
+    yield Column("load_factor", "float", "1", "the least of all stages, where it is bounded")
+    yield Column("load_factor_unbounded", "bool", "", "whether there is no end to any of them")
+    yield from _limiting()
+    yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
+    yield from _failed()
+
+
+def _asked() -> Iterator[Column]:
+    yield Column(INDEX, "int", "1", "of the request, from zero; blank lines do not count")
+    yield Column("id", "text", "", "the request's")
+
+
+def _limiting() -> Iterator[Column]:
+    for part in LimitName.__struct_fields__:
+        yield Column(f"limiting_{part}", "text", "", f"{part} of the limit that is used most")
+
+
+def _failed() -> Iterator[Column]:
     for part in ("kind", "field", "message"):
         yield Column(f"error_{part}", "text", "", f"{part} of the error; empty for a plan")
 
@@ -168,7 +212,7 @@ def row_of(answer: Answer, form: Format, columns: Sequence[str]) -> Answer:
 def _values(told: _Told) -> dict[str, Any]:
     found: dict[str, Any] = {
         name: getattr(told, name)
-        for name in ("id", "status", "utilisation", "load_factor", "verified")
+        for name in ("id", "name", "status", "utilisation", "load_factor", "verified", "crux")
     }
     if told.status is not None:
         found["load_factor_unbounded"] = bool(told.load_factor_unbounded)
@@ -176,6 +220,10 @@ def _values(told: _Told) -> dict[str, Any]:
     if told.limiting is not None:
         for part in LimitName.__struct_fields__:
             found[f"limiting_{part}"] = getattr(told.limiting, part)
+    if told.crux is not None:
+        found["stages"] = len(told.stages)
+        for part in _Stage.__struct_fields__:
+            found[f"crux_{part}"] = getattr(told.stages[told.crux], part)
     for hand in told.hands or ():
         found[f"{hand.limb}_utilisation"] = hand.utilisation
         tensions = hand.tensions or [finger.tendon_tension for finger in hand.fingers]

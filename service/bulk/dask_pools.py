@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Hashable
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, nullcontext, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["LOCAL", "DaskPool", "check_address"]
 
+log = logging.getLogger(__name__)
+
 LOCAL: Final = "dask:local"
 """A cluster of this machine's own, for as long as the work lasts."""
 
@@ -26,6 +28,9 @@ PATIENCE: Final = 15.0
 
 LOOK: Final = 1.0
 """How often it is looked whether the scheduler is still there, while nothing comes [s]."""
+
+ALONE: Final = 5
+"""How often there is no worker, when it is looked, until that is told."""
 
 ALLOWED: Final = 3
 """Deaths of workers after which Dask tries a chunk no more, as it is by default
@@ -90,6 +95,7 @@ class DaskPool:
         self._on, self._workers, self._setting = on, workers, setting
         self._stack = ExitStack()
         self._open: dict[int, Future[bytes]] = {}
+        self._alone = 0
         self._done: SimpleQueue[tuple[int, Future[bytes]]] = SimpleQueue()
 
     def __enter__(self) -> Self:
@@ -159,9 +165,22 @@ class DaskPool:
             try:
                 number, future = self._done.get(timeout=LOOK)
             except Empty:
+                self._tell_if_alone()
                 continue
             if self._open.pop(number, None) is not None:
                 return [(number, self._found(future))]
+
+    def _tell_if_alone(self) -> None:
+        """Say once that there is no worker to wait for."""
+        with suppress(OSError):
+            self._alone = 0 if self._client.nthreads() else self._alone + 1
+        if self._alone == ALONE:
+            log.warning(
+                "the Dask scheduler at %s has no worker left: waiting for one; start it with: dask "
+                "worker %s, or break off with Ctrl-C, and go on later with --resume",
+                self._address,
+                self._address,
+            )
 
     def _check_scheduler(self) -> None:
         if self._client.status != "running":

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_version
+from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
 from service.bulk.columns import row_of
 from service.bulk.grouping import about, grouped
 from service.bulk.pools import Pool, pool_on
-from service.requests import PlanRequest
-from service.wire import Answer, Format, LostError, MalformedError, encode_error, identifier
+from service.requests import PlanRequest, RouteRequest
+from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
 
 if TYPE_CHECKING:
     from distributed import Client
 
     from planner import RobotFile
 
-__all__ = ["answered", "evaluate"]
+__all__ = ["Question", "answered", "evaluate"]
 
 PACE: Final = 0.5
 """How long a chunk is to take [s]: long beside what it costs to send, short beside any wait."""
@@ -37,9 +37,11 @@ BYTES: Final = 2**22
 AGAIN: Final = 2
 """Times that a chunk is tried again before it is halved."""
 
+Question = bytes | PlanRequest | RouteRequest | Answer
+
 
 def evaluate(
-    questions: Iterable[bytes | PlanRequest],
+    questions: Iterable[Question],
     on: str | Client = "processes",
     *,
     workers: int | None = None,
@@ -49,8 +51,9 @@ def evaluate(
     form: Format = Format.JSON,
     explain: bool | None = None,
     columns: tuple[str, ...] | None = None,
+    kind: str = PLAN,
 ) -> Generator[Answer, None, None]:
-    """Answer any number of plan requests, in order, errors in their places.
+    """Answer any number of plan requests or routes, in order, errors in their places.
 
     Questions are taken as there is work for them: some chunks are ahead at most, however many there
     are. A process that dies is replaced, and its chunk tried again, `AGAIN` times at most; then it
@@ -59,8 +62,8 @@ def evaluate(
 
     Parameters
     ----------
-    questions : iterable of bytes or PlanRequest
-        Bytes are encoded requests.
+    questions : iterable of bytes, PlanRequest, RouteRequest or Answer
+        Bytes are encoded requests; an answer is one that is known without asking.
     on : str or distributed.Client, optional
         ``processes`` of this machine, ``here`` for this process alone, ``tcp://HOST:PORT`` of a
         Dask scheduler or its client, ``dask:local`` for a cluster of this machine's own.
@@ -80,6 +83,8 @@ def evaluate(
     columns : tuple of str, optional
         Of the rows (`service.bulk.Row`, as MessagePack) that answers are told as; by default they
         are whole replies.
+    kind : str, optional
+        Of the questions: ``plan`` or ``route``.
 
     Yields
     ------
@@ -95,7 +100,7 @@ def evaluate(
         If no process can be started, or a cluster is gone: what is not yet answered can be asked
         again.
     """
-    setting = Setting(robot, hand, folder, form, explain, columns, own_version())
+    setting = Setting(robot, hand, folder, form, explain, columns, own_versions(), kind)
     with pool_on(on, workers, setting) as pool:
         yield from answered(questions, pool, form, columns)
 
@@ -115,7 +120,7 @@ class _Chunk(NamedTuple):
 
 
 def answered(
-    questions: Iterable[bytes | PlanRequest],
+    questions: Iterable[Question],
     pool: Pool,
     form: Format = Format.JSON,
     columns: tuple[str, ...] | None = None,
@@ -150,7 +155,7 @@ class _Work:
 
     def __init__(
         self,
-        source: Iterator[tuple[int, bytes | PlanRequest]],
+        source: Iterator[tuple[int, Question]],
         pool: Pool,
         form: Format,
         columns: tuple[str, ...] | None,
@@ -271,9 +276,9 @@ def _again(chunk: _Chunk, deaths: int) -> list[_Chunk]:
     ]
 
 
-def _encoded(question: bytes | PlanRequest, form: Format) -> bytes | Answer:
-    """Return a question's bytes, or the error of what is none."""
-    if isinstance(question, bytes):
+def _encoded(question: Question, form: Format) -> bytes | Answer:
+    """Return a question's bytes, or its answer where that is known: the error of what is none."""
+    if isinstance(question, bytes | Answer):
         return question
     try:
         return form.encode(question)

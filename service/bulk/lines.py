@@ -8,11 +8,30 @@ import tempfile
 from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 from hand_models.base import InvalidInputError
+from service.wire import Answer
 
-__all__ = ["LineDigest", "Lines"]
+__all__ = ["Asked", "LineDigest", "Lines"]
+
+
+class Asked(Protocol):
+    """Questions whose answers are kept.
+
+    Attributes
+    ----------
+    count : int
+        How many there are.
+    """
+
+    count: int
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield what each is known by when its answer is found again."""
+
+    def questions(self) -> Iterator[bytes | Answer]:
+        """Yield them, encoded, or the answers of those that need not be asked."""
 
 
 class Lines:
@@ -47,6 +66,10 @@ class Lines:
 
     def __iter__(self) -> Iterator[bytes]:
         return (line for _, line in self.numbered())
+
+    def questions(self) -> Iterator[bytes]:
+        """Yield the lines."""
+        return iter(self)
 
     def numbered(self) -> Iterator[tuple[int, bytes]]:
         """Yield each line, without its end, and its number in the file, from one."""

@@ -14,7 +14,7 @@ import msgspec
 from hand_models.base import InvalidInputError
 from planner import Time
 from service.bulk.columns import Column, Row
-from service.bulk.lines import LineDigest, Lines
+from service.bulk.lines import Asked, LineDigest
 from service.bulk.manifest import Manifest
 from service.bulk.tables import Table
 from service.bulk.tally import Tally
@@ -82,7 +82,7 @@ class ReplyLines:
         Whether they go to standard output where there is no file.
     resume : bool
         Whether the file's replies are kept.
-    lines : Lines
+    lines : Asked
         The requests.
 
     Raises
@@ -95,7 +95,7 @@ class ReplyLines:
 
     columns = None
 
-    def __init__(self, file: Path | None, shown: bool, resume: bool, lines: Lines) -> None:
+    def __init__(self, file: Path | None, shown: bool, resume: bool, lines: Asked) -> None:
         self._file, self._shown, self._resume = file, shown, resume
         self._out: FileIO | None = None
         self.tally = Tally()
@@ -134,7 +134,7 @@ class ReplyLines:
                 out.truncate(out.seek(0, 2) - written)
             raise
 
-    def _read(self, file: Path, lines: Lines) -> None:
+    def _read(self, file: Path, lines: Asked) -> None:
         """Count what the whole lines of a file tell, and drop a last one that is cut off."""
         with file.open("rb") as stream:
             count = sum(line.endswith(b"\n") for line in stream)
@@ -213,7 +213,7 @@ def rows_at(
     columns: Sequence[Column],
     begun: Manifest,
     resume: bool,
-    lines: Lines,
+    lines: Asked,
 ) -> Rows:
     """Return a table that goes on, or that is begun anew in place of one that was there.
 
@@ -226,7 +226,7 @@ def rows_at(
         As it would be without rows.
     resume : bool
         Whether rows that are there are kept.
-    lines : Lines
+    lines : Asked
         The requests.
 
     Raises

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple, Self
 import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
-from service.bulk.columns import Column
+from service.bulk.columns import INDEX, Column
 from service.bulk.lines import LineDigest
 from service.bulk.manifest import Manifest, Part
 
@@ -280,7 +280,7 @@ def _schema(columns: Sequence[Column]) -> Any:
             pa.field(
                 each.name,
                 types[each.kind],
-                nullable=each.kind != "int",
+                nullable=each.name != INDEX,
                 metadata={"unit": each.unit, "meaning": each.meaning},
             )
             for each in columns

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
@@ -15,8 +16,14 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.interruption import Interrupted
-from service.commands.options import hand_option, json_option, robot_option
+from service.commands.options import (
+    dask_option,
+    hand_option,
+    json_option,
+    robot_option,
+    workers_option,
+)
+from service.processes import Interrupted
 from service.tables import (
     BAD_INPUT,
     DONE,
@@ -28,14 +35,14 @@ from service.tables import (
     say,
     writing,
 )
-from service.wire import REQUEST_KINDS
+from service.wire import REQUEST_KINDS, Answer
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.bulk import Column, Lines, Sink, Table, Tally
+    from service.bulk import Asked, Column, Lines, Question, Sink, Table, Tally
 
-__all__ = ["batch"]
+__all__ = ["answer_rest", "batch", "exit_status", "place", "writing_answers"]
 
 WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
@@ -60,15 +67,8 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
-)
-@click.option(
-    "--dask",
-    metavar="ADDRESS",
-    help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
-    "machine's own.",
-)
+@workers_option
+@dask_option
 @click.option(
     "--explain/--no-explain",
     default=None,
@@ -101,8 +101,7 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import LOCAL, Lines, ReplyLines, evaluate, new_manifest, rows_at, table_at
-    from service.processes import worth
+    from service.bulk import Lines, ReplyLines, evaluate, new_manifest, rows_at, table_at
 
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
@@ -114,69 +113,123 @@ def batch(
     begun = perf_counter()
     with closing(Lines(requests)) as lines:
         if kind is None:
-            with _writing(file):
+            with writing_answers(file):
                 sink: Sink = ReplyLines(file, as_json, resume, lines)
         else:
             assert file is not None
             explain = bool(explain)
             chosen = _columns(columns, robot, explain)
             now = new_manifest([each.name for each in chosen], explain, hand, robot)
-            with _writing(file):
+            with writing_answers(file):
                 sink = rows_at(kind, file, chosen, now, resume, lines)
         before = sink.tally.count
-        left = lines.count - before
-        if dask is not None:
-            on, count = LOCAL if dask == "local" else dask, workers
-        else:
-            count = worth(left, workers)
-            on = "here" if count == 1 else "processes"
-        asked: deque[bytes] = deque()
-
-        def ask() -> Iterator[bytes]:
-            for line in islice(lines, before, None):
-                asked.append(line)
-                yield line
-
-        answers = evaluate(
-            ask(),
-            on,
-            workers=None if on == "here" else count,
+        on, workers = place(dask, workers, lines.count - before)
+        answers = partial(
+            evaluate,
+            on=on,
+            workers=workers,
             hand=hand,
             robot=robot,
             folder=Path() if requests == "-" else Path(requests).parent,
             explain=explain,
             columns=sink.columns,
         )
-        try:
-            with ExitStack() as stack:
-                tell = stack.enter_context(bulk_progress(f"planning {requests}"))
-                stack.enter_context(_writing(file))
-                stack.enter_context(sink.open())
-                stack.enter_context(closing(answers))
-                tell(before, lines.count, "")
-                for answer in answers if left else ():
-                    sink.write(asked.popleft(), answer.payload, answer.seconds)
-                    done = sink.tally.count
-                    rate = (done - before) / (perf_counter() - begun)
-                    words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
-                    tell(done, lines.count, words)
-        except Interrupted:
-            raise Interrupted(_kept(sink.whole, lines.count, file)) from None
-        except InvalidInputError:
-            raise
-        except CruxError as error:
-            raise CruxError(f"{error.message}; {_kept(sink.whole, lines.count, file)}") from None
+        answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
         elapsed = perf_counter() - begun
         _complain(lines, sink.tally)
     if not as_json:
         _print(sink.tally, before, elapsed, file)
     elif file is not None:
         say(_summary(sink.tally, elapsed) | {"file": str(file)})
-    return _exit_status(sink.tally)
+    return exit_status(sink.tally)
 
 
-def _writing(file: Path | None) -> AbstractContextManager[None]:
+def writing_answers(file: Path | None) -> AbstractContextManager[None]:
+    """Turn what goes wrong in writing answers into one line, if they go to a file."""
     return nullcontext() if file is None else writing(file, "-o")
+
+
+def place(dask: str | None, workers: int | None, left: int) -> tuple[str, int | None]:
+    """Return where so many questions are answered, and by how many processes.
+
+    Parameters
+    ----------
+    dask : str or None
+        As `--dask`.
+    workers : int or None
+        As `--workers`.
+    left : int
+        Questions, each as dear as a plan.
+    """
+    from service.bulk import LOCAL
+    from service.processes import worth
+
+    if dask is not None:
+        return (LOCAL if dask == "local" else dask), workers
+    count = worth(left, workers)
+    return ("here", None) if count == 1 else ("processes", count)
+
+
+def answer_rest(
+    asked: Asked,
+    answers: Callable[[Iterator[Question]], Generator[Answer, None, None]],
+    sink: Sink,
+    file: Path | None,
+    title: str,
+    noun: str,
+) -> None:
+    """Write the answers that a sink does not have yet, with progress.
+
+    Parameters
+    ----------
+    asked : Asked
+        All questions, those that are answered among them.
+    answers : callable
+        Answers questions in order.
+    sink : Sink
+    file : Path or None
+        Where the sink writes.
+    title : str
+        What is done.
+    noun : str
+        What the questions are.
+
+    Raises
+    ------
+    Interrupted, CruxError
+        That say what is kept.
+    """
+    begun, before = perf_counter(), sink.tally.count
+    due: deque[bytes] = deque()
+
+    def ask() -> Iterator[Question]:
+        for question in islice(asked.questions(), before, None):
+            due.append(question.payload if isinstance(question, Answer) else question)
+            yield question
+
+    def kept() -> str:
+        told = f"{sink.whole} of {asked.count} {noun} are answered"
+        return told if file is None else f"{told} in {file}; --resume goes on"
+
+    try:
+        with ExitStack() as stack:
+            tell = stack.enter_context(bulk_progress(title))
+            stack.enter_context(writing_answers(file))
+            stack.enter_context(sink.open())
+            found = stack.enter_context(closing(answers(ask())))
+            tell(before, asked.count, "")
+            for answer in found if before < asked.count else ():
+                sink.write(due.popleft(), answer.payload, answer.seconds)
+                done = sink.tally.count
+                rate = (done - before) / (perf_counter() - begun)
+                words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
+                tell(done, asked.count, words)
+    except Interrupted:
+        raise Interrupted(kept()) from None
+    except InvalidInputError:
+        raise
+    except CruxError as error:
+        raise CruxError(f"{error.message}; {kept()}") from None
 
 
 def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | None) -> None:
@@ -207,12 +260,6 @@ def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tu
         raise InvalidInputError(error.message, field="--columns") from None
 
 
-def _kept(done: int, count: int, file: Path | None) -> str:
-    """Say how much of a batch that is broken off is done."""
-    told = f"{done} of {count} requests are answered"
-    return told if file is None else f"{told} in {file}; --resume goes on"
-
-
 def _complain(lines: Lines, tally: Tally) -> None:
     """Name the first line that is bad input, and how many more are."""
     if tally.first_bad is not None:
@@ -222,9 +269,9 @@ def _complain(lines: Lines, tally: Tally) -> None:
         note(f"line {lines.number(index)}: {field}{error.message}{more}")
 
 
-def _exit_status(tally: Tally) -> int:
-    """Return the worst of what the requests alone would have."""
-    found = [EXIT_STATUS.get(status, FAILED) for status in tally.statuses]
+def exit_status(tally: Tally, statuses: Mapping[str, int] = EXIT_STATUS) -> int:
+    """Return the worst of what the requests alone would have, by their statuses."""
+    found = [statuses.get(status, FAILED) for status in tally.statuses]
     found += [BAD_INPUT if kind in REQUEST_KINDS else FAILED for kind in tally.kinds]
     return min(found, key=WORST_FIRST.index, default=DONE)
 

@@ -60,8 +60,8 @@ COMMANDS: Final = {
         "Make a mesh hold of a scan: a point cloud, or a grid of heights.",
     ),
     "route": Entry(
-        "plans",
-        "Evaluate a climb: every stance, and every one with a limb in the air.",
+        "routes",
+        "Evaluate climbs: every stance, and every one with a limb in the air.",
     ),
     "schema": Entry("network", "Print the JSON Schema of every message."),
     "serve": Entry(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
-from service.commands.interruption import interruptible
+from service.processes import interruptible
 
 __all__ = ["main"]
 

@@ -14,8 +14,8 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
-from service.commands.interruption import Interrupted
 from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
+from service.processes import Interrupted
 from service.tables import progress, say, writing
 
 if TYPE_CHECKING:

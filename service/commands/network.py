@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 import click
 import msgspec
 
-from service.commands.interruption import kill_children
 from service.commands.options import (
     PICTURES,
     asked,
@@ -24,6 +23,7 @@ from service.commands.options import (
     with_extras,
 )
 from service.commands.stances import read_request
+from service.processes import kill_children
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving import (
     ended_in_time,

@@ -24,6 +24,7 @@ __all__ = [
     "FiniteRange",
     "asked",
     "beginning_so",
+    "dask_option",
     "draws_option",
     "explain_option",
     "folder_option",
@@ -33,10 +34,11 @@ __all__ = [
     "output_in",
     "plot_option",
     "robot_option",
-    "route_argument",
+    "routes_argument",
     "stance_argument",
     "timeout_option",
     "with_extras",
+    "workers_option",
 ]
 
 R = TypeVar("R", PlanRequest, RouteRequest)
@@ -167,8 +169,12 @@ def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[Compl
 
 
 stance_argument = click.argument("stance", shell_complete=beginning_so(bundled(), files=True))
-route_argument = click.argument(
-    "route", shell_complete=beginning_so(bundled(RouteRequest), files=True)
+routes_argument = click.argument(
+    "routes",
+    nargs=-1,
+    required=True,
+    metavar="ROUTE...",
+    shell_complete=beginning_so(bundled(RouteRequest), files=True),
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
@@ -214,6 +220,16 @@ timeout_option = click.option(
     "--timeout",
     type=FiniteRange(0.01, LONGEST),
     help=f"[s]; by default {TIMEOUT:g}, or what the deadline of the request takes.",
+)
+
+workers_option = click.option(
+    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
+)
+dask_option = click.option(
+    "--dask",
+    metavar="ADDRESS",
+    help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
+    "machine's own.",
 )
 
 

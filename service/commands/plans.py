@@ -1,9 +1,9 @@
-"""Commands that plan without the network: one stance, or a climb."""
+"""A command that plans one stance, without the network."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 import msgspec
@@ -13,24 +13,19 @@ from service.commands.options import (
     asked,
     draws_option,
     explain_option,
-    folder_option,
     hand_option,
     json_option,
     robot_option,
-    route_argument,
     stance_argument,
     with_extras,
 )
-from service.commands.stances import read_request, read_route
+from service.commands.stances import read_request
 from service.requests import Draw, PlanRequest, Want
 from service.tables import (
-    DONE,
     EXIT_STATUS,
     FAILED,
-    OVERLOADED,
     draw_plan,
     filling_folder,
-    progress,
     say,
     tell_solver,
     verbosity,
@@ -43,7 +38,10 @@ if TYPE_CHECKING:
     from service.answering import Robots
     from service.replies import PlanReply
 
-__all__ = ["plan", "route"]
+__all__ = ["plan"]
+
+ADVICE_SECONDS: Final = 30.0
+"""For advice that nobody asked for, where a request has no deadline."""
 
 
 @click.command()
@@ -112,9 +110,11 @@ def plan(
         with deadline.within(request.deadline):
             answer = answering.planned(request, robots)
             if not as_json and answer.reply.status in ("overloaded", "infeasible"):
-                answer = answering.with_advice(answer)
-            whole = request.detail == "full" and verbosity() >= 0
-            bare = _without_palms(request, robots) if whole or as_json else None
+                # --advice is looked for as long as it takes
+                with deadline.within(request.deadline or ADVICE_SECONDS):
+                    answer = answering.with_advice(answer)
+            full = request.detail == "full" and (as_json or verbosity() >= 0)
+            bare = _without_palms(request, robots) if full else None
         if picture is not None:
             draw_plan(answer, picture)
     written: list[Path] = []
@@ -173,48 +173,3 @@ def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
         return None
     assert isinstance(reply, PlanReply)  # of a whole request
     return reply
-
-
-@click.command()
-@route_argument
-@folder_option("Where the table, the picture and the summary go.")
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
-)
-@explain_option
-@hand_option
-@robot_option
-@json_option
-def route(
-    route: str,
-    folder: Path,
-    workers: int | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    as_json: bool,
-) -> int:
-    """Evaluate a climb: every stance, and every one with a limb in the air.
-
-    ROUTE is the path of a JSON file, - for standard input, or the name of a bundled route.
-    """
-    from planner import evaluate, summary, write_report
-    from service import answering
-    from service.answering import robots_of
-    from service.tables import console, print_route
-
-    request = asked(read_route(route), hand, robot)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    climb = answering.route(request, robots_of(robot))
-    with progress(f"planning {climb.name}") as tell:
-        result = evaluate(climb, workers, tell)
-    with filling_folder():
-        files = write_report(result, folder)
-    if as_json:
-        say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
-    else:
-        print_route(result, files, console())
-    if result.feasible:
-        return DONE
-    return FAILED if any(plan.status == "failed" for plan in result.plans) else OVERLOADED

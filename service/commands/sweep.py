@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from hand_models.base import InvalidInputError
-from service.commands.interruption import Interrupted
+from hand_models.base import CruxError, InvalidInputError
 from service.commands.options import (
     FiniteRange,
     asked,
+    dask_option,
     folder_option,
     hand_option,
     json_option,
     robot_option,
     stance_argument,
+    workers_option,
 )
 from service.commands.stances import read_request
+from service.processes import Interrupted
 from service.sweeping import TOLERANCE
 from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
 
@@ -62,9 +64,8 @@ PICTURE: Final = "sweep.png"
     show_default=True,
     help="Of where it stops holding, if one number varies: a share of the range.",
 )
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
-)
+@workers_option
+@dask_option
 @folder_option("Where the table and the picture go.")
 @hand_option
 @robot_option
@@ -77,6 +78,7 @@ def sweep(
     over: str | None,
     tolerance: float,
     workers: int | None,
+    dask: str | None,
     folder: Path,
     hand: ParameterTable | None,
     robot: RobotFile | None,
@@ -107,7 +109,7 @@ def sweep(
     pair = _pair(over, design)
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    result = _answered(design, folder, stance, workers, robot, tolerance)
+    result = _answered(design, folder, stance, workers, dask, robot, tolerance)
     files = {"table": folder / TABLE, "picture": folder / PICTURE}
     with filling_folder():
         result.write_table(files["table"])
@@ -140,25 +142,36 @@ def _answered(
     folder: Path,
     stance: str,
     workers: int | None,
+    dask: str | None,
     robot: RobotFile | None,
     tolerance: float,
 ) -> Sweep:
     """Return the sweep; if it is broken off, keep the table of what is done."""
+    from service.bulk import LOCAL
     from service.sweeping import Sweep, answered
 
-    rows: dict[int, Row] = {}
+    rows: list[Row] = []
+    on = LOCAL if dask == "local" else dask
     try:
         with progress(f"sweeping {stance}") as tell:
             return answered(
-                design, rows, workers=workers, robot=robot, progress=tell, tolerance=tolerance
+                design,
+                rows,
+                workers=workers,
+                on=on,
+                robot=robot,
+                progress=tell,
+                tolerance=tolerance,
             )
-    except Interrupted:
-        done = Sweep(design, tuple(rows[i] for i in sorted(rows)))
+    except InvalidInputError:
+        raise
+    except (Interrupted, CruxError) as error:
         with filling_folder():
-            done.write_table(folder / TABLE)
-        raise Interrupted(
-            f"{len(rows)} of {len(design.points)} points are answered in {folder / TABLE}"
-        ) from None
+            Sweep(design, tuple(rows)).write_table(folder / TABLE)
+        kept = f"{len(rows)} of {len(design.points)} points are answered in {folder / TABLE}"
+        if isinstance(error, CruxError):
+            raise CruxError(f"{error.message}; {kept}") from None
+        raise Interrupted(kept) from None
 
 
 def _status(result: Sweep) -> int:

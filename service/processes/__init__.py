@@ -1,4 +1,4 @@
-"""Work in processes of its own."""
+"""Work in processes of its own, and what ends them."""
 
 import lazy_loader
 

@@ -1,3 +1,8 @@
 from .hold_trials import try_everywhere as try_everywhere
+from .interruption import (
+    Interrupted as Interrupted,
+    interruptible as interruptible,
+    kill_children as kill_children,
+)
 from .many import Planners as Planners, plan_many as plan_many, worth as worth
 from .questions import Job as Job, answering as answering

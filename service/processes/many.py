@@ -1,7 +1,6 @@
-"""Many plan requests at once, in processes: replies in their order, errors in their places.
+"""Many plan requests at once: replies in their order, errors in their places, as objects.
 
-Encoded requests and replies travel between processes, and each is answered as the service would
-answer it.
+They are bulk work like any other; for as many as are no list, or for a cluster, use that itself.
 """
 
 from __future__ import annotations
@@ -10,22 +9,24 @@ import gc
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner import Lost, Workers, cores
-from service.processes.questions import Job, answering
+from planner import Workers, cores
+from service.bulk import Setting, answered, own_versions, pool_on
 from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
-from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
+from service.wire import Answer, Format
 
 if TYPE_CHECKING:
     from planner import RobotFile
 
 __all__ = ["Planners", "plan_many", "worth"]
+
+FORM: Final = Format.MSGPACK
+"""In which requests and replies travel."""
 
 WORTH_A_PROCESS: Final = 500
 """Requests below this many are planned faster here than in processes that must first start."""
@@ -37,8 +38,7 @@ class Planners:
     Parameters
     ----------
     workers : int, optional
-        Processes; as many as there are cores by default. One of them is this process itself, which
-        plans alone until the others have started.
+        Processes; as many as there are cores by default. With one, this process plans itself.
     robot : RobotFile, optional
         The only robot that is planned for; those that are bundled by default.
     hand : ParameterTable, optional
@@ -62,22 +62,23 @@ class Planners:
         folder: Path | None = None,
     ) -> None:
         count = cores() if workers is None else _whole(workers)
-        self._make = partial(answering, robot, hand, folder)
+        setting = Setting(robot, hand, folder, FORM, versions=own_versions())
+        self._pool = pool_on("here" if count == 1 else "processes", count, setting)
         self._closed = False
-        self._workers = Workers(self._make, count - 1)
 
     def __enter__(self) -> Self:
         self._closed = False
-        self._workers.__enter__()
+        self._pool.__enter__()
         return self
 
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+    def __exit__(self, *error: object) -> None:
         self._closed = True
-        self._workers.__exit__(kind, error, traceback)
+        self._pool.__exit__(*error)
 
     def wait(self) -> None:
-        """Wait until all processes have started, if that is better than to begin without them."""
-        self._workers.wait()
+        """Wait until all processes have started, if that is not to be timed."""
+        if isinstance(self._pool, Workers):
+            self._pool.wait()
 
     def plan_many(
         self,
@@ -85,36 +86,20 @@ class Planners:
         progress: Callable[[int, int], None] | None = None,
     ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
         """Return the reply to each request, or the error in its place; as `plan_many`."""
-        form = Format.MSGPACK
-        found: dict[int, Answer] = {}
-        good, payloads = [], []
-        for i, request in enumerate(requests):
-            try:
-                payloads.append(form.encode(request))
-                good.append(i)
-            except (TypeError, ValueError, OverflowError, RecursionError) as error:
-                name = getattr(request, "id", None)
-                known = name if isinstance(name, str) else None
-                found[i] = encode_error(MalformedError(f"no request: {error}"), form, known)
-        for k, answer in self.answers(payloads, form):
-            found[good[k]] = answer
-            if progress is not None:
-                progress(len(found), len(requests))
-        with _no_collection():
-            return [_decoded(found[i], form, each) for i, each in enumerate(requests)]
-
-    def answers(
-        self, payloads: Sequence[bytes], form: Format = Format.JSON
-    ) -> Iterator[tuple[int, Answer]]:
-        """Yield each encoded request's index and encoded answer, as they are done."""
         if self._closed:
             raise InvalidInputError("is closed; enter another, or this one again", field="planners")
-        asked = [Job(PLAN, payload, form.value) for payload in payloads]
-        for i, found in self._workers.each(asked, self._make()):
-            if isinstance(found, Lost):
-                yield i, encode_error(LostError(found.reason), form, identifier(payloads[i], form))
-            else:
-                yield i, found
+        answers = []
+        try:
+            for answer in answered(requests, self._pool, FORM):
+                answers.append(answer)
+                if progress is not None:
+                    progress(len(answers), len(requests))
+        except BaseException:
+            # what nobody waits for any more
+            self._pool.__exit__()
+            raise
+        with _no_collection():
+            return [_decoded(*each) for each in zip(answers, requests, strict=True)]
 
 
 def plan_many(
@@ -129,8 +114,8 @@ def plan_many(
     ----------
     requests : sequence of PlanRequest
     workers : int, optional
-        Processes; as many as there are cores where the requests are enough to be worth it. One is
-        this process itself. A program that starts processes needs its
+        Processes; as many as there are cores where the requests are enough to be worth it. With
+        one, this process plans itself. A program that starts processes needs its
         ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with (requests done, requests in all).
@@ -144,6 +129,8 @@ def plan_many(
     ------
     InvalidInputError
         If ``workers`` is no whole number of at least 1.
+    CruxError
+        If processes cannot be started.
     """
     with Planners(worth(len(requests), workers)) as planners:
         return planners.plan_many(requests, progress)
@@ -187,11 +174,9 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _decoded(
-    answer: Answer, form: Format, request: PlanRequest
-) -> PlanReply | BriefPlanReply | ErrorReply:
+def _decoded(answer: Answer, request: PlanRequest) -> PlanReply | BriefPlanReply | ErrorReply:
     if not answer.good:
-        return form.decode(answer.payload, ErrorReply)
+        return FORM.decode(answer.payload, ErrorReply)
     if getattr(request, "detail", "full") == "full":
-        return form.decode(answer.payload, PlanReply)
-    return form.decode(answer.payload, BriefPlanReply)
+        return FORM.decode(answer.payload, PlanReply)
+    return FORM.decode(answer.payload, BriefPlanReply)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
@@ -54,9 +53,7 @@ class Job(NamedTuple):
     rehearsal: bool = False
 
 
-def answering(
-    robot: RobotFile | None, hand: ParameterTable | None, folder: Path | None = None
-) -> Callable[[Job], Answer]:
+def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
     """Return what answers; here the planner is imported, in each process.
 
     Parameters
@@ -65,16 +62,13 @@ def answering(
         The only robot that is planned for; those that are bundled by default.
     hand : ParameterTable or None
         Entries in which its hands are not the bundled one; a request's own go on top.
-    folder : Path, optional
-        That names of mesh files in requests are relative to; by default requests name none.
     """
     from planner import deadline
-    from service.answering import MeshFiles, Streams, handle, robots_of
+    from service.answering import Streams, handle, robots_of
 
     for name in LATER:
         import_module(name)
     robots = robots_of(robot)
-    files = None if folder is None else MeshFiles(folder)
     streams = Streams()
 
     def answer(job: Job) -> Answer:
@@ -90,7 +84,6 @@ def answering(
                 robots,
                 started=arrived,
                 streams=asked,
-                files=files,
             )
         return found._replace(seconds=time.perf_counter() - start)
 

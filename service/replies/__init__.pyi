@@ -29,6 +29,7 @@ from .reply import (
     Reply as Reply,
     StanceReply as StanceReply,
 )
+from .route import RouteReply as RouteReply, RouteStage as RouteStage
 from .stream import (
     HandColumns as HandColumns,
     HandSetPoints as HandSetPoints,

@@ -273,8 +273,9 @@ class Move(Hand, frozen=True, kw_only=True):
 
 
 class RouteRequest(Request, frozen=True, kw_only=True):
-    """A climb: a start stance, and moves. Not asked over zenoh; a file of the command line."""
+    """A climb: a start stance, and moves. Not asked over zenoh, but in bulk work."""
 
+    id: Identifier | None = None
     name: Identifier = "route"
     stance: Stance
     load: Load | None = None

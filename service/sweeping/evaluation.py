@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
 from planner import LimitName
-from service.processes import Planners, worth
+from service.bulk import Setting, answered, own_versions, pool_on
+from service.processes import worth
 from service.replies import ErrorDetail
 from service.sweeping.design import Design, Point
 from service.wire import REQUEST_KINDS, Answer, Format
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from planner import RobotFile
 
 __all__ = ["Ask", "Row", "State", "asking", "rows_at"]
 
-Ask = Callable[[Sequence[bytes]], Iterator[tuple[int, Answer]]]
-"""Yields each encoded request's index and its answer, as they are done."""
+Ask = Callable[[Iterable[bytes]], Iterator[Answer]]
+"""Yields the answers to encoded requests, in order; asked again only after the last of them."""
 
 State = Literal["holds", "overloaded", "infeasible", "error"]
 
@@ -29,8 +32,6 @@ STATES: Final[dict[str, State]] = {
     "overloaded": "overloaded",
     "infeasible": "infeasible",
 }
-AT_ONCE: Final = 2**26
-"""Bytes of requests that are kept for processes to take, but at least two requests."""
 
 
 class _Told(msgspec.Struct):
@@ -104,27 +105,28 @@ class Row(msgspec.Struct, frozen=True):
 
 
 @contextmanager
-def asking(count: int, workers: int | None, robot: RobotFile | None) -> Iterator[Ask]:
+def asking(
+    count: int, workers: int | None, robot: RobotFile | None, on: str | Client | None = None
+) -> Iterator[Ask]:
     """Yield what answers encoded requests, some ``count`` of them in all.
 
     Raises
     ------
     InvalidInputError
-        If ``workers`` is no whole number of at least 1.
+        If ``workers`` is no whole number of at least 1, or ``on`` is impossible.
     """
-    with Planners(worth(count, workers), robot=robot) as planners:
-        yield lambda payloads: planners.answers(payloads, Format.MSGPACK)
+    if on is None:
+        workers = worth(count, workers)
+        on = "here" if workers == 1 else "processes"
+    form = Format.MSGPACK
+    setting = Setting(robot, form=form, versions=own_versions())
+    with pool_on(on, workers, setting) as pool:
+        yield lambda payloads: answered(payloads, pool, form)
 
 
-def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[tuple[int, Row]]:
-    """Yield the index and the row of each point, as they are done."""
-    begin, size = 0, 2
-    while begin < len(points):
-        payloads = [design.payload(point) for point in points[begin : begin + size]]
-        for i, answer in ask(payloads):
-            point = points[begin + i]
-            told = msgspec.msgpack.decode(answer.payload, type=_Told)
-            row = Row(point, **msgspec.structs.asdict(told), cap=design.cap(point))
-            yield begin + i, row
-        begin += len(payloads)
-        size = max(2, AT_ONCE // max(map(len, payloads)))
+def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Row]:
+    """Yield the row of each point, in order."""
+    answers = ask(design.payload(point) for point in points)
+    for point, answer in zip(points, answers, strict=True):
+        told = msgspec.msgpack.decode(answer.payload, type=_Told)
+        yield Row(point, **msgspec.structs.asdict(told), cap=design.cap(point))

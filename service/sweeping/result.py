@@ -20,6 +20,8 @@ from service.sweeping.evaluation import Ask, Row, asking, rows_at
 from service.sweeping.variation import Value, Variation
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from planner import RobotFile
 
 __all__ = ["Sweep", "answered", "sweep"]
@@ -138,9 +140,10 @@ def _cell(value: Value, none: str = "") -> str:
 
 def answered(
     design: Design,
-    rows: dict[int, Row],
+    rows: list[Row],
     *,
     workers: int | None = None,
+    on: str | Client | None = None,
     robot: RobotFile | None = None,
     progress: Callable[[int, int], None] | None = None,
     tolerance: float = TOLERANCE,
@@ -150,22 +153,21 @@ def answered(
     Parameters
     ----------
     design : Design
-    rows : dict
-        Rows by their points' places, which are put here as they are answered; so what is done is
-        there if the rest is broken off.
-    workers, robot, progress, tolerance
+    rows : list
+        Empty; rows are put here as they are answered, so what is done is there if the rest is
+        broken off.
+    workers, on, robot, progress, tolerance
         As for `sweep`.
     """
     total = len(design.points)
-    with asking(total, workers, robot) as ask:
+    with asking(total, workers, robot, on) as ask:
         if progress is not None:
             progress(0, total)
-        for i, row in rows_at(design, design.points, ask):
-            rows[i] = row
+        for row in rows_at(design, design.points, ask):
+            rows.append(row)
             if progress is not None:
                 progress(len(rows), total)
-        found = tuple(rows[i] for i in range(total))
-        return Sweep(design, found, tuple(_borders(design, found, ask, tolerance)))
+        return Sweep(design, tuple(rows), tuple(_borders(design, rows, ask, tolerance)))
 
 
 def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Iterator[Border]:
@@ -183,7 +185,8 @@ def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) ->
     def plan(value: float) -> Row:
         point = list(ordered[0].point)
         point[place] = int(value) if target.whole else value
-        return next(rows_at(design, [tuple(point)], ask))[1]
+        (row,) = rows_at(design, [tuple(point)], ask)
+        return row
 
     along = Along(place, variation.path, target.unit, target.whole)
     yield from borders(ordered, along, tolerance * range_, plan)
@@ -196,6 +199,7 @@ def sweep(
     samples: int | None = None,
     seed: int = 0,
     workers: int | None = None,
+    on: str | Client | None = None,
     hand: ParameterTable | None = None,
     robot: RobotFile | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -214,6 +218,8 @@ def sweep(
         Of the samples.
     workers : int, optional
         Processes; by default as many as are worth it.
+    on : str or distributed.Client, optional
+        As of `service.bulk.evaluate`; by default processes, where they are worth it.
     hand : ParameterTable, optional
         Entries in which hands are not the bundled one.
     robot : RobotFile, optional
@@ -242,5 +248,11 @@ def sweep(
     asked = with_robot(with_hand(request, hand), robot)
     design = Design.of(asked, chosen, samples, seed, robots_of(robot))
     return answered(
-        design, {}, workers=workers, robot=robot, progress=progress, tolerance=tolerance
+        design,
+        [],
+        workers=workers,
+        on=on,
+        robot=robot,
+        progress=progress,
+        tolerance=tolerance,
     )

@@ -27,6 +27,7 @@ from .keys import (
     HEALTH as HEALTH,
     METRICS as METRICS,
     PLAN as PLAN,
+    ROUTE as ROUTE,
     SET_POINTS as SET_POINTS,
     STREAM as STREAM,
     WRENCH_SPACE as WRENCH_SPACE,

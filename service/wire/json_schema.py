@@ -14,6 +14,7 @@ from service.replies import (
     ErrorReply,
     HealthReply,
     PlanReply,
+    RouteReply,
     SetPointsReply,
     StreamReply,
     WrenchSpaceReply,
@@ -51,6 +52,7 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     SetPointsRequest,
     SetPointsReply,
     RouteRequest,
+    RouteReply,
     HealthReply,
     ErrorReply,
 )

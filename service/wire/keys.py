@@ -12,6 +12,7 @@ __all__ = [
     "HEALTH",
     "METRICS",
     "PLAN",
+    "ROUTE",
     "SET_POINTS",
     "STREAM",
     "WRENCH_SPACE",
@@ -29,6 +30,9 @@ HEALTH: Final = "health"
 METRICS: Final = "metrics"
 CLIENTS: Final = "clients"
 """Before the identifiers of sessions, in the liveliness tokens of clients."""
+
+ROUTE: Final = "route"
+"""A question of bulk work alone: it takes too long to be asked over zenoh."""
 
 DEFAULT_ROBOT: Final = "robosimian"
 """Whose stance is meant where nothing names a robot."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,7 +17,10 @@ import msgspec
 import pytest
 
 from hand_models.base import CruxError
+from service import sweep
 from service.bulk import evaluate
+from service.commands.stances import read_request, read_route
+from service.wire import ROUTE
 from tests.service.bulk.test_evaluation import CASES, encoded, timeless
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import FAILED
@@ -48,6 +53,17 @@ def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
     assert client.status == "running"
 
 
+def test_routes_and_sweeps_come_to_the_same_on_a_cluster(client):
+    route = read_route("six-moves")
+    asked = [msgspec.structs.replace(route, id=str(i)) for i in range(3)]
+    here, there = (list(evaluate(asked, on, kind=ROUTE)) for on in ("here", client))
+    assert [answer.payload for answer in there] == [answer.payload for answer in here]
+    wall, varied = read_request("wall-300"), ["load.mass=60:120:7"]
+    alone, spread = (sweep(wall, varied, on=on) for on in ("here", client))
+    assert spread.rows == alone.rows
+    assert spread.borders == alone.borders
+
+
 def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):
     taken = 0
 
@@ -74,6 +90,37 @@ def test_a_worker_that_is_killed_is_replaced(client):
     assert killed
     assert [reply["id"] for reply in found] == [str(i) for i in range(120)]
     assert {reply["status"] for reply in found} == {"overloaded"}
+
+
+def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
+    monkeypatch.setattr("service.bulk.dask_pools.LOOK", 0.05)
+    asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(60)])
+    told = []
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    )
+    with cluster, distributed.Client(cluster, set_as_default=False) as client:
+
+        class Hire(logging.Handler):
+            def emit(self, record: logging.LogRecord) -> None:
+                told.append(record.getMessage())
+                cluster.scale(1)
+
+        log, hire = logging.getLogger("service.bulk.dask_pools"), Hire()
+        log.addHandler(hire)
+        try:
+            answers = evaluate(asked, client)
+            found = [next(answers)]
+            cluster.scale(0)
+            while client.nthreads():
+                time.sleep(0.01)
+            found += answers
+        finally:
+            log.removeHandler(hire)
+    assert [json.loads(answer.payload)["id"] for answer in found] == [str(i) for i in range(60)]
+    assert told
+    assert "has no worker left: waiting for one" in told[0]
+    assert "--resume" in told[0]
 
 
 def test_no_scheduler_is_told(monkeypatch):

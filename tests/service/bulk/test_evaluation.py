@@ -17,7 +17,7 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_version
+from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
 from service.bulk.evaluation import AHEAD, WINDOW
 from service.bulk.grouping import About, about, grouped
 from service.bulk.pools import LARGEST, Here
@@ -56,7 +56,7 @@ class Letters(Workers):
         self.width = count
 
 
-SETTING = pickle.dumps(Setting(version=own_version()))
+SETTING = pickle.dumps(Setting(versions=own_versions()))
 
 
 class Shuffled:
@@ -167,9 +167,13 @@ def test_no_place_to_work_at_is_told():
 
 
 def test_another_version_is_not_answered():
-    setting = pickle.dumps(Setting(version="0.0.none"))
-    with pytest.raises(CruxError, match=r"0\.0\.none where it is asked"):
-        answer_chunk(setting, encode_chunk([]))
+    for name in ("crux", "numpy", "scipy", "clarabel"):
+        setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
+        with pytest.raises(CruxError) as caught:
+            answer_chunk(setting, encode_chunk([]))
+        there, here = caught.value.message.split(", and where it is asked ")
+        assert there.endswith(f" {name} {own_versions()[name]}")
+        assert here.startswith(f"{name} 0.0.none;")
 
 
 @settings(max_examples=50, deadline=None)
@@ -232,7 +236,7 @@ def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
 
 
 def test_here_one_question_is_answered_at_a_time():
-    pool = Here(Setting(version=own_version()))
+    pool = Here(Setting(versions=own_versions()))
     taken = []
 
     def asked() -> Iterator[PlanRequest]:

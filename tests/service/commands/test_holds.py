@@ -12,7 +12,7 @@ import trimesh
 
 from service import processes
 from service.commands.cli import run
-from service.commands.interruption import Interrupted
+from service.processes import Interrupted
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 from tests.suite.helpers.requests import wall_request

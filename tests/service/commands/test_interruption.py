@@ -14,7 +14,7 @@ import pytest
 
 from hand_models.base import whole_file
 from service.commands.cli import run
-from service.commands.interruption import Interrupted
+from service.processes import Interrupted
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, result
 from tests.suite.helpers.processes import begun, ended, loaded, until, watched, workers

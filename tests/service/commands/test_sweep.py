@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from service.bulk import answered
 from service.commands.cli import run
-from service.commands.interruption import Interrupted
-from service.processes import Planners
+from service.processes import Interrupted
 from service.wire import LostError, encode_error
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
@@ -130,13 +130,12 @@ def test_numbers_of_a_hand_of_ones_own_count(
 def test_a_point_that_is_lost_is_a_failure(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    true = Planners.answers
 
-    def losing(self, payloads, form):
-        for i, answer in true(self, payloads, form):
-            yield i, encode_error(LostError("its process died"), form) if i == 1 else answer
+    def losing(questions, pool, form):
+        for i, answer in enumerate(answered(questions, pool, form)):
+            yield encode_error(LostError("its process died"), form) if i == 1 else answer
 
-    monkeypatch.setattr(Planners, "answers", losing)
+    monkeypatch.setattr("service.sweeping.evaluation.answered", losing)
     values = "load.mass=60,80,100"
     assert run(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"]) == FAILED
     told = result(capfd)
@@ -147,14 +146,12 @@ def test_a_point_that_is_lost_is_a_failure(
 def test_what_is_answered_is_kept(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    true = Planners.answers
 
-    def interrupted(self, payloads, form):
-        answers = true(self, payloads, form)
-        yield next(answers)
+    def interrupted(questions, pool, form):
+        yield next(answered(questions, pool, form))
         raise Interrupted
 
-    monkeypatch.setattr(Planners, "answers", interrupted)
+    monkeypatch.setattr("service.sweeping.evaluation.answered", interrupted)
     with pytest.raises(Interrupted) as caught:
         run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
