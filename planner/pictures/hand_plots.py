@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-__all__ = ["direction_in_words", "draw_fingers", "plot_wrench_space"]
+__all__ = ["direction_in_words", "draw_fingers", "draw_wrench_space", "plot_wrench_space"]
 
 PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
 
@@ -97,15 +97,29 @@ def plot_wrench_space(
     outlined : bool, optional
         Whether projections are drawn by how far the set reaches, as its vertices are too many.
     """
+    figure = draw_wrench_space(settled, space, title, preload, outlined=outlined)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=110, facecolor="white")
+
+
+def draw_wrench_space(
+    settled: SettledHand,
+    space: WrenchSpace | None,
+    title: str,
+    preload: Array | None = None,
+    *,
+    outlined: bool = False,
+) -> Figure:
+    """Draw a hand and what it can carry; arguments as of `plot_wrench_space`."""
     tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
     figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
     heights = [1.0] if space is None else [1.0, 0.6]
     rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
     upper = rows[0, 0]
-    grid = upper.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.4))
-    fingers = [upper.add_subplot(grid[i, j]) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1))]
-    draw_fingers(fingers, settled, tensions)
-    _draw_from_above(upper.add_subplot(grid[:, 2]), settled)
+    # apart, as panels that share a grid crowd each other where they keep their aspect
+    left, right = upper.subfigures(1, 2, width_ratios=(2.0, 1.4))
+    draw_fingers(left.subplots(2, 2).ravel().tolist(), settled, tensions)
+    _draw_from_above(right.subplots(), settled)
     seating = settled.seating.rule.replace("_", " ")
     held = f"closing tension of {settled.closing_tension:g} N"
     if preload is not None:
@@ -120,8 +134,7 @@ def plot_wrench_space(
         for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
             points = _outline(space, i, j) if vertices is None else vertices[:, [i, j]]
             _draw_projection(axes, points, i, j)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=110, facecolor="white")
+    return figure
 
 
 def _listed(tensions: Array) -> str:
@@ -154,8 +167,7 @@ def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> N
     for axes, name in zip(
         panels, ("inner_left", "outer_left", "inner_right", "outer_right"), strict=True
     ):
-        below = name.endswith("right")
-        _draw_finger(axes, settled, FINGERS.index(name), loads, largest, limits, below)
+        _draw_finger(axes, settled, FINGERS.index(name), loads, largest, limits)
     shown = [kind for kind in CONTACTS if any(tile.contact == kind for tile in settled.tiles)]
     handles = [
         Line2D([], [], color=CONTACTS[kind][0], linewidth=4, label=CONTACTS[kind][1])
@@ -172,7 +184,6 @@ def _draw_finger(
     loads: Array,
     largest: float,
     limits: tuple[Array, Array],
-    below: bool,
 ) -> None:
     """Draw a finger and the rock in its plane, from its proximal joint."""
     frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
@@ -216,7 +227,7 @@ def _draw_finger(
     )
     axes.set(
         title=f"{FINGERS[index].replace('_', ' ')}: plane {direction_in_words(frame.along)}",
-        xlabel="along the finger, from its proximal joint [mm]" if below else "",
+        xlabel="along the finger, from its proximal joint [mm]",
         ylabel="into the rock, from the joint [mm]",
         xlim=(low[0], high[0]),
         ylim=(high[1], low[1]),
@@ -378,8 +389,8 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     (a, unit_a), (b, unit_b) = symbol_of(COMPONENTS[i]), symbol_of(COMPONENTS[j])
     axes.set(
         title=f"all wrenches on the rock, in {a} and {b}",
-        xlabel=f"{a} [{unit_a}]",
-        ylabel=f"{b} [{unit_b}]",
+        xlabel=f"{a} in H [{unit_a}]",
+        ylabel=f"{b} in H [{unit_b}]",
     )
     if np.ptp(points[:, 0]) < FLAT:
         axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)

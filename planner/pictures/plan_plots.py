@@ -1,7 +1,7 @@
 """The picture of a plan: the robot on the rock, what its hands carry, and how near each limit is.
 
-The robot is drawn from behind in W, and from two sides. Limbs and torso are drawn where the joints
-are known; without them the hands and the rock alone.
+The robot is drawn from behind in W, and from two sides: its body as the capsules in its file, its
+limbs where the joints are known.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ SPREAD: Final = (0.045, BOTTOM, 0.33, 0.11)
 ABOVE_SPREAD: Final = 0.3
 """Where that view begins then, over the picture's height."""
 
-REASON: Final = 0.45
+REASON: Final = 0.4
 """From the upper edge down to the reason [inch]."""
 
 SENTENCE: Final = 180
@@ -177,7 +177,9 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     def flat(points: Array) -> Array:
         return np.column_stack(proj3d.proj_transform(*points.T, projection)[:2])
 
-    draw_scene(View(axes, lambda points: points, flat, Poly3DCollection), scene)
+    height = np.array([0.0, 0.0, math.sin(elevation)])
+    look = -math.cos(elevation) * camera - height
+    draw_scene(View(axes, lambda points: points, flat, Poly3DCollection, look, deep=True), scene)
     axes.set(xlabel="x of W [m]", ylabel="y of W [m]", zlabel="z of W [m]")
 
 
@@ -206,4 +208,4 @@ def _draw_side(
     axes.update_datalim(flat(scene.points))
     axes.grid(alpha=0.3)
     axes.set(xlabel=f"{words[0]}, from B [m]", ylabel=f"{words[1]}, from B [m]")
-    draw_scene(View(axes, flat, flat, PolyCollection, np.cross(up, right)), scene)
+    draw_scene(View(axes, flat, flat, PolyCollection, np.cross(up, right), deep=False), scene)

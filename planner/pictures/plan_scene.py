@@ -18,6 +18,7 @@ from planner.result import HandPlan, Plan
 
 __all__ = [
     "UP",
+    "DrawnCapsules",
     "DrawnHand",
     "DrawnLimb",
     "DrawnLoad",
@@ -89,6 +90,13 @@ class DrawnLimb(NamedTuple):
     utilisations: Array | None
 
 
+class DrawnCapsules(NamedTuple):
+    """Capsules: their segments in W, shape (n, 2, 3), and their radii, shape (n,) [m]."""
+
+    ends: Array
+    radii: Array
+
+
 class DrawnLoad(NamedTuple):
     """What the hands hold up: a force at a place, in W [m, N], and a moment about it [N·m].
 
@@ -112,14 +120,20 @@ class Scene:
     hands : tuple of DrawnHand
     limbs : tuple of DrawnLimb
         Empty where nothing is said of joints.
+    body_capsules, link_capsules : DrawnCapsules
+        Of what no joint moves, and of the limbs' links where the joints are known; as in the
+        robot's parameters.
     torso : ndarray, shape (m, 3, 3)
-        Triangles of the hull of B and the first joints, in W [m].
+        Of a robot whose file has no such capsules: triangles of the hull of B and the first joints,
+        in W [m].
     load : DrawnLoad
     """
 
     body: Pose
     hands: tuple[DrawnHand, ...]
     limbs: tuple[DrawnLimb, ...]
+    body_capsules: DrawnCapsules
+    link_capsules: DrawnCapsules
     torso: Array
     load: DrawnLoad
 
@@ -136,6 +150,8 @@ class Scene:
             if hand.force is not None:
                 parts.append(hand.place + self.scale * hand.force)
         parts += [limb.chain for limb in self.limbs]
+        for ends, radii in (self.body_capsules, self.link_capsules):
+            parts += [ends + side * radii[:, None, None] for side in (-1.0, 1.0)]
         return np.vstack([np.reshape(part, (-1, 3)) for part in parts])
 
     @property
@@ -186,13 +202,17 @@ def scene_of(plan: Plan, question: Question) -> Scene:
     stance = question.stance
     plans = {hand.limb: hand for hand in plan.hands or ()}
     limbs = _limbs(plan, question)
+    body, links = _capsules(plan, stance)
+    hull = [stance.body.position, *(limb.chain[0] for limb in limbs)]
     return Scene(
         body=stance.body,
         hands=tuple(
             _hand(hand, settle_hand(hand, stance), plans.get(hand.limb)) for hand in stance.hands
         ),
         limbs=limbs,
-        torso=_torso(np.array([stance.body.position, *(limb.chain[0] for limb in limbs)])),
+        body_capsules=body,
+        link_capsules=links,
+        torso=np.zeros((0, 3, 3)) if len(body.ends) else _torso(np.array(hull)),
         load=_load(plan, question),
     )
 
@@ -230,6 +250,20 @@ def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
         )
         for limb in stance.robot.limbs
     )
+
+
+def _capsules(plan: Plan, stance: Stance) -> tuple[DrawnCapsules, DrawnCapsules]:
+    """Return those of the body, and those of links."""
+    robot = stance.robot
+    (body, radii), links = robot.body_capsules, np.zeros((0, 2, 3))
+    if plan.joints is not None:
+        links = robot.placed_capsules(plan.joints)[len(body) :]
+    of_links = robot.capsules.radii[len(body) :][: len(links)]
+
+    def placed(ends: Array, widths: Array) -> DrawnCapsules:
+        return DrawnCapsules(stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3), widths)
+
+    return placed(body, radii), placed(links, of_links)
 
 
 def _torso(points: Array) -> Array:

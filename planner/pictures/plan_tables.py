@@ -44,27 +44,38 @@ SAID: Final[dict[str, Any]] = {"fontsize": 8, "ha": "left", "va": "top"}
 
 
 def draw_tiles(axes: Any, plan: Plan) -> None:
-    """Draw the utilisation of every tile and palm as a table of colours."""
+    """Draw the utilisation of every tile and palm as a table of colours.
+
+    A palm's cell is as high as the rows of its hand's fingers.
+    """
     hands = plan.hands or ()
     clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
     columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
     names: list[str] = []
     rows: list[list[float]] = []
+    palms: list[float] = []
     for hand in hands:
         for finger in hand.fingers:
             touching = (tile for tile in finger.tiles if tile.contact != "none")
             used = {tile.phalanx: tile.utilisation for tile in touching}
-            rows.append([*(used.get(phalanx, np.nan) for phalanx in columns), np.nan])
+            rows.append([used.get(phalanx, np.nan) for phalanx in columns])
             names.append(
                 f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
                 f"  {finger.tendon_tension:3.0f} N"
             )
-        rows[-len(hand.fingers)][-1] = hand.palm.utilisation if hand.palm.engaged else np.nan
-    _draw_table(axes, np.array(rows), [*columns, "palm"], names)
+        palm = hand.palm.utilisation if hand.palm.engaged else np.nan
+        palms += [palm] * len(hand.fingers)
+    values = np.column_stack([rows, palms])
+    _draw_colours(axes, values, [*columns, "palm"], names)
+    _write_numbers(axes, values[:, :-1])
+    axes.axvline(len(columns) - 0.5, color="white", linewidth=3.0)
     done = 0
-    for hand in hands[:-1]:
+    for hand in hands:
+        middle = done + 0.5 * (len(hand.fingers) - 1)
+        _write_numbers(axes, values[done : done + 1, -1:], (middle, len(columns)))
         done += len(hand.fingers)
-        axes.axhline(done - 0.5, color="black", linewidth=1.0)
+        if hand is not hands[-1]:
+            axes.axhline(done - 0.5, color="black", linewidth=1.0)
     axes.set_title("utilisation of each tile; tension of each tendon", fontsize=10, loc="right")
 
 
@@ -73,12 +84,13 @@ def draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:
     used = [np.asarray(limb.utilisations) for limb in limbs]
     values = np.array(list(zip_longest(*used, fillvalue=np.nan))).T
     columns = [str(i + 1) for i in range(values.shape[1])]
-    _draw_table(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
+    _draw_colours(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
+    _write_numbers(axes, values)
     axes.set_title("utilisation of each joint, from the body outward", fontsize=10, loc="right")
 
 
-def _draw_table(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
-    """Draw numbers on their colours; none where a number is NaN."""
+def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
+    """Draw numbers as colours; none where a number is NaN."""
     shown = np.ma.masked_invalid(values)
     axes.imshow(shown, cmap=COLOURS, norm=UTILISATION, aspect="auto", interpolation="none")
     axes.set_xticks(range(values.shape[1]), list(columns), fontsize=6.5)
@@ -89,10 +101,15 @@ def _draw_table(axes: Any, values: Array, columns: Iterable[str], rows: Iterable
     if widest > axes.bbox.width / values.shape[1]:
         for title in titles:
             title.set(rotation=SLANT, ha="right", rotation_mode="anchor")
+
+
+def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 0.0)) -> None:
+    """Write numbers that are not NaN on their colours, the first at a row and a column."""
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7}
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value > 1.0 else "black"
-            axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)
+            axes.text(first[1] + j, first[0] + i, f"{value:.2f}", color=colour, **style)
 
 
 def draw_shortfall(axes: Any, plan: Plan) -> None:

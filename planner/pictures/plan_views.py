@@ -9,12 +9,12 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 
 from hand_models.base import Array
-from planner.pictures.plan_scene import DrawnHand, DrawnLimb, Scene
+from planner.pictures.plan_scene import DrawnCapsules, DrawnHand, DrawnLimb, Scene
 
-__all__ = ["COLOURS", "UTILISATION", "View", "draw_scene"]
+__all__ = ["COLOURS", "UTILISATION", "View", "capsule_outlines", "draw_scene"]
 
 COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", ["#1a9850", "#e6a117", "#d73027"]
@@ -30,6 +30,12 @@ LIGHT: Final = np.array([-0.5, -0.3, 0.8])
 """Where light comes from, in W."""
 
 LIMB: Final = "#4a6a8a"
+
+BODY: Final = (*to_rgb(LIMB), 0.16)
+"""Of the body, through which hands and rock are seen."""
+
+ROUND: Final = 16
+"""Points of half a circle."""
 
 LOAD: Final = "tab:blue"
 
@@ -88,8 +94,10 @@ class View:
         Places as they are seen, (n, 2), for arrows and notes.
     polygons : callable
         Makes the collection of polygons that these axes show.
-    look : ndarray, shape (3,), optional
-        Direction in W of looking, where the axes know of no depth.
+    look : ndarray, shape (3,)
+        Direction in W of looking.
+    deep : bool
+        Whether the axes know of depth.
     seen : list of ndarray, shape (n, 2)
         Lines and arrows drawn so far, as they are seen.
     """
@@ -98,7 +106,8 @@ class View:
     place: Callable[[Array], Array]
     flat: Callable[[Array], Array]
     polygons: Callable[..., Any]
-    look: Array | None = None
+    look: Array
+    deep: bool
     seen: list[Array] = field(default_factory=list)
 
     def line(self, points: Array, **style: Any) -> None:
@@ -116,7 +125,7 @@ class View:
 
     def back_to_front(self, polygons: Array) -> Array:
         """Return polygons (n, k, 3) of W in the order in which they are to be drawn."""
-        if self.look is None:
+        if self.deep:
             return polygons
         return np.asarray(polygons[np.argsort(-(polygons @ self.look).mean(axis=1))])
 
@@ -136,7 +145,7 @@ class View:
         found: list[tuple[Array, str]] = []
         for spot, text in zip(spots, texts, strict=True):
             for i, (known, before) in enumerate(found):
-                if self.look is not None and np.linalg.norm(spot - known) < near:
+                if not self.deep and np.linalg.norm(spot - known) < near:
                     found[i] = known, before + between + text
                     break
             else:
@@ -169,7 +178,7 @@ class View:
         renderer = figure.canvas.get_renderer()
         point = figure.dpi / POINTS_PER_INCH
         dots = self._dots(SPACING * point)
-        frame = figure.bbox if self.look is None else self.axes.bbox
+        frame = figure.bbox if self.deep else self.axes.bbox
         placed = np.zeros((0, 4))
         for note in self.axes.texts:
             if not note.get_text():
@@ -207,8 +216,7 @@ def draw_scene(view: View, scene: Scene) -> None:
     view.fill(rock, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
     for hand in scene.hands:
         _draw_hand(view, hand)
-    outline = 1.0 if len(scene.torso) == 1 else 0.0
-    view.fill(scene.torso, facecolor=LIMB, edgecolor=LIMB, linewidth=outline, alpha=0.25, zorder=4)
+    _draw_body(view, scene)
     for limb in scene.limbs:
         _draw_limb(view, limb)
     _name_hands(view, scene)
@@ -233,6 +241,38 @@ def _draw_hand(view: View, hand: DrawnHand) -> None:
         view.line(chain, color="0.2", linewidth=1.5, zorder=3)
     if len(hand.touching):
         view.line(hand.touching, color="black", linestyle="none", marker=".", ms=4, zorder=3)
+
+
+def _draw_body(view: View, scene: Scene) -> None:
+    """Draw capsules as they are seen; the hull of the shoulders if the body has none."""
+    for capsules, edge in ((scene.link_capsules, "none"), (scene.body_capsules, LIMB)):
+        outlines = capsule_outlines(capsules, view.look)
+        view.fill(outlines, facecolor=BODY, edgecolor=edge, linewidth=0.5, zorder=4)
+    width = 1.0 if len(scene.torso) == 1 else 0.0
+    view.fill(scene.torso, facecolor=BODY, edgecolor=LIMB, linewidth=width, zorder=4)
+
+
+def capsule_outlines(capsules: DrawnCapsules, look: Array) -> Array:
+    """Return the outlines of capsules as seen in parallel along a direction.
+
+    Parameters
+    ----------
+    capsules : DrawnCapsules
+    look : ndarray, shape (3,)
+        Unit direction.
+
+    Returns
+    -------
+    ndarray, shape (n, 2 · `ROUND`, 3)
+        Half a circle about each end, across the direction [m].
+    """
+    ends, radii = capsules
+    across = np.linalg.svd(look[None])[2][1:]
+    steps = (ends[:, 1] - ends[:, 0]) @ across.T
+    along = np.arctan2(steps[:, 1], steps[:, 0])
+    turn = along[:, None] + np.linspace(-math.pi / 2.0, math.pi / 2.0, ROUND)
+    half = np.stack([np.cos(turn), np.sin(turn)], axis=-1) @ across * radii[:, None, None]
+    return np.concatenate([ends[:, None, 1] + half, ends[:, None, 0] - half], axis=1)
 
 
 def _draw_limb(view: View, limb: DrawnLimb) -> None:

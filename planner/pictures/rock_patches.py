@@ -29,7 +29,7 @@ from hand_models.rock import (
 
 __all__ = ["AROUND", "rock_patch"]
 
-AROUND: Final = 0.25
+AROUND: Final = 0.45
 """Half the side of the box about the hand in which rock is drawn [m]."""
 
 STEPS: Final = 28
@@ -38,7 +38,7 @@ STEPS: Final = 28
 MOST: Final = 3000
 """Triangles of a mesh near a hand above which it is drawn coarsely."""
 
-COARSE: Final = 0.012
+COARSE: Final = 0.02
 """Size of what is drawn of such a mesh [m]."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -44,6 +45,31 @@ def test_every_hold_has_a_picture(hold, rotation, tmp_path):
     path = tmp_path / "hand.png"
     hand_plots.plot_wrench_space(settled, wrench_space(settled), path, "a hand")
     assert path.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["cylinder", "ellipsoid", "mesh", "too small to hold"])
+def test_titles_and_labels_lie_on_nothing_else_that_is_written(name):
+    hold, rotation = HOLDS[name]
+    settled = HAND.settle(hold, ROCK, Grasp(rotation, lateral=False))
+    figure = hand_plots.draw_wrench_space(settled, wrench_space(settled), "a hand")
+    figure.draw_without_rendering()
+    titles = [text for part in figure.findobj(SubFigure) for text in part.texts]
+    ticks = []
+    for axes in figure.axes:
+        titles += [axes.title, axes.xaxis.label, axes.yaxis.label]
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            labels = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
+            ticks += [label for place, label in labels if low <= place <= high]
+    titles, ticks = ([text for text in texts if text.get_text()] for texts in (titles, ticks))
+    assert len(titles) >= 3 * 8
+    assert len(ticks) > 50
+    clashes = [
+        (one.get_text(), other.get_text())
+        for one, other in (*combinations(titles, 2), *product(titles, ticks))
+        if one.get_window_extent().overlaps(other.get_window_extent())
+    ]
+    assert clashes == []
 
 
 def test_contacts_and_forces_are_drawn_where_they_are():

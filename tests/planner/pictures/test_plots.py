@@ -16,6 +16,7 @@ import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.path import Path as MplPath
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3D
@@ -27,8 +28,8 @@ from hand_models.rock.profile import STRIPS
 from planner import solving
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
-from planner.pictures.plan_scene import scene_of, view_directions
-from planner.pictures.plan_views import COLOURS, LIMB
+from planner.pictures.plan_scene import DrawnCapsules, scene_of, view_directions
+from planner.pictures.plan_views import BODY, COLOURS, LIMB, capsule_outlines
 from planner.pictures.report import draw_route
 from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
 from planner.question import HandOnHold, Limits, Load, Question, Stance
@@ -377,12 +378,29 @@ def test_the_table_has_the_utilisation_of_every_tile():
     table = drawn("plain").axes[3]
     want = []
     for hand in plan.hands:
-        for i, finger in enumerate(hand.fingers):
+        for finger in hand.fingers:
             want += [tile.utilisation for tile in finger.tiles if tile.contact != "none"]
-            if i == 0 and hand.palm.engaged:
-                want.append(hand.palm.utilisation)
-    assert words(table) == [f"{value:.2f}" for value in want]
+    palms = [hand.palm.utilisation for hand in plan.hands if hand.palm.engaged]
+    assert len(palms) == len(plan.hands)
+    assert words(table) == [f"{value:.2f}" for value in want + palms]
     assert len(table.get_yticklabels()) == 4 * len(plan.hands)
+
+
+def test_a_palm_has_a_cell_as_high_as_its_hand():
+    question, plan = answered("plain")
+    first, *others = plan.hands
+    used = 0.37
+    palms = [replace(first.palm, utilisation=used), *(hand.palm for hand in others)]
+    palms[1] = replace(palms[1], engaged=())
+    hands = (replace(hand, palm=palm) for hand, palm in zip(plan.hands, palms, strict=True))
+    table = draw_plan(replace(plan, hands=tuple(hands)), question).axes[3]
+    assert [label.get_text() for label in table.get_xticklabels()][-1] == "palm"
+    (cell,) = (text for text in table.texts if text.get_text() == "0.37")
+    # in the palm's column, in the middle of the hand's four fingers
+    assert cell.get_position() == (4, 1.5)
+    column = table.images[0].get_array()[:, 4]
+    np.testing.assert_allclose(column[:4], used)
+    assert column.mask.tolist() == [False] * 4 + [True] * 4 + [False] * 8
 
 
 def test_joints_without_a_plan_have_no_colour_and_no_table():
@@ -432,6 +450,82 @@ def test_many_hands_make_the_picture_taller():
     assert drawn("plain").get_size_inches()[1] == plan_plots.SIZE[1]
     height = draw_plan(wide, question).get_size_inches()[1]
     assert height * (plan_plots.TOP - plan_plots.BOTTOM) / 64 > 0.1
+
+
+# The body ---------------------------------------------------------------------------------------
+
+
+def outlines(axes):
+    """Outlines of the body's capsules in axes of two dimensions, shape (n, k, 2)."""
+    (found,) = (
+        each
+        for each in axes.collections
+        if np.allclose(each.get_facecolor()[0], BODY) and len(each.get_edgecolor())
+    )
+    return np.array([path.vertices[:-1] for path in found.get_paths()])
+
+
+@pytest.mark.parametrize("name", ["solved", "floating", "infeasible"])
+def test_the_bodys_capsules_are_drawn_where_they_stand(name):
+    question, plan = answered(name)
+    stance = question.stance
+    ends, radii = stance.robot.body_capsules
+    assert len(ends) > 5
+    scene = scene_of(plan, question)
+    assert len(scene.torso) == 0
+    placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
+    np.testing.assert_allclose(scene.body_capsules.ends, placed, atol=1e-12)
+    np.testing.assert_allclose(scene.body_capsules.radii, radii, atol=0.0)
+    _, facing, _ = panels(drawn(name))
+    corners = outlines(facing)
+    assert len(corners) == len(ends)
+    # upright, to the right of B is against its y, and up is its x
+    flat = ends[..., [1, 0]] * [-1.0, 1.0]
+    for spots, segment, radius in zip(corners, flat, radii, strict=True):
+        np.testing.assert_allclose(off_segment(spots, segment), radius, atol=1e-9)
+        low, high = segment.min(axis=0) - radius, segment.max(axis=0) + radius
+        np.testing.assert_allclose(spots.min(axis=0), low, atol=0.03 * radius)
+        np.testing.assert_allclose(spots.max(axis=0), high, atol=0.03 * radius)
+    # B itself is within the body as it is drawn
+    assert any(MplPath(spots).contains_point((0.0, 0.0)) for spots in corners)
+
+
+def off_segment(points, segment):
+    """How far points (n, 2) are from a segment (2, 2)."""
+    step = segment[1] - segment[0]
+    part = (points - segment[0]) @ step / max(float(step @ step), 1e-18)
+    nearest = segment[0] + np.clip(part, 0.0, 1.0)[:, None] * step
+    return np.linalg.norm(points - nearest, axis=1)
+
+
+def test_the_outline_of_a_capsule_is_its_radius_from_it_across_the_look():
+    ends = np.array([[[0.0, 0, 0], [0.3, 0.1, 0.5]], [[1.0, 1, 1], [1.0, 1, 1]]])
+    capsules = DrawnCapsules(ends, np.array([0.2, 0.1]))
+    look = np.array([0.6, 0.0, -0.8])
+    seen = capsule_outlines(capsules, look)
+    across = np.linalg.svd(look[None])[2][1:].T
+    for outline, segment, radius in zip(seen, ends, capsules.radii, strict=True):
+        np.testing.assert_allclose(off_segment(outline @ across, segment @ across), radius)
+
+
+def test_links_have_their_capsules_where_the_joints_are_known():
+    question, plan = answered("solved")
+    robot = question.stance.robot
+    body, links = (getattr(scene_of(plan, question), f"{of}_capsules") for of in ("body", "link"))
+    placed = robot.placed_capsules(plan.joints)
+    back = question.stance.body.inverse().apply(links.ends.reshape(-1, 3)).reshape(-1, 2, 3)
+    np.testing.assert_allclose(back, placed[len(body.ends) :], atol=1e-9)
+    np.testing.assert_allclose(links.radii, robot.capsules.radii[len(body.ends) :])
+    question, plan = answered("plain")
+    assert plan.joints is None
+    assert len(scene_of(plan, question).link_capsules.ends) == 0
+
+
+def test_a_robot_without_capsules_of_its_body_has_the_hull_of_its_shoulders():
+    question, plan = answered("two limbs")
+    scene = scene_of(plan, question)
+    assert len(scene.body_capsules.ends) == 0
+    assert len(scene.torso) > 0
 
 
 # Where it is seen from --------------------------------------------------------------------------
@@ -527,6 +621,19 @@ def test_a_fine_mesh_is_drawn_coarsely():
     # corners of a grid about points of the ball, and chords between them
     assert away.max() <= 0.15 + COARSE * math.sqrt(0.75)
     assert away.min() >= 0.15 - 2.0 * COARSE
+
+
+def test_so_much_rock_is_drawn_that_one_sees_what_it_is():
+    # a log all around and longer than it is thick, a whole boulder, a wall beyond the hand
+    log = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
+    width = np.ptp(rock_patch(log).reshape(-1, 3), axis=0)
+    np.testing.assert_allclose(width, [0.3, 2.0 * AROUND, 0.3], rtol=0.01)
+    assert width[1] > 2.0 * width[0]
+    boulder = HAND.settle(Ellipsoid((0.3, 0.2, 0.12)), ROCK, Grasp(0.5))
+    width = np.ptp(rock_patch(boulder).reshape(-1, 3), axis=0)
+    np.testing.assert_allclose(width, [0.6, 0.4, 0.24], rtol=0.02)
+    wall_patch = rock_patch(HAND.settle(Plane(), ROCK, Grasp()))
+    assert np.ptp(wall_patch.reshape(-1, 3), axis=0)[:2].min() > 4.0 * HAND.palm_length
 
 
 def test_a_flat_wall_is_drawn_to_the_edge_of_the_box():
