@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from msgspec.structs import asdict
 
-from hand_models.base import whole_file
-from planner.result import LimitName, Plan
+from hand_models.base import Array, whole_file
+from planner.result import MANY, LimitName, Plan
 from planner.route import OutOfReach, RouteResult, RouteStage
 
 __all__ = ["draw_route", "summary", "write_report"]
@@ -26,6 +26,9 @@ HEADROOM: Final = 1.2
 
 OVER: Final[dict[str, Any]] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
 """Where the legend is: above what is drawn."""
+
+BAND: Final = "0.15"
+"""Colour of a spread."""
 
 PHASE_COLOURS: Final = {
     "start": "0.4",
@@ -137,6 +140,7 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
         "utilisation": used,
         "margin": None if used is None else stage.question.limits.utilisation - used,
         "load_factor": plan.load_factor,
+        **_spread(stage, plan),
         "joint_utilisation": plan.joint_utilisation,
         "limiting_limb": name.limb or None,
         "limiting_finger": name.finger,
@@ -147,15 +151,32 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
     }
 
 
+def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
+    """Return the spread of a stage in short, where it was asked for."""
+    if "spread" not in stage.question.want:
+        return {}
+    told = plan.spread
+    used, factor = (None, None) if told is None else (told.utilisation, told.load_factor)
+    return {
+        "utilisation_low": used and used.low,
+        "utilisation_high": used and used.high,
+        "load_factor_low": factor and factor.low,
+        "load_factor_high": factor and factor.high,
+        "draws": told and told.draws,
+        "holds": told and told.holds,
+    }
+
+
 def draw_route(result: RouteResult) -> Figure:
-    """Draw utilisation and load factor along a climb, with its crux."""
+    """Draw utilisation and load factor along a climb, with its crux, and their spread."""
     figure = Figure(figsize=(11.0, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     index = np.arange(len(result.plans))
     used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
+    bands = [_band(result.plans, name) for name in ("utilisation", "load_factor")]
     cap = result.route.limits.utilisation
     # what is far beyond the limit is cut off and written in, so that the rest can be seen
-    height = min(float(np.nanmax(np.append(used, cap))), CUT) * 1.1
+    height = min(float(np.nanmax([*used, *bands[0][1], cap])), CUT) * 1.1
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(used), color=colours)
     for i in np.flatnonzero(used > height):
@@ -168,9 +189,10 @@ def draw_route(result: RouteResult) -> Figure:
         if any(stage.phase == phase for stage in result.stages):
             upper.bar(0, 0, color=colour, label=phase)
     crux = result.crux
+    over = float(np.nanmax([used[crux], bands[0][1, crux], 0.0]))
     upper.annotate(
         "crux",
-        (crux, height if np.isnan(used[crux]) else min(used[crux], height)),
+        (crux, height if np.isnan(used[crux]) else min(over, height)),
         xytext=(0, 14),
         textcoords="offset points",
         ha="center",
@@ -179,16 +201,18 @@ def draw_route(result: RouteResult) -> Figure:
         arrowprops={"arrowstyle": "-|>"},
     )
     upper.set(
-        ylabel="utilisation [1]; below the limit: margin",
+        ylabel="utilisation [1]",
         ylim=(0.0, height * HEADROOM),
     )
     figure.suptitle(result.route.name)
-    upper.legend(**OVER, ncols=6, fontsize=8, frameon=False)
+    for axes, band in zip((upper, lower), bands, strict=True):
+        _draw_band(axes, band, _of_draws(result.plans))
+    upper.legend(**OVER, ncols=7, fontsize=8, frameon=False)
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color="tab:red")
     lower.set(ylabel="load factor [1]", xlabel="stance")
-    lower.set_ylim(0.0, 1.1 * float(np.nanmax(np.append(factor, 1.0))))
+    lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))
     labels = [
         "start" if s.move == 0 else f"{s.move} {s.phase}\n{str(s.limb).replace('_', ' ')}"
         for s in result.stages
@@ -197,3 +221,23 @@ def draw_route(result: RouteResult) -> Figure:
     for axes in (upper, lower):
         axes.grid(axis="y", alpha=0.3)
     return figure
+
+
+def _band(plans: Sequence[Plan | OutOfReach], name: str) -> Array:
+    """Return the ends of a spread at every stage, shape (2, n); NaN where there is none."""
+    told = [None if plan.spread is None else getattr(plan.spread, name) for plan in plans]
+    return np.array([(np.nan, np.nan) if s is None else (s.low, s.high) for s in told]).T
+
+
+def _of_draws(plans: Sequence[Plan | OutOfReach]) -> str:
+    """Return what the bands are."""
+    draws = max((plan.spread.draws for plan in plans if plan.spread is not None), default=0)
+    return f"5 to 95 % of {draws} draws" if draws >= MANY else f"all of {draws} draws"
+
+
+def _draw_band(axes: Any, band: Array, label: str) -> None:
+    """Draw a spread along a climb, if there is one; also of a stage between two that have none."""
+    if np.isfinite(band).any():
+        index = np.arange(band.shape[1])
+        axes.fill_between(index, *band, color=BAND, alpha=0.25, linewidth=0.0, label=label)
+        axes.vlines(index, *band, color=BAND, linewidth=1.5)

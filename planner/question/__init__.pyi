@@ -11,6 +11,7 @@ from .question import (
     Load as Load,
     Objective as Objective,
     Question as Question,
+    Want as Want,
 )
 from .stance import (
     EARTH as EARTH,

@@ -15,7 +15,7 @@ from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Load", "Objective", "Question"]
+__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Load", "Objective", "Question", "Want"]
 
 Frame = Literal["hand", "body", "world"]
 

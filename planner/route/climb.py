@@ -15,9 +15,10 @@ from functools import partial
 from typing import Final, Literal
 
 from hand_models.base import InvalidInputError, Pose, within
+from hand_models.parameters import Draw
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
-from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance
+from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance, Want
 from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.solving import plan
@@ -66,6 +67,10 @@ class Route:
         Of every stage.
     explain : bool
         As of every stage's question.
+    want : frozenset of str
+        Extras of every stage's question, beside its load factor.
+    draws : tuple of Draw, optional
+        As of every stage's question.
     """
 
     name: str
@@ -75,6 +80,8 @@ class Route:
     limits: Limits = field(default_factory=Limits)
     objective: Objective = "max_margin"
     explain: bool = True
+    want: frozenset[Want] = frozenset()
+    draws: tuple[Draw, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +127,7 @@ class OutOfReach:
     load_factor_unbounded: Literal[False] = False
     limiting: None = None
     joint_utilisation: None = None
+    spread: None = None
     warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -216,7 +224,8 @@ def stages(route: Route) -> Iterator[RouteStage]:
             stance,
             load=route.load,
             limits=replace(route.limits, per_hand=caps),
-            want=frozenset(["load_factor"]),
+            want=route.want | {"load_factor"},
+            draws=route.draws,
             objective=route.objective,
             explain=route.explain,
         )

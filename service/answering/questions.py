@@ -106,6 +106,8 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         limits=_limits(request.limits),
         objective=cast(Objective, request.objective),
         explain=request.explain,
+        want=frozenset(request.want),
+        draws=_draws(request.draws),
     )
 
 

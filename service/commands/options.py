@@ -35,6 +35,7 @@ __all__ = [
     "plot_option",
     "robot_option",
     "routes_argument",
+    "spread_option",
     "stance_argument",
     "timeout_option",
     "with_extras",
@@ -190,6 +191,11 @@ explain_option = click.option(
     "unexplained",
     is_flag=True,
     help="Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
+)
+spread_option = click.option(
+    "--spread",
+    is_flag=True,
+    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
 )
 draws_option = click.option(
     "--draws",

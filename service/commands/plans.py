@@ -16,6 +16,7 @@ from service.commands.options import (
     hand_option,
     json_option,
     robot_option,
+    spread_option,
     stance_argument,
     with_extras,
 )
@@ -54,11 +55,7 @@ ADVICE_SECONDS: Final = 30.0
     is_flag=True,
     help="And the least load factor where every hand is a little elsewhere.",
 )
-@click.option(
-    "--spread",
-    is_flag=True,
-    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
-)
+@spread_option
 @click.option(
     "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
 )

@@ -19,11 +19,13 @@ from service.commands.batch import answer_rest, exit_status, place, writing_answ
 from service.commands.options import (
     asked,
     dask_option,
+    draws_option,
     explain_option,
     hand_option,
     json_option,
     robot_option,
     routes_argument,
+    spread_option,
     workers_option,
 )
 from service.commands.stances import read_route
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
     from service.bulk import Sink, Tally
-    from service.requests import RouteRequest
+    from service.requests import Draw, RouteRequest
 
 __all__ = ["route"]
 
@@ -79,6 +81,8 @@ SHOWN: Final = 100
 )
 @workers_option
 @dask_option
+@spread_option
+@draws_option
 @explain_option
 @hand_option
 @robot_option
@@ -89,6 +93,8 @@ def route(
     resume: bool,
     workers: int | None,
     dask: str | None,
+    spread: bool,
+    draws: list[Draw] | None,
     unexplained: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
@@ -103,6 +109,9 @@ def route(
     Exit status of many: the worst of theirs, as of crux batch.
     """
     if output.suffix.lower() in ENDINGS:
+        for option, asked_for in (("--spread", spread), ("--draws", draws is not None)):
+            if asked_for:
+                raise InvalidInputError("is told of one route: needs -o DIR", field=option)
         return _many(routes, output, resume, workers, dask, unexplained, hand, robot, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
@@ -113,13 +122,16 @@ def route(
             raise InvalidInputError(f"needs -o FILE that ends in {LISTED}", field=option)
     if output.exists() and not output.is_dir():
         raise InvalidInputError(f"{output}: is no folder", field="-o")
-    return _one(routes[0], output, workers, unexplained, hand, robot, as_json)
+    spread = spread or draws is not None
+    return _one(routes[0], output, workers, spread, draws, unexplained, hand, robot, as_json)
 
 
 def _one(
     source: str,
     folder: Path,
     workers: int | None,
+    spread: bool,
+    draws: list[Draw] | None,
     unexplained: bool,
     hand: ParameterTable | None,
     robot: RobotFile | None,
@@ -132,6 +144,8 @@ def _one(
     from service.tables import console, print_route
 
     request = asked(read_route(source), hand, robot)
+    if spread:
+        request = msgspec.structs.replace(request, want=["spread"], draws=draws or request.draws)
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     climb = answering.route(request, robots_of(robot))

@@ -148,6 +148,16 @@ class Draw(Strict, frozen=True, kw_only=True):
     ] = None
 
 
+Draws = Annotated[
+    list[Draw],
+    Meta(
+        min_length=1,
+        max_length=100,
+        description="over which the spread is told; by default those of draws.toml",
+    ),
+]
+
+
 class BodyRange(Strict, frozen=True, kw_only=True):
     """How far an advice may move the body from where it is."""
 
@@ -185,14 +195,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
             "advice: what would make it hold, or hold more: verified changes"
         ),
     ] = []
-    draws: Annotated[
-        list[Draw],
-        Meta(
-            min_length=1,
-            max_length=100,
-            description="over which the spread is told; by default those of draws.toml",
-        ),
-    ] = []
+    draws: Draws = []
     explain: Explain = True
     body_range: Annotated[BodyRange, Meta(description="for the advice")] = BodyRange()
 
@@ -283,6 +286,11 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     limits: Limits = Limits()
     moves: Annotated[list[Move], Meta(max_length=10_000)]
     explain: Explain = True
+    want: Annotated[
+        list[Literal["spread"]],
+        Meta(description="of every stance, beside its load factor: as in a plan's request"),
+    ] = []
+    draws: Draws = []
 
 
 def about_the_same(kind: type[Q], request: Query, **more: Any) -> Q:

@@ -8,11 +8,14 @@ import multiprocessing
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 
 from hand_models.base import InvalidInputError, Pose
 from planner.pictures import summary, write_report
+from planner.pictures.report import draw_route
 from planner.question import ForceCap, Limits, Load
 from planner.robots import UnreachableError
 from planner.route import Route, evaluate
@@ -117,6 +120,70 @@ def test_the_table_tells_every_stage_and_the_summary_its_crux(result, tmp_path: 
     assert told["crux"]["stage"] == result.crux
     assert "with rear right in the air" in told["crux"]["sentence"]
     assert files["picture"].read_bytes().startswith(PNG)
+
+
+def test_the_spread_of_a_route_is_in_its_table_and_its_picture(route, result, tmp_path: Path):
+    short = replace(route, moves=route.moves[:1], want=frozenset(["spread"]))
+    spread = evaluate(short)
+    plans = list(spread.plans)
+    low, high = (
+        np.array([getattr(each.spread.load_factor, end) for each in plans])
+        for end in ("low", "high")
+    )
+    assert (high - low).max() > 0.05
+    table = write_report(spread, tmp_path)["table"].read_text(encoding="utf-8")
+    rows = csv.DictReader(table.splitlines())
+    for row, answer in zip(rows, plans, strict=True):
+        told = answer.spread
+        want = (*ends_of(told.utilisation), *ends_of(told.load_factor), told.draws, told.holds)
+        got = [float(row[name]) for name in (*ENDS, "draws", "holds")]
+        assert got == pytest.approx(want)
+    for i, name in enumerate(("utilisation", "load_factor")):
+        want = [ends_of(getattr(each.spread, name)) for each in plans]
+        assert bars(draw_route(spread).axes[i]) == pytest.approx(np.array(want))
+    legend = draw_route(spread).axes[0].get_legend()
+    draws = plans[0].spread.draws
+    assert f"5 to 95 % of {draws} draws" in [text.get_text() for text in legend.get_texts()]
+    # of a stage that has none nothing is drawn, nor of a route that was not asked
+    gap = replace(spread, plans=(plans[0], replace(plans[1], spread=None), *plans[2:]))
+    assert len(bars(draw_route(gap).axes[1])) == len(plans) - 1
+    assert "draws" not in summary(result)["crux"]
+    assert not any(axes.collections for axes in draw_route(result).axes)
+
+
+ONE_DRAW = """
+[[draws]]
+surfaces.rock.shear_limit = { value = 90, unit = "N", source = "measured" }
+"""
+ENDS = ("utilisation_low", "utilisation_high", "load_factor_low", "load_factor_high")
+
+
+def ends_of(quantiles):
+    return quantiles.low, quantiles.high
+
+
+def bars(axes):
+    """Ends of the upright lines of a spread, shape (n, 2), where there are any."""
+    (lines,) = (each for each in axes.collections if isinstance(each, LineCollection))
+    found = np.array([path.vertices[:, 1] for path in lines.get_paths()])
+    return found[np.isfinite(found).all(axis=1)]
+
+
+def test_the_command_asks_for_the_spread_of_every_stance(tmp_path: Path, capfd):
+    draws = tmp_path / "draws.toml"
+    path = tmp_path / "route.json"
+    request = msgspec.json.decode(msgspec.json.encode(read_route("six-moves")))
+    path.write_bytes(msgspec.json.encode(request | {"moves": []}))
+    run(["route", str(path), "-o", str(tmp_path / "a"), "--spread", "--json"])
+    assert json.loads(capfd.readouterr().out)["crux"]["draws"] > 1
+    draws.write_text(ONE_DRAW, encoding="utf-8")
+    run(["route", str(path), "-o", str(tmp_path / "b"), "--draws", str(draws), "--json"])
+    assert json.loads(capfd.readouterr().out)["crux"]["draws"] == 1
+    run(["route", str(path), "-o", str(tmp_path / "c"), "--json"])
+    assert "draws" not in json.loads(capfd.readouterr().out)["crux"]
+    path.write_bytes(msgspec.json.encode(request | {"moves": [], "want": ["advice"]}))
+    assert run(["route", str(path), "-o", str(tmp_path / "d")]) == 2
+    assert "want" in capfd.readouterr().err
 
 
 def test_processes_give_what_one_process_gives_and_tell_their_progress(route, result):
