@@ -452,7 +452,7 @@ def test_what_a_presolve_leaves_undecided_is_asked_again_without(monkeypatch):
             found.status, found.x = 4, None
         return found
 
-    monkeypatch.setattr(linear_programs, "linprog", undecided)
+    monkeypatch.setattr("scipy.optimize.linprog", undecided)
     np.testing.assert_allclose(linear_program(np.ones(2), BOX, np.ones(4), "it"), [-1.0, -1.0])
     assert asked == [True, False]
     monkeypatch.setattr(linear_programs, "PRESOLVED", (True,))

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog, nnls
 
-from planner.explanation import irreducible_infeasible_set
 from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
 from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
 from planner.programs import UNLIMITED
@@ -84,7 +83,7 @@ def test_rows_that_say_nothing_of_each_other_contradict_only_the_box(monkeypatch
         assert A.size
         return nnls(A, b)
 
-    monkeypatch.setattr(irreducible_infeasible_set, "nnls", with_equations)
+    monkeypatch.setattr("scipy.optimize.nnls", with_equations)
     parts = system([[0, 1, 0, 0, 0, 0, 0]], [0], ("low",), goal=1.5 * UNLIMITED)
     parts.G[:] = np.delete(np.eye(7), 1, axis=0)
     parts.G[0, 1] = 1.0

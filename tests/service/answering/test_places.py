@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError
-from service.answering import questions
-from service.answering.dispatch import plan, wrench_space
+from service.answering import plan, questions, wrench_space
 from service.requests import WrenchSpaceRequest
 from service.tables import console, print_plan
 from service.wire import decode_request

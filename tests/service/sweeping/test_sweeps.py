@@ -206,7 +206,7 @@ def test_a_sweep_that_is_broken_off_has_a_table(tmp_path: Path) -> None:
 def test_the_example_of_the_documents_prints_what_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "sweeps.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "sweeps.md", "exec"), {})
