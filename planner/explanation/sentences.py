@@ -332,14 +332,19 @@ def off_sentences(where: Posture | None) -> tuple[str, ...]:
 
 
 def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
-    """Yield what of a hand touches no rock; ``by_finger``: how many tiles and nails hold it."""
+    """Yield what of a hand holds no rock; ``by_finger``: how many tiles and nails hold it."""
     tiles = sum(by_finger)
-    if not tiles and not hand.palm.engaged:
+    bare = {tile.finger for tile in hand.tiles if tile.contact == "frame"}
+    without = [name for name, holds in zip(FINGERS, by_finger, strict=True) if not holds]
+    pressing = [name for name in without if name in bare]
+    idle = [name for name in without if name not in bare]
+    if not tiles and not bare and not hand.palm.engaged:
         yield "touches nothing, so it carries nothing"
-    elif not tiles:
+    elif not tiles and not bare:
         yield "no finger touches rock, only the palm does"
-    idle = [name for name, holds in zip(FINGERS, by_finger, strict=True) if not holds]
-    if tiles and idle and not hand.grasp.fingernail:
+    if pressing:
+        yield f"no spine of {', '.join(pressing)} is on rock, bare phalanges press on it"
+    if (tiles or bare) and idle and not hand.grasp.fingernail:
         yield f"{', '.join(idle)} {'touch' if len(idle) > 1 else 'touches'} no rock"
     if hand.grasp.fingernail and 0 < tiles < len(FINGERS):
         yield f"{tiles} of {len(FINGERS)} nails hook"

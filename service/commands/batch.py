@@ -304,4 +304,4 @@ def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None
     known = f", {before} were answered before" if before else ""
     out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}", markup=False)
     if file is not None:
-        out.print(f"replies: {file}", markup=False, soft_wrap=True)
+        out.print(f"written: {file}", markup=False, soft_wrap=True)

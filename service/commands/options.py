@@ -157,7 +157,8 @@ def beginning_so(
 
     def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names if name.startswith(begun)]
-        return [*found, CompletionItem(begun, type="file")] if files else found
+        # last, click's function for bash would forget the names for it
+        return [CompletionItem(begun, type="file"), *found] if files else found
 
     return complete
 

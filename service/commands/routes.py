@@ -295,7 +295,7 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
         out.print(f"and {routes.count - SHOWN} more", markup=False)
     known = f", {before} were answered before" if before else ""
     out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
-    out.print(f"replies: {file}", markup=False, soft_wrap=True)
+    out.print(f"written: {file}", markup=False, soft_wrap=True)
 
 
 def _number(value: Any) -> str:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from hand_models.base import Pose
-from hand_models.rock import Cylinder, Plane
+from hand_models.hand import FINGERS, Grasp
+from hand_models.rock import Cylinder, Edge, Plane
 from hand_models.tile import Surface
-from planner.explanation import overload_sentence, shortfall_sentence
-from planner.prepare import settle_hand
+from planner.explanation import overload_sentence, shortfall_sentence, warnings
+from planner.prepare import prepare_stance, settle_hand
 from planner.programs import WRENCH_UNIT
 from planner.question import Limits, Question
 from planner.solving import plan
@@ -120,6 +121,19 @@ def test_a_stance_in_the_air_says_so():
     assert "no hand touches rock" in answer.reason
     assert len(answer.warnings) == len(stance.hands)
     assert all("touches nothing" in warning for warning in answer.warnings)
+
+
+def test_a_hand_on_bare_phalanges_is_not_said_to_touch_nothing():
+    stance = on_wall()
+    hand = replace(stance.hands[1], hold=Edge(fillet_radius=0.02, angle=1.5), grasp=Grasp())
+    hands = (stance.hands[0], hand, *stance.hands[2:])
+    prepared = prepare_stance(ask(replace(stance, hands=hands)))
+    contacts = {tile.contact for tile in prepared.batch.hands[1].tiles}
+    assert contacts == {"frame", "none"}
+    (said,) = warnings(prepared.question.stance, prepared.batch)
+    assert said == (
+        f"{hand.limb}: no spine of {', '.join(FINGERS)} is on rock, bare phalanges press on it"
+    )
 
 
 def test_a_hand_out_of_reach_is_warned_of_and_one_within_is_not():

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import os
 import pty
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -45,6 +47,31 @@ def test_the_version_is_that_of_the_distribution(capfd: pytest.CaptureFixture[st
 def test_names_of_stances_are_completed(command: str) -> None:
     assert completed(command, "") == list(bundled())
     assert completed(command, "wall-300-") == ["wall-300-floating", "wall-300-joints"]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["plan", "wall-300-"], ["wall-300-floating", "wall-300-joints"]),
+        (["route", "si"], ["six-moves"]),
+        (["wrench-space", "boulders", "--hand", "front_"], ["front_right", "front_left"]),
+        (["study", "fig06"], ["fig06"]),
+    ],
+)
+def test_bash_offers_the_names(words: list[str], names: list[str], tmp_path: Path) -> None:
+    command = Path(sys.executable).with_name("crux")
+    script = f"""
+        PATH={shlex.quote(str(command.parent))}:$PATH
+        eval "$(_CRUX_COMPLETE=bash_source crux)"
+        COMP_WORDS=(crux {shlex.join(words)}) COMP_CWORD={len(words)} COMPREPLY=()
+        _crux_completion crux
+        printf '%s\\n' "${{COMPREPLY[@]}}"
+    """
+    told = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert sorted(told.stdout.split()) == sorted(names)
 
 
 def test_names_of_commands_routes_and_studies_are_completed() -> None:
