@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Hashable
-from contextlib import ExitStack, nullcontext, suppress
+import signal
+from collections.abc import Hashable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
@@ -55,6 +57,21 @@ def check_address(address: object) -> None:
             "tcp://HOST:PORT of a Dask scheduler, or its client",
             field="on",
         )
+
+
+@contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Keep Ctrl-C from threads and processes that begin meanwhile, for good: it is this thread's.
+
+    A shell sends it to all of them, and each worker would tell its traceback.
+    """
+    # which would let it through again when it begins
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class DaskPool:
@@ -124,14 +141,14 @@ class DaskPool:
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         where: Any = self._on
         if where == LOCAL:
-            where = self._stack.enter_context(
-                LocalCluster(
+            with _no_interrupts():
+                where = LocalCluster(
                     n_workers=cores() if self._workers is None else self._workers,
                     threads_per_worker=1,
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL,
                 )
-            )
+            self._stack.enter_context(where)
         return Client(where, timeout=PATIENCE, set_as_default=False)
 
     def __exit__(self, *error: object) -> None:

@@ -116,12 +116,14 @@ class ReplyLines:
             yield
 
     def write(self, line: bytes, payload: bytes, seconds: float) -> None:
+        # before it is written, so that next to nothing is between a line and its count
+        told = msgspec.json.decode(payload, type=_Told)
         if self._out is not None:
             self._append(payload + b"\n", self._out)
         elif self._shown:
             sys.stdout.buffer.write(payload + b"\n")
             sys.stdout.buffer.flush()
-        msgspec.json.decode(payload, type=_Told).count(self.tally)
+        told.count(self.tally)
 
     def _append(self, line: bytes, out: FileIO) -> None:
         written = 0

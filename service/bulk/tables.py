@@ -201,6 +201,8 @@ class CsvTable(Table):
 
     def begin(self) -> None:
         if not self.manifest.parts:
+            # a file without one could not be resumed
+            self._write_manifest(False)
             self.path.write_bytes(b"")
             self._state = self._state._replace(
                 manifest=msgspec.structs.replace(

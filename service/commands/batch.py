@@ -33,6 +33,7 @@ from service.tables import (
     bulk_progress,
     note,
     say,
+    verbosity,
     writing,
 )
 from service.wire import REQUEST_KINDS, Answer
@@ -203,20 +204,32 @@ def answer_rest(
     due: deque[bytes] = deque()
 
     def ask() -> Iterator[Question]:
+        # now there is somewhere to work: until then what was there has stayed
+        open_sink()
         for question in islice(asked.questions(), before, None):
             due.append(question.payload if isinstance(question, Answer) else question)
             yield question
 
+    opened = False
+
+    def open_sink() -> None:
+        nonlocal opened
+        opened = True
+        stack.enter_context(sink.open())
+
     def kept() -> str:
         told = f"{sink.whole} of {asked.count} {noun} are answered"
-        return told if file is None else f"{told} in {file}; --resume goes on"
+        if file is None or (not opened and file.exists()):
+            return told
+        return f"{told} in {file}; --resume goes on"
 
     try:
         with ExitStack() as stack:
             tell = stack.enter_context(bulk_progress(title))
             stack.enter_context(writing_answers(file))
-            stack.enter_context(sink.open())
             found = stack.enter_context(closing(answers(ask())))
+            if before == asked.count:
+                open_sink()
             tell(before, asked.count, "")
             for answer in found if before < asked.count else ():
                 sink.write(due.popleft(), answer.payload, answer.seconds)
@@ -298,7 +311,8 @@ def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None
         table.add_row(status, str(tally.statuses[status]), *shown)
     for kind, count in sorted(tally.kinds.items()):
         table.add_row(f"error: {kind}", str(count), "-", "-")
-    out.print(table)
+    if verbosity() >= 0:
+        out.print(table)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

@@ -11,6 +11,7 @@ import click
 import msgspec
 from click.shell_completion import CompletionItem
 
+from hand_models.base import InvalidInputError
 from service.commands.stances import bundled, limbs_of
 from service.requests import Draw, PlanRequest, RouteRequest, Want
 from service.serving import TIMEOUT
@@ -232,9 +233,27 @@ timeout_option = click.option(
 workers_option = click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
 )
+
+
+def _place(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
+    """Refuse what is no address of a scheduler."""
+    if address not in (None, "local"):
+        from service.bulk.dask_pools import check_address
+
+        try:
+            check_address(address)
+        except InvalidInputError:
+            raise InvalidInputError(
+                f"must be local, or tcp://HOST:PORT of a Dask scheduler, got {address!r}",
+                field="--dask",
+            ) from None
+    return address
+
+
 dask_option = click.option(
     "--dask",
     metavar="ADDRESS",
+    callback=_place,
     help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
     "machine's own.",
 )

@@ -37,6 +37,7 @@ from service.tables import (
     note,
     progress,
     say,
+    verbosity,
 )
 from service.wire import ROUTE, Answer, Format, encode_error
 
@@ -290,8 +291,9 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
         move = row["crux_move"]
         shown = (row["status"] or error, crux or "-", "-" if move is None else str(move))
         table.add_row(*shown, *numbers, escape(name))
-    out.print(table)
-    if routes.count > SHOWN:
+    if verbosity() >= 0:
+        out.print(table)
+    if routes.count > SHOWN and verbosity() >= 0:
         out.print(f"and {routes.count - SHOWN} more", markup=False)
     known = f", {before} were answered before" if before else ""
     out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)

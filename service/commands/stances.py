@@ -6,6 +6,7 @@ Files that its holds name are read here, so that what travels is whole.
 from __future__ import annotations
 
 import sys
+from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -61,6 +62,11 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
         return LIMBS
 
 
+def _text(path: Path) -> bytes:
+    """Return what a file has, without the mark that some editors put before it."""
+    return path.read_bytes().removeprefix(BOM_UTF8)
+
+
 def _folder(kind: type[Request]) -> Traversable:
     folder = resources.files("service") / "examples"
     return folder / "routes" if kind is RouteRequest else folder
@@ -75,7 +81,7 @@ def _read(source: str, kind: type[R], field: str, noun: str) -> R:
     path = Path(source)
     if path.is_file():
         try:
-            return MeshFiles(path.parent).whole(decode_request(path.read_bytes(), kind))
+            return MeshFiles(path.parent).whole(decode_request(_text(path), kind))
         except OSError as error:
             raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
     if source in bundled(kind):

@@ -22,7 +22,7 @@ from service.commands.options import (
 from service.commands.stances import read_request
 from service.processes import Interrupted
 from service.sweeping import TOLERANCE
-from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say
+from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say, verbosity
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
@@ -118,7 +118,8 @@ def sweep(
         say(result.summary() | {"files": {name: str(file) for name, file in files.items()}})
     else:
         out = console()
-        print_sweep(result, out)
+        if verbosity() >= 0:
+            print_sweep(result, out)
         for name, file in files.items():
             out.print(f"{name}: {file}", markup=False, soft_wrap=True)
     return _status(result)

@@ -24,7 +24,7 @@ from service.wire import ROUTE
 from tests.service.bulk.test_evaluation import CASES, encoded, timeless
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import FAILED
-from tests.suite.helpers.processes import begun, until, watched
+from tests.suite.helpers.processes import begun, ended, until, watched
 from tests.suite.helpers.requests import HEAVY, wall_request
 
 distributed = pytest.importorskip("distributed")
@@ -163,3 +163,18 @@ def test_a_scheduler_that_goes_away_leaves_what_is_whole(tmp_path: Path):
         for process in (scheduler, worker):
             process.terminate()
             process.wait()
+
+
+@watched
+def test_an_interrupt_from_a_shell_is_one_line(tmp_path: Path):
+    path, table = tmp_path / "q.jsonl", tmp_path / "t.csv"
+    asked = [wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(4000)]
+    path.write_text("".join(json.dumps(each) + "\n" for each in asked))
+    batch = begun("batch", str(path), "-o", str(table), "--dask", "local")
+    until(lambda: table.exists() and table.read_bytes().count(b"\n") > 10, batch)
+    # a shell sends it to all processes
+    os.killpg(batch.pid, signal.SIGINT)
+    status, error = ended(batch)
+    rows = table.read_bytes().count(b"\n") - 1
+    kept = f"{rows} of 4000 requests are answered in {table}"
+    assert (status, error) == (FAILED, f"crux: interrupted: {kept}; --resume goes on\n")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -135,7 +137,8 @@ def test_what_is_interrupted_goes_on_and_is_the_same_table(ending, lines, tmp_pa
     assert run(["batch", str(lines), "-o", str(whole), "--json"]) == BAD_INPUT
     summary = json.loads(capfd.readouterr().out)
     process = begun("batch", str(lines), "-o", str(path), "--workers", "2")
-    until(lambda: len(workers(process)) >= 2, process)
+    kind = CsvTable if ending == ".csv" else ParquetTable
+    until(lambda: len(workers(process)) >= 2 and kind.manifest_path(path).exists(), process)
     process.send_signal(signal.SIGINT)
     status, error = ended(process)
     rows = len(content(path)) if manifest(path)["parts"] else 0
@@ -256,3 +259,46 @@ def test_a_batch_without_errors_is_overloaded_at_worst(tmp_path, capfd):
     path.write_text(json.dumps(wall_request(HEAVY)))
     assert run(["batch", str(path), "-o", str(table), "--json"]) == OVERLOADED
     assert run(["batch", str(path), "-o", str(table), "--json", "--resume"]) == OVERLOADED
+
+
+@pytest.mark.parametrize("name", ["keep.jsonl", "keep.csv"])
+@pytest.mark.parametrize(
+    ("address", "status", "told"),
+    [
+        ("bogus", BAD_INPUT, "--dask: must be local, or tcp://HOST:PORT of a Dask scheduler"),
+        ("processes", BAD_INPUT, "got 'processes'"),
+        ("tcp://127.0.0.1:9", FAILED, "0 of 24 requests are answered\n"),
+    ],
+)
+def test_answers_stay_where_no_others_take_their_place(
+    name, address, status, told, lines, tmp_path, capfd, monkeypatch
+):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("service.bulk.dask_pools.PATIENCE", 0.5)
+    path = tmp_path / name
+    path.write_text("answers\n")
+    assert run(["batch", str(lines), "-o", str(path), "--dask", address]) == status
+    assert told in capfd.readouterr().err
+    assert path.read_text() == "answers\n"
+
+
+def test_a_table_goes_on_that_a_full_disk_left_without_a_row(lines, tmp_path, capfd, monkeypatch):
+    path = tmp_path / "table.csv"
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as there:
+        there.setattr(CsvTable, "_append", full)
+        assert run(["batch", str(lines), "-o", str(path)]) == FAILED
+    assert "--resume goes on" in complaint(capfd)
+    assert run(["batch", str(lines), "-o", str(path), "--resume"]) == BAD_INPUT
+    assert len(content(path)) == COUNT
+
+
+def test_less_is_said_of_a_batch(lines, tmp_path, capfd):
+    for quiet in ([], ["-q"]):
+        run(["batch", str(lines), "-o", str(tmp_path / "t.csv"), *quiet])
+        out = capfd.readouterr().out
+        assert ("error: invalid" in out) == (not quiet)
+        assert f"{COUNT} requests in" in out

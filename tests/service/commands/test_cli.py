@@ -201,6 +201,15 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
         assert line.startswith(f"{what}, utilisation {result(capfd)['utilisation']:.2f}: ")
 
 
+def test_a_mark_that_editors_put_before_a_text_is_no_part_of_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "stance.json"
+    path.write_text(json.dumps(wall_request()), encoding="utf-8-sig")
+    assert run(["plan", str(path), "--json"]) == DONE
+    assert result(capfd)["status"] == "optimal"
+
+
 def test_nothing_is_said_of_changes_that_nobody_asked_for(
     capfd: pytest.CaptureFixture[str],
 ) -> None:

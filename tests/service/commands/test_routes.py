@@ -143,7 +143,7 @@ def test_processes_are_ended_and_what_is_whole_is_kept(climbs, tmp_path):
     file = tmp_path / "routes.jsonl"
     routes = [str(climbs / "a.json"), str(climbs / "c.json")] * 40
     process = begun("route", *routes, "-o", str(file), "--workers", "2")
-    until(lambda: len(workers(process)) >= 2 and file.stat().st_size, process)
+    until(lambda: len(workers(process)) >= 2 and file.exists() and file.stat().st_size, process)
     process.terminate()
     status, error = ended(process)
     kept = f"{len(replies(file))} of 80 routes are answered in {file}; --resume goes on"
