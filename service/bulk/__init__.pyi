@@ -11,7 +11,7 @@ from .columns import (
     route_columns as route_columns,
     row_of as row_of,
 )
-from .dask_pools import LOCAL as LOCAL
+from .dask_pools import LOCAL as LOCAL, check_address as check_address
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
 from .lines import Asked as Asked, Lines as Lines
 from .manifest import Manifest as Manifest, new_manifest as new_manifest

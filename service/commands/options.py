@@ -238,7 +238,7 @@ workers_option = click.option(
 def _place(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
     """Refuse what is no address of a scheduler."""
     if address not in (None, "local"):
-        from service.bulk.dask_pools import check_address
+        from service.bulk import check_address
 
         try:
             check_address(address)
