@@ -1,4 +1,5 @@
 from .hold_trials import (
+    AT_BORDER as AT_BORDER,
     WAYS as WAYS,
     FoundHold as FoundHold,
     Trial as Trial,

@@ -25,7 +25,10 @@ from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+__all__ = ["AT_BORDER", "WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+
+AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
+"""Why a hand is not asked for there."""
 
 WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
 """Wrenches on the rock, in H: the pull-off, and shear to all sides; and their axes."""
@@ -228,9 +231,7 @@ def try_holds(
             continue
         space = next(spaces)
         if _at_border(hand, outcome):
-            found.append(
-                InvalidInputError("the scan ends within a finger's reach", field="place.point")
-            )
+            found.append(InvalidInputError(AT_BORDER, field="place.point"))
             continue
         support, pure = np.full(len(WAYS), math.nan), math.nan
         try:

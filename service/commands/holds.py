@@ -14,6 +14,7 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
+from hand_models.fixed_wrist import AT_BORDER
 from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
 from service.processes import Interrupted
 from service.tables import progress, say, writing
@@ -313,8 +314,11 @@ def _print(
         "of them also where they are pulled off (pull; shear is the least to any side)"
     )
     if not found:
+        open_rock = [reason for reason, _ in refused.most_common(1)] == [AT_BORDER]
         out.print(
-            "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
+            "nothing holds: is the scan full of holes? `crux rock --hole` bridges wider ones"
+            if open_rock
+            else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
             markup=False,
         )
     for words in oddities:

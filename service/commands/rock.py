@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,6 +26,11 @@ OUTPUT: Final = ".ply"
 
 STEEP: Final = 0.9
 """Vertical part of a view from which on the rock is ground, or a roof."""
+
+SIEVE: Final = 100
+"""Holes from which on it is said which `--hole` would bridge most."""
+
+NINE_IN_TEN: Final = 0.9
 
 NAMED: Final = 5
 """Holes whose width is told."""
@@ -199,6 +205,13 @@ def _print_rock(
         out.print(
             f"warning: with {up} up this is ground, or a roof; of a wall that was seen along {up}, "
             "tell with --up which axis points up",
+            markup=False,
+        )
+    if len(made.holes) > SIEVE:
+        most = sorted(found.width for found in made.holes)[int(NINE_IN_TEN * len(made.holes))]
+        out.print(
+            f"warning: {len(made.holes)} holes leave hands little to hold: --hole "
+            f"{math.ceil(1e3 * most) / 1e3:g} would bridge nine in ten",
             markup=False,
         )
     for each in made.filled:

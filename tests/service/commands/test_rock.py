@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import matplotlib as mpl
@@ -152,3 +153,21 @@ def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
         assert run(["rock", *options, "--up", up]) == DONE
         said = "400 points are at exactly 0 m" in " ".join(capfd.readouterr().out.split())
         assert said == bool(holes)
+
+
+def test_a_scan_that_is_a_sieve_is_told_to_be_one(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    x, z = np.random.default_rng(0).uniform(0.0, 0.7, (2, 4400))
+    cloud, rock = tmp_path / "cloud.xyz", tmp_path / "rock.ply"
+    np.savetxt(cloud, np.c_[x, 0.02 * np.sin(x / 0.07) * np.cos(z / 0.09), z])
+    asked = ["rock", str(cloud), "-o", str(rock), "--view", "0,1,0"]
+    assert run([*asked, "--hole", "0.02"]) == DONE
+    said = " ".join(capfd.readouterr().out.split())
+    told = re.search(r"warning: (\d+) holes .* --hole ([\d.]+) would bridge nine in ten", said)
+    assert told is not None
+    assert run(["holds", str(rock), "-o", str(tmp_path / "h.json"), "--spacing", "0.3"]) == DONE
+    said = " ".join(capfd.readouterr().out.split())
+    assert "nothing holds: is the scan full of holes? `crux rock --hole` bridges wider" in said
+    assert run([*asked, "--hole", told[2], "--json"]) == DONE
+    assert len(result(capfd)["holes"]) <= 0.15 * int(told[1])
