@@ -131,7 +131,8 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         finally:
-            if ctx.meta.get(VERBOSITY, 0) > 0:
+            # a service says what its log does; nobody may be there to read more
+            if ctx.meta.get(VERBOSITY, 0) > 0 and ctx.invoked_subcommand != "serve":
                 took, used = time.perf_counter() - start, time.process_time() - used
                 told = f"took {took:.2f} s, {used:.2f} s of this process's time"
                 click.echo(f"{NAME}: {told}", err=True)
