@@ -69,6 +69,7 @@ with contextlib.suppress(SystemExit):
         "crux study f",
         "crux route s",
         "crux query --h",
+        "crux holds wall.ply --s",
         "crux wrench-space wall-300 --hand f",
         "crux stream w",
         "crux serve --",

@@ -14,7 +14,6 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
-from hand_models.fixed_wrist import AT_BORDER
 from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
 from service.processes import Interrupted
 from service.tables import progress, say, writing
@@ -288,6 +287,7 @@ def _print(
     out: Console,
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
+    from hand_models.fixed_wrist import AT_BORDER
     from service.tables import table_of
 
     numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst")
