@@ -283,7 +283,7 @@ def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd)
     assert run(["batch", path, "-o", str(kept), "--workers", "1"]) == 1
     out, err = capfd.readouterr()
     assert err == ""
-    assert max(len(line) for line in out.splitlines() if "replies:" not in line) <= 80
+    assert max(len(line) for line in out.splitlines() if "written:" not in line) <= 80
     cells = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.strip()}
     assert cells["optimal"][0] == "2"
     assert cells["infeasible"] == ["0", "-", "-"]
