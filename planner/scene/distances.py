@@ -62,22 +62,20 @@ def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
     angles : mapping of str to ndarray, or None
         Of every limb [rad]; None where they are not known: then links are not measured.
     """
-    hands, body = hand_solids(scene), _body(scene)
+    hands, rocks, body = hand_solids(scene), rock_solids(scene), _body(scene)
     unchecked = [] if body else [NO_BODY]
     of_links: dict[str, Distance | None] = {}
     if angles is None:
         unchecked.append(NO_JOINTS)
     else:
         links = _links(scene, angles)
-        of_links["link_rock"] = _least(
-            scene, _with_rock(scene, links[len(body) :], rock_solids(scene))
-        )
+        of_links["link_rock"] = _least(scene, _with_rock(scene, links[len(body) :], rocks))
         of_links["link_link"] = _least(scene, _among_links(scene, links, hands))
     return Clearance(
         **of_links,
         hand_hand=_least(scene, _pairs(hands, hands, np.argwhere(np.tri(len(hands), k=-1)))),
         hand_body=_least(scene, _pairs(hands, body, _every(hands, body))),
-        body_rock=body_clearance(scene),
+        body_rock=_least(scene, _with_rock(scene, body, rocks)),
         unchecked=unchecked,
     )
 

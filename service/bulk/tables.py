@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import time
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -52,7 +53,7 @@ class _State(NamedTuple):
     kept: list[_Kept]
 
 
-class Table:
+class Table(ABC):
     """Rows that are kept until they make a part, while it is entered.
 
     Parameters
@@ -81,11 +82,12 @@ class Table:
         return self._state.manifest
 
     @staticmethod
+    @abstractmethod
     def manifest_path(path: Path) -> Path:
         """Return where a table's manifest is."""
-        raise NotImplementedError
 
     @staticmethod
+    @abstractmethod
     def check(path: Path, ours: bool) -> None:
         """Refuse to write over what is something else.
 
@@ -99,15 +101,14 @@ class Table:
         ------
         InvalidInputError
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def begin(self) -> None:
         """Take away what is not whole."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _part(self, rows: list[list[Any]]) -> Part:
         """Write rows, and return the part that they are, or that they have made larger."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         self.begin()

@@ -41,9 +41,9 @@ from service.wire import REQUEST_KINDS, Answer
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.bulk import Asked, Column, Lines, Question, Sink, Table, Tally
+    from service.bulk import Asked, Column, Question, Sink, Table, Tally
 
-__all__ = ["answer_rest", "batch", "exit_status", "place", "writing_answers"]
+__all__ = ["answer_rest", "batch", "complain", "exit_status", "place", "writing_answers"]
 
 WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
@@ -137,7 +137,7 @@ def batch(
         )
         answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
         elapsed = perf_counter() - begun
-        _complain(lines, sink.tally)
+        complain(sink.tally, lambda index: f"line {lines.number(index)}", "lines")
     if not as_json:
         _print(sink.tally, before, elapsed, file)
     elif file is not None:
@@ -273,13 +273,23 @@ def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tu
         raise InvalidInputError(error.message, field="--columns") from None
 
 
-def _complain(lines: Lines, tally: Tally) -> None:
-    """Name the first line that is bad input, and how many more are."""
+def complain(tally: Tally, where: Callable[[int], str], noun: str) -> None:
+    """Name the first question that is bad input, and how many more are.
+
+    Parameters
+    ----------
+    tally : Tally
+        Of all answers.
+    where : callable
+        Says which question has an index.
+    noun : str
+        What the questions are.
+    """
     if tally.first_bad is not None:
         index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
-        more = f"; {tally.bad - 1} more lines are bad input" if tally.bad > 1 else ""
-        note(f"line {lines.number(index)}: {field}{error.message}{more}")
+        more = f"; {tally.bad - 1} more {noun} are bad input" if tally.bad > 1 else ""
+        note(f"{where(index)}: {field}{error.message}{more}")
 
 
 def exit_status(tally: Tally, statuses: Mapping[str, int] = EXIT_STATUS) -> int:

@@ -15,7 +15,7 @@ import click
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.batch import answer_rest, exit_status, place, writing_answers
+from service.commands.batch import answer_rest, complain, exit_status, place, writing_answers
 from service.commands.options import (
     asked,
     dask_option,
@@ -34,7 +34,6 @@ from service.tables import (
     FAILED,
     OVERLOADED,
     filling_folder,
-    note,
     progress,
     say,
     verbosity,
@@ -42,9 +41,11 @@ from service.tables import (
 from service.wire import ROUTE, Answer, Format, encode_error
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.bulk import Sink, Tally
+    from service.bulk import Sink
     from service.requests import Draw, RouteRequest
 
 __all__ = ["route"]
@@ -258,7 +259,7 @@ def _many(
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
     elapsed = perf_counter() - begun
-    _complain(routes, sink.tally)
+    complain(sink.tally, routes.names.__getitem__, "routes")
     if as_json:
         told = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
         say({"v": 1, "routes": routes.count, **told, "file": str(file)})
@@ -267,22 +268,23 @@ def _many(
     return exit_status(sink.tally, STATUSES)
 
 
-def _complain(routes: _Routes, tally: Tally) -> None:
-    """Name the first route that is bad input, and how many more are."""
-    if tally.first_bad is not None:
-        index, error = tally.first_bad
-        field = "" if error.field is None else f"{error.field}: "
-        more = f"; {tally.bad - 1} more routes are bad input" if tally.bad > 1 else ""
-        note(f"{routes.names[index]}: {field}{error.message}{more}")
-
-
 def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
     """Print what each route came to, and where that is."""
-    from rich.markup import escape
-
-    from service.tables import console, table_of
+    from service.tables import console
 
     out = console()
+    if verbosity() >= 0:
+        _print_table(file, routes, out)
+    known = f", {before} were answered before" if before else ""
+    out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
+    out.print(f"written: {file}", markup=False, soft_wrap=True)
+
+
+def _print_table(file: Path, routes: _Routes, out: Console) -> None:
+    from rich.markup import escape
+
+    from service.tables import table_of
+
     table = table_of("status", "crux", numbers=("move", "util", "load factor"), words=("route",))
     for name, row in zip(routes.names, islice(_rows(file), SHOWN), strict=False):
         numbers = (_number(row[part]) for part in ("utilisation", "load_factor"))
@@ -291,13 +293,9 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
         move = row["crux_move"]
         shown = (row["status"] or error, crux or "-", "-" if move is None else str(move))
         table.add_row(*shown, *numbers, escape(name))
-    if verbosity() >= 0:
-        out.print(table)
-    if routes.count > SHOWN and verbosity() >= 0:
+    out.print(table)
+    if routes.count > SHOWN:
         out.print(f"and {routes.count - SHOWN} more", markup=False)
-    known = f", {before} were answered before" if before else ""
-    out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
-    out.print(f"written: {file}", markup=False, soft_wrap=True)
 
 
 def _number(value: Any) -> str:
