@@ -78,7 +78,7 @@ class FloatingWrist(CompliantGrasp):
     def load_rows(self) -> LoadRows:
         """What loads and wrenches must keep to, but for the way of the palm."""
         settled, layout = self.hand.settled, self.layout
-        n, structure, drive = len(settled.tiles), settled.hand.structure, settled.hand.drive
+        n, structure = len(settled.tiles), settled.hand.structure
         tension, palm = 3 * n, 3 * n + len(FINGERS)
         stop = palm + 2
         size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD)
@@ -94,8 +94,7 @@ class FloatingWrist(CompliantGrasp):
             most = min(most, self.tension_limit)
         for per_newton, at_zero, end in (
             (1.0, 0.0, most),
-            (drive.torque_per_newton, 0.0, drive.maximum_torque),
-            (drive.current_per_newton, drive.no_load_current, drive.maximum_current),
+            *settled.hand.drive.limits,
         ):
             own = slice(k, k + len(FINGERS))
             P[own, tension:palm], p[own], s[own] = per_newton * np.eye(len(FINGERS)), at_zero, end

@@ -36,6 +36,9 @@ SIDES: Final = (1.0, -1.0)
 WRENCH_PARTS: Final = 6 + len(HELD)
 """A wrench, and what of its force is held along each of `HELD`."""
 
+ROUNDING: Final = 1e-14
+"""What is left of forces that cancel [N per newton, N·m per newton]: a zero, and told as one."""
+
 HELD_ROWS: Final = np.hstack([HELD, np.zeros_like(HELD)])
 """D of every hand: the rows of `HELD` of a wrench."""
 
@@ -86,6 +89,7 @@ def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Arr
         shear[:, 0], shear[:, 4], shear[:, 5] = -1.0, -z, y
         pressing[:, 2], pressing[:, 3], pressing[:, 4] = 1.0, y, -x
         shear[:, 6:], pressing[:, 6:] = -HELD[:, 0], HELD[:, 2]
+    V[np.abs(V) < ROUNDING] = 0.0
     return np.add.reduce(wrenches[:, 0], axis=2), V
 
 
@@ -101,7 +105,7 @@ def limit_rows(
     ``most``: the largest tension of each hand (h,) [N]; ``wrenches``: their `wrench_columns`.
     """
     (at_zero, V), finger_of = wrenches, layout.finger_of
-    loads, drive, structure = _of_tiles(hands, "loads"), model.drive, model.structure
+    loads, structure = _of_tiles(hands, "loads"), model.structure
     shape = len(hands), len(layout.limits)
     L, l0, s = np.zeros((*shape, V.shape[2])), np.zeros(shape), np.empty(shape)
     tile, k = layout.plane_tiles, len(layout.plane_tiles)
@@ -117,8 +121,7 @@ def limit_rows(
         L[:, row, column[of]] = planes[:, :, 2] * shares
     for slope, start, end in (
         (1.0, 0.0, most[:, None]),
-        (drive.torque_per_newton, 0.0, drive.maximum_torque),
-        (drive.current_per_newton, drive.no_load_current, drive.maximum_current),
+        *model.drive.limits,
     ):
         own = slice(k, k + TENDONS)
         L[:, own, :TENDONS], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end

@@ -21,6 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable
 
@@ -102,6 +104,14 @@ class TendonDrive:
         return drive
 
     @property
+    def limits(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Per newton of tension, at none and at most: of the torque [N·m], of the current [A]."""
+        return (
+            (self.torque_per_newton, 0.0, self.maximum_torque),
+            (self.current_per_newton, self.no_load_current, self.maximum_current),
+        )
+
+    @property
     def torque_per_newton(self) -> float:
         """τ / f [m]."""
         return self.winch_radius / (self.gear_ratio * self.efficiency)
@@ -118,6 +128,18 @@ class TendonDrive:
     def current(self, tension: T) -> T:
         """Return the current I that the motor draws then [A]."""
         return tension * self.current_per_newton + self.no_load_current
+
+    def driven(self, tensions: Array, wound: tuple[Array, Array, Array, Array, Array]) -> Array:
+        """Return torque [N·m] and current [A] of motors, and angle [rad] of winches, (3, F).
+
+        Parameters
+        ----------
+        tensions : ndarray, shape (F,)
+            That the motors hold [N].
+        wound : tuple of ndarray
+            What `winch_angle` takes.
+        """
+        return np.array([self.torque(tensions), self.current(tensions), self.winch_angle(*wound)])
 
     def winch_angle(
         self, joints: T, tension: T, shears: T, losses: T, nail_drawn: T | float = 0.0

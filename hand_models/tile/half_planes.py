@@ -19,7 +19,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -57,8 +56,7 @@ LEAST_LATERAL: Final = 1e-3
 """Share of a load out of the finger plane from which on the search looks."""
 
 
-@dataclass(frozen=True)
-class HalfPlane:
+class HalfPlane(NamedTuple):
     """A limit ``a_shear T + a_normal N + a_lateral |Y| ≤ capacity`` of one tile.
 
     Attributes

@@ -12,7 +12,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.prepare import KEPT_NAMES, concatenated
+from planner.prepare import KEPT_NAMES
 from planner.programs import JOINT_TORQUE, SLACK
 from planner.result import LimitName, Price
 
@@ -91,9 +91,9 @@ class ActiveLimits:
         spaces: Sequence[WrenchSpace],
         multipliers: Sequence[Array],
     ) -> None:
-        self._capacities = concatenated([space.s for space in spaces])
+        self._capacities = np.concatenate([space.s for space in spaces])
         self._names, self._of_row = _named(tuple([space.rows for space in spaces]), tuple(limbs))
-        duals = concatenated(multipliers)
+        duals = np.concatenate(multipliers)
         self._weights = duals * (duals > BINDING)
         self._worth = np.bincount(self._of_row, self._weights, len(self._names))
 
@@ -168,7 +168,7 @@ def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> Named:
     offsets = accumulate((len(names) for names, _ in hands), initial=0)
     return (
         tuple(chain.from_iterable(names for names, _ in hands)),
-        concatenated([of_row + at for (_, of_row), at in zip(hands, offsets, strict=False)]),
+        np.concatenate([of_row + at for (_, of_row), at in zip(hands, offsets, strict=False)]),
     )
 
 

@@ -175,8 +175,7 @@ class HandSets:
 
     def with_sets(self, spaces: Sequence[WrenchSpace]) -> HandSets:
         """Return the same stance with other sets of its hands."""
-        scaled = tuple([scaled_rows(space) for space in spaces])
-        return replace(self, spaces=tuple(spaces), scaled=scaled)
+        return replace(self, spaces=tuple(spaces), scaled=scaled_rows(spaces))
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""

@@ -18,7 +18,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
 from planner.prepare.hand_sets import HandSets, Sets, are_own
 from planner.prepare.joint_posture import Posture, posture
-from planner.prepare.settled_stance import settle_stance, wrist_at
+from planner.prepare.settled_stance import settle_stance, wrists_at
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
 from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
 from planner.question import Question
@@ -93,7 +93,7 @@ class PreparedStance:
             ``stance.hands``.
         """
         stance, cap = self.question.stance, self.question.limits.tendon_tension
-        wrists = tuple([wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)])
+        wrists = wrists_at(stance, settled, cap)
         spaces, scaled = _sets_of(settled, wrists, self.hands.added, cap)
         hands = replace(self.hands, spaces=spaces, scaled=scaled, wrists=wrists)
         return replace(self, batch=HandBatch.of(settled), hands=hands)
@@ -141,7 +141,7 @@ def assemble(
     """
     stance, cap = question.stance, question.limits.tendon_tension
     settled = tuple(settle_stance(stance))
-    wrists = tuple([wrist_at(stance, i, hand, cap) for i, hand in enumerate(settled)])
+    wrists = wrists_at(stance, settled, cap)
     added = _added_rows(question, where)
 
     def made() -> tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
@@ -177,7 +177,7 @@ def _sets_of(
     plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
     pairs = zip(plain, added, strict=True)
     spaces = tuple([each if rows is NOTHING else rows.on(each) for each, rows in pairs])
-    return spaces, tuple([scaled_rows(each) for each in spaces])
+    return spaces, scaled_rows(spaces)
 
 
 def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstraints, ...]:

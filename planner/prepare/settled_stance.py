@@ -22,6 +22,7 @@ __all__ = [
     "settle_hand",
     "settle_stance",
     "wrist_at",
+    "wrists_at",
 ]
 
 
@@ -89,6 +90,13 @@ def wrist_at(
         if isinstance(error, UnsupportedError):
             error.field = "wrist"
         raise error.within(f"stance.hands[{index}]") from None
+
+
+def wrists_at(
+    stance: Stance, settled: Sequence[SettledHand], tension_limit: float | None = None
+) -> tuple[FloatingWrist | None, ...]:
+    """Return how each hand gives way; see `wrist_at`."""
+    return tuple([wrist_at(stance, i, hand, tension_limit) for i, hand in enumerate(settled)])
 
 
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:

@@ -6,6 +6,7 @@ which capacity measures a load) is found once for each list of names.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -106,8 +107,12 @@ class _Roles(NamedTuple):
     efforts: slice | Indices
 
 
-def scaled_rows(space: WrenchSpace) -> ScaledRows:
-    """Return what a hand's set gives the programs."""
+def scaled_rows(spaces: Sequence[WrenchSpace]) -> tuple[ScaledRows, ...]:
+    """Return what the set of each hand gives the programs."""
+    return tuple([_scaled(space) for space in spaces])
+
+
+def _scaled(space: WrenchSpace) -> ScaledRows:
     roles = _roles(space.columns, space.rows, len(space.s))
     scale, s = roles.scale, space.s
     L, l0 = space.L * (scale / s[:, None]), space.l0 / s

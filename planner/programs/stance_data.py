@@ -45,6 +45,10 @@ __all__ = [
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
 
+ROUNDING: Final = 1e-14
+"""What of a scaled entry is left of others that cancel: a zero. A solver is set up for where zeros
+are, and that must not hang on rounding."""
+
 
 class HandData(NamedTuple):
     """One hand's rows, nondimensional; nb rows of balance.
@@ -92,7 +96,7 @@ class HandData(NamedTuple):
             What the further rows of the balance take of this hand's wrench in H.
         """
         given = np.zeros((0, 6)) if held is None else held
-        return hands_data([scaled_rows(space)], transport[None], [given])[0]
+        return hands_data(scaled_rows([space]), transport[None], [given])[0]
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -127,7 +131,9 @@ def hands_data(
     for rows, carried, given in zip(scaled, -transports / WRENCH_UNIT[:, None], held, strict=True):
         if len(given):
             carried = np.vstack([carried, given / WRENCH_UNIT])
-        found.append(HandData(carried @ rows.generators, carried @ rows.origin, *rows[2:]))
+        G = carried @ rows.generators
+        G[np.abs(G) < ROUNDING] = 0.0
+        found.append(HandData(G, carried @ rows.origin, *rows[2:]))
     return tuple(found)
 
 

@@ -78,7 +78,7 @@ class Support:
     """
 
     def __init__(self, space: WrenchSpace, cap: float) -> None:
-        rows = scaled_rows(space)
+        (rows,) = scaled_rows([space])
         self._generators, self._origin = rows.generators, rows.origin
         A, most = np.vstack([rows.L, rows.H]), np.concatenate([cap - rows.l0, rows.h])
         free = np.full(A.shape[1], np.inf)

@@ -42,7 +42,6 @@ def recover_floating_hand(
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)
     joints, losses, nails = drawn_tendons(known)
-    turned = drive.winch_angle(joints, hand.preload, drawn, losses, nails)
     shear, pressing = found.palm[0]
     palm = PalmPlan(
         position=settled.palm.centre,
@@ -55,7 +54,7 @@ def recover_floating_hand(
         limb=limb,
         wrench=hand.wrenches(found)[0],
         tensions=tensions,
-        drives=np.array([drive.torque(tensions), drive.current(tensions), turned]),
+        drives=drive.driven(tensions, (joints, hand.preload, drawn, losses, nails)),
         loads=loads,
         forces=np.einsum("tk,tkx->tx", loads, axes),
         positions=positions,

@@ -7,7 +7,7 @@ travel are made of these when they are asked for.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -16,10 +16,10 @@ from msgspec import UNSET
 
 from hand_models.base import Array
 from hand_models.compliance import PalmMode
-from hand_models.hand import FINGERS, Seating, Tile as NamedTile
+from hand_models.hand import FINGERS, NAIL, Seating, Tile as NamedTile
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import concatenated
+from planner.prepare import HandBatch, concatenated
 from planner.result.plain_parts import Finger, Tile
 
 __all__ = ["HandPlan", "PalmPlan", "PlanArrays", "WristPlan"]
@@ -155,7 +155,7 @@ class HandPlan:
         nail, share = self.nail_planes.get(tile), float(self.engagement[tile])
         if nail is not None or share in (0.0, 1.0):
             return self.half_planes if nail is None else nail
-        return tuple(replace(p, capacity=share * p.capacity) for p in self.half_planes)
+        return tuple(p._replace(capacity=share * p.capacity) for p in self.half_planes)
 
     def tile(self, finger: str | None, phalanx: str | None) -> int:
         """Return the index of a tile among the hand's."""
@@ -233,3 +233,56 @@ class PlanArrays(NamedTuple):
     def palms(self) -> Array:
         """Forces of the palms, shape (H, 3)."""
         return self.forces[len(self.loads) :]
+
+    def hands(
+        self, limbs: Sequence[str], known: HandBatch, spaces: Sequence[WrenchSpace]
+    ) -> tuple[HandPlan, ...]:
+        """Return the numbers of settled hands with fixed wrists hand by hand, as parts of these.
+
+        Parameters
+        ----------
+        limbs : sequence of str
+        known : HandBatch
+        spaces : sequence of WrenchSpace
+            The sets that the program used.
+        """
+        firsts, tiles, count = known.places.first.tolist(), len(self.loads), len(FINGERS)
+        palm_used, used = self.palm_utilisations.tolist(), self.utilisations.tolist()
+        found = []
+        for h, (limb, hand, space) in enumerate(zip(limbs, known.hands, spaces, strict=True)):
+            own = slice(firsts[h], firsts[h] + len(hand.tiles))
+            fingers, palm = slice(count * h, count * (h + 1)), tiles + h
+            found.append(
+                HandPlan(
+                    limb=limb,
+                    wrench=self.wrenches[h],
+                    tensions=self.tensions[fingers],
+                    drives=self.drives[:, fingers],
+                    loads=self.loads[own],
+                    forces=self.forces[own],
+                    positions=self.points[own],
+                    axes=self.axes[own],
+                    engagement=self.engagement[own],
+                    tile_utilisations=self.tile_utilisations[own],
+                    tiles=self.tiles[h],
+                    half_planes=self.half_planes[h],
+                    palm=PalmPlan(
+                        position=self.points[palm],
+                        force=self.forces[palm],
+                        moment=self.palm_moments[h],
+                        engaged=self.engaged[h],
+                        utilisation=palm_used[h],
+                    ),
+                    utilisation=used[h],
+                    seating=hand.seating,
+                    closures=hand.closures,
+                    space=space,
+                    laws=hand.loads,
+                    nail_planes={
+                        t: hand.nail_limits(t)
+                        for t, tile in enumerate(hand.tiles)
+                        if tile.contact == NAIL
+                    },
+                )
+            )
+        return tuple(found)

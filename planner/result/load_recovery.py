@@ -9,13 +9,12 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger import PHALANGES
-from hand_models.hand import NAIL
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
 from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
-from planner.result.hand_plan import HandPlan, PalmPlan, PlanArrays
-from planner.result.load_layout import COUNT, WRENCH, ZERO, layout_of
+from planner.result.hand_plan import PlanArrays
+from planner.result.load_layout import WRENCH, ZERO, layout_of
 
 __all__ = ["LoadRecovery", "drawn_tendons"]
 
@@ -49,7 +48,7 @@ class LoadRecovery:
         spaces: Sequence[WrenchSpace],
         scaled: Sequence[ScaledRows] | None = None,
     ) -> None:
-        self._spaces, self._known, settled = spaces, known, known.hands
+        self._known, settled = known, known.hands
         pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
@@ -70,7 +69,7 @@ class LoadRecovery:
         self.least = layout.least.take(layout.columns)
         self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
         self.at_rest = np.zeros(layout.shape)
-        of_sets = [scaled_rows(space) for space in spaces] if scaled is None else scaled
+        of_sets = scaled_rows(spaces) if scaled is None else scaled
         for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
@@ -119,14 +118,13 @@ class LoadRecovery:
             shears[layout.hooked] = 0.0
         drawn = np.add.reduceat(shears, known.places.first_of_finger)
         drive, (joints, losses, nails) = known.hands[0].hand.drive, self._drawn
-        turned = drive.winch_angle(joints, tensions, drawn, losses, nails)
         forces = np.zeros((len(known.points), 3))
         forces[: len(of_tiles)] = (of_tiles[:, None] @ known.axes)[:, 0]
         forces[len(of_tiles) :, ::2] = palms * PALM_SIGNS
         palm_used = palms / known.palm_limits
         arrays = PlanArrays(
             tensions,
-            np.array([drive.torque(tensions), drive.current(tensions), turned]),
+            drive.driven(tensions, (joints, tensions, drawn, losses, nails)),
             of_tiles,
             forces,
             known.points,
@@ -140,45 +138,6 @@ class LoadRecovery:
             *self._fixed,
         )
         return arrays, used, float(efforts.dot(efforts))
-
-    def hands(self, limbs: Sequence[str], arrays: PlanArrays) -> tuple[HandPlan, ...]:
-        """Return what was read, hand by hand; its arrays are parts of those."""
-        known = self._known
-        firsts = known.places.first.tolist()
-        palm_used, used = arrays.palm_utilisations.tolist(), arrays.utilisations.tolist()
-        found, tiles, moments = [], len(arrays.loads), arrays.palm_moments
-        for h, (limb, hand, space) in enumerate(zip(limbs, known.hands, self._spaces, strict=True)):
-            own = slice(firsts[h], firsts[h] + len(hand.tiles))
-            fingers = slice(COUNT * h, COUNT * (h + 1))
-            place, force = arrays.points[tiles + h], arrays.forces[tiles + h]
-            found.append(
-                HandPlan(
-                    limb=limb,
-                    wrench=arrays.wrenches[h],
-                    tensions=arrays.tensions[fingers],
-                    drives=arrays.drives[:, fingers],
-                    loads=arrays.loads[own],
-                    forces=arrays.forces[own],
-                    positions=arrays.points[own],
-                    axes=arrays.axes[own],
-                    engagement=arrays.engagement[own],
-                    tile_utilisations=arrays.tile_utilisations[own],
-                    tiles=arrays.tiles[h],
-                    half_planes=arrays.half_planes[h],
-                    palm=PalmPlan(place, force, moments[h], arrays.engaged[h], palm_used[h]),
-                    utilisation=used[h],
-                    seating=hand.seating,
-                    closures=hand.closures,
-                    space=space,
-                    laws=hand.loads,
-                    nail_planes={
-                        t: hand.nail_limits(t)
-                        for t, tile in enumerate(hand.tiles)
-                        if tile.contact == NAIL
-                    },
-                )
-            )
-        return tuple(found)
 
 
 def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:

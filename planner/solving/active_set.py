@@ -29,7 +29,6 @@ import numpy.typing as npt
 import scipy
 
 from hand_models.base import Array
-from planner.prepare import concatenated
 from planner.programs import Outcome, StanceData, parted, tie_weight
 
 __all__ = ["ActiveSetOptimum", "active_set_optimum"]
@@ -134,8 +133,8 @@ def active_set_optimum(
     hands, rows = data.hands, _Rows.of(data)
     unit = data.rows.unit
     Q = 2.0 * share * tie_weight(len(data.hands)) * data.rows.tie
-    multipliers = concatenated([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
-    start = _Point(concatenated(outcome.loads) / unit, outcome.value, multipliers)
+    multipliers = np.concatenate([outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals])
+    start = _Point(np.concatenate(outcome.loads) / unit, outcome.value, multipliers)
     room = rows.room(start.z, start.u)
     for sure in SURE:
         active = multipliers > sure * room

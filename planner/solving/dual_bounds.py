@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array
-from planner.prepare import concatenated
 from planner.programs import TIE, Outcome, StanceData, tie_weight
 
 __all__ = ["least_bound", "least_effort_bound", "unique_bound"]
@@ -41,7 +40,7 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
     ``share``: how much of its weight the second term had.
     """
     rows = data.rows
-    z = concatenated(outcome.loads) / rows.unit
+    z = np.concatenate(outcome.loads) / rows.unit
     small = share * tie_weight(len(data.hands)) * rows.tie * z
     value = -float(small @ z) - share * TIE * outcome.value**2
     slopes = 2.0 * small
@@ -60,12 +59,12 @@ def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
         effort, small = hand.E @ z + hand.e0, hand.rest * z
         slopes.append(2.0 * (hand.E.T @ effort + small))
         value += float(effort @ effort + small @ z - slopes[-1] @ z)
-    return _dual_bound(data, outcome, concatenated(slopes), cap, 0.0) + value
+    return _dual_bound(data, outcome, np.concatenate(slopes), cap, 0.0) + value
 
 
 def _missing(outcome: Outcome) -> float:
     """Return how far the multipliers of limits are from a sum of one."""
-    return abs(1.0 - float(concatenated(outcome.limit_duals).sum()))
+    return abs(1.0 - float(np.concatenate(outcome.limit_duals).sum()))
 
 
 def _dual_bound(
@@ -77,7 +76,7 @@ def _dual_bound(
     """
     assert outcome.balance_dual is not None
     nu, rows = outcome.balance_dual, data.rows
-    signed = concatenated([*outcome.limit_duals, *outcome.hard_duals])
+    signed = np.concatenate([*outcome.limit_duals, *outcome.hard_duals])
     scale = max(1.0, abs(outcome.value))
     if signed.min(initial=0.0) < -STATIONARY * scale:
         return -math.inf

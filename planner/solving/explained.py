@@ -155,7 +155,8 @@ def _of_plan(
     if wrong:
         return _Verdict("failed", f"the solver's plan does not pass the checks: {wrong[0]}")
     if checks.recovery is not None:
-        read = read._replace(hands=checks.recovery.hands(prepared.limbs, read.arrays))
+        hands = read.arrays.hands(prepared.limbs, prepared.batch, found.sets.spaces)
+        read = read._replace(hands=hands)
     cap = question.limits.utilisation
     binding = ActiveLimits(prepared.limbs, found.sets.spaces, found.outcome.limit_duals)
     limiting, reason = _explain(binding, read, idle, cap)

@@ -190,7 +190,7 @@ def _read_hand(
     limb, settled = prepared.limbs[index], prepared.batch.hands[index]
     space, wrist = sets.spaces[index], prepared.hands.wrists[index]
     if wrist is None or search is None:
-        recovery = LoadRecovery(HandBatch.of((settled,)), (space,))
-        return recovery.hands((limb,), recovery.read((y,))[0])[0]
+        alone, own = HandBatch.of((settled,)), (space,)
+        return LoadRecovery(alone, own).read((y,))[0].hands((limb,), alone, own)[0]
     pose = WristPlan(y, search.point.palms[index] or "off", search.rounds, search.error)
     return recover_floating_hand(limb, settled, wrist.hand, space, pose)

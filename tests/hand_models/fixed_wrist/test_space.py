@@ -286,8 +286,8 @@ def test_the_palm_shears_along_minus_x_and_presses_along_z_at_its_centre():
     space = wrench_space(settled)
     shear, pressing = space.generators[:, -2], space.generators[:, -1]
     x, y, z = settled.palm.centre
-    np.testing.assert_allclose(shear, [-1, 0, 0, *np.cross([x, y, z], [-1, 0, 0])])
-    np.testing.assert_allclose(pressing, [0, 0, 1, *np.cross([x, y, z], [0, 0, 1])])
+    for column, force in ((shear, [-1, 0, 0]), (pressing, [0, 0, 1])):
+        np.testing.assert_allclose(column, [*force, *np.cross([x, y, z], force)], atol=1e-15)
     assert space.columns[-2:] == ("palm_shear", "palm_pressing")
     assert not any("palm" in name for name in wrench_space(pinch(palm=False)).columns)
 

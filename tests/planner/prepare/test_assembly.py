@@ -151,7 +151,7 @@ def test_a_hand_elsewhere_gives_the_very_same_rows():
 
 def test_scaled_rows_cannot_be_written_to():
     hands, _ = gathered(ask(on_wall(Cylinder(0.41), limbs=("front_left",))))
-    rows = scaled_rows(hands.spaces[0])
+    (rows,) = scaled_rows(hands.spaces[:1])
     for name in ("generators", "origin", "L", "l0", "H", "h", "E", "e0", "tie", "rest", "unit"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(rows, name)[...] = 1.0

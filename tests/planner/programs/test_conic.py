@@ -14,6 +14,7 @@ import pytest
 from cvxpy.reductions.solvers.conic_solvers.clarabel_conif import CLARABEL
 from scipy.sparse import csc_matrix
 
+from hand_models.rock import Cylinder
 from planner import deadline
 from planner.programs import conic, program, solvers, stance_program
 from planner.programs.conic import ConicProgram, Solver, Solvers
@@ -364,3 +365,12 @@ def test_a_program_of_one_row_is_solved_by_hand():
     found = Solvers(1).solve(asked, SETTINGS)
     assert found.value == pytest.approx(-0.25, abs=1e-8)
     assert found.x == pytest.approx([-0.5], abs=1e-6)
+
+
+def test_where_zeros_are_does_not_hang_on_rounding():
+    """Pinches of a wall's logs differ in nothing but numbers: one solver serves them all."""
+    found = set()
+    for diameter in np.linspace(0.27, 0.33, 24):
+        rows = program_data(ask(on_wall(Cylinder(float(diameter))))).rows.columns
+        found.add((rows.rows.tobytes(), rows.starts.tobytes()))
+    assert len(found) == 1

@@ -60,7 +60,7 @@ def named(space, y):
 def test_every_number_is_that_of_its_definition(stance):
     settled, spaces, data, loads, reader = read(stance)
     arrays, told_used, effort = reader.read(loads)
-    hands = reader.hands([hand.limb for hand in stance.hands], arrays)
+    hands = arrays.hands([hand.limb for hand in stance.hands], HandBatch.of(settled), spaces)
     used = [space.utilisations(y) for space, y in zip(spaces, loads, strict=True)]
     np.testing.assert_allclose(told_used, np.concatenate(used), rtol=1e-12, atol=1e-12)
     efforts = [
@@ -97,7 +97,7 @@ def test_every_number_is_that_of_its_definition(stance):
                 if hand.touching[t]:
                     engagement = float(hand.engagement[t])
                     lateral = load.get(f"{name}/lateral", 0.0) * engagement / spines
-                    planes = tuple(replace(p, capacity=engagement * p.capacity) for p in planes)
+                    planes = tuple(p._replace(capacity=engagement * p.capacity) for p in planes)
                 if hand.nails[t]:
                     shear, planes = load[f"{name}/nail"], hand.nail_limits(t)
                 if tile.phalanx != "nail":
@@ -133,9 +133,11 @@ def test_hands_are_read_alone_as_together(stance):
     carried = reader.read(loads)[0]
     alone = []
     for limb, hand, space, y in zip(limbs, settled, spaces, loads, strict=True):
-        one = LoadRecovery(HandBatch.of([hand]), [space])
-        alone += one.hands([limb], one.read([y])[0])
-    for got in (PlanArrays.of(alone), PlanArrays.of(reader.hands(limbs, carried))):
+        batch = HandBatch.of([hand])
+        arrays = LoadRecovery(batch, [space]).read([y])[0]
+        alone += arrays.hands([limb], batch, [space])
+    parted = carried.hands(limbs, HandBatch.of(settled), spaces)
+    for got in (PlanArrays.of(alone), PlanArrays.of(parted)):
         for name, mine, expected in zip(carried._fields, got, carried, strict=True):
             if isinstance(expected, np.ndarray):
                 np.testing.assert_allclose(mine, expected, rtol=1e-12, atol=1e-12, err_msg=name)
@@ -159,9 +161,9 @@ def test_loads_that_are_negative_by_rounding_count_as_zero():
 def test_a_reading_of_other_loads_leaves_the_first_as_it_was():
     """Arrays that are told must not be those that the next reading writes to."""
     stance = on_wall()
-    _, _, _, loads, reader = read(stance)
+    settled, spaces, _, loads, reader = read(stance)
     limbs = [hand.limb for hand in stance.hands]
-    first = reader.hands(limbs, reader.read(loads)[0])
+    first = reader.read(loads)[0].hands(limbs, HandBatch.of(settled), spaces)
     kept = [(hand.loads.copy(), hand.forces.copy(), hand.wrench.copy()) for hand in first]
     reader.read([2.0 * y for y in loads])
     for hand, numbers in zip(first, kept, strict=True):
@@ -181,8 +183,9 @@ def test_the_same_holds_give_the_same_arrays_for_hands_that_are_settled_anew():
 
 def test_what_is_kept_of_hands_cannot_be_written_to():
     stance = on_wall()
-    _, _, _, loads, reader = read(stance)
-    hands = reader.hands([hand.limb for hand in stance.hands], reader.read(loads)[0])
+    settled, spaces, _, loads, reader = read(stance)
+    limbs = [hand.limb for hand in stance.hands]
+    hands = reader.read(loads)[0].hands(limbs, HandBatch.of(settled), spaces)
     for array in (hands[1].positions, hands[1].axes, hands[1].palm.position):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0

@@ -211,7 +211,7 @@ def test_half_a_tile_is_held_against_half_its_limit_curve(half):
     assert np.hypot(*load[:2]) > float(hands[h].surface.strength(math.atan2(-load[1], load[0])))
     generous = replace(
         hand,
-        half_planes=tuple(replace(p, capacity=10.0 * p.capacity) for p in hand.half_planes),
+        half_planes=tuple(p._replace(capacity=10.0 * p.capacity) for p in hand.half_planes),
     )
     told = tuple(generous if i == h else each for i, each in enumerate(answer.hands))
     found = complaints(question, hands, replace(answer, hands=told))

@@ -149,7 +149,7 @@ def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
                     whole = inner_half_planes(place.surface)
                     limits = hand.limits_of(hand.tile(finger.name, tile.phalanx))
                     assert limits == tuple(
-                        replace(p, capacity=(share or 1.0) * p.capacity) for p in whole
+                        p._replace(capacity=(share or 1.0) * p.capacity) for p in whole
                     )
                     rows = [
                         (p.a_shear * load[0] + p.a_normal * load[1]) / p.capacity

@@ -153,7 +153,7 @@ def test_half_planes_that_promise_more_than_the_limit_curve_are_found():
     generous = spoilt(
         answer,
         ("hands", hand, "half_planes"),
-        lambda planes: tuple(replace(plane, capacity=10.0 * plane.capacity) for plane in planes),
+        lambda planes: tuple(plane._replace(capacity=10.0 * plane.capacity) for plane in planes),
     )
     assert any(each.endswith(name) for each in complaints(generous, question))
 
