@@ -14,8 +14,14 @@ from .columns import (
 from .dask_pools import LOCAL as LOCAL, check_address as check_address
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
 from .lines import Asked as Asked, Lines as Lines
-from .manifest import Manifest as Manifest, new_manifest as new_manifest
+from .manifest import Manifest as Manifest, digest_of as digest_of, new_manifest as new_manifest
 from .pools import pool_on as pool_on
-from .sinks import ReplyLines as ReplyLines, Sink as Sink, rows_at as rows_at
-from .tables import CSV as CSV, PARQUET as PARQUET, Table as Table, table_at as table_at
+from .sinks import ReplyLines as ReplyLines, Rows as Rows, Sink as Sink
+from .tables import (
+    CSV as CSV,
+    PARQUET as PARQUET,
+    CsvTable as CsvTable,
+    Table as Table,
+    table_at as table_at,
+)
 from .tally import Tally as Tally

@@ -124,7 +124,7 @@ def answered(
     pool: Pool,
     form: Format = Format.JSON,
     columns: tuple[str, ...] | None = None,
-) -> Iterator[Answer]:
+) -> Generator[Answer, None, None]:
     """Yield the answers to questions in order, made by a pool that has been entered."""
     work = _Work(enumerate(questions), pool, form, columns)
     following = 0

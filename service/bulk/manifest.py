@@ -17,9 +17,12 @@ from planner import RobotFile
 from service.bulk.chunks import own_version
 from service.bulk.lines import LineDigest
 
-__all__ = ["Manifest", "Part", "new_manifest"]
+__all__ = ["RESUME", "Manifest", "Part", "digest_of", "new_manifest"]
 
 RESUME: Final = "--resume"
+
+DIGESTS: Final = ("hand", "robot", "stance")
+"""Names of what a manifest has a digest of."""
 
 
 class Part(msgspec.Struct):
@@ -35,7 +38,8 @@ class Manifest(msgspec.Struct):
 
     ``sha256``: over the SHA-256 digests of the request lines that the parts answer, in order.
     ``statuses``, ``errors``: how many of their plans have which status, and how many errors are of
-    which kind. ``hand``, ``robot``: digests of their numbers, null for the bundled ones.
+    which kind. ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``:
+    what else the work is of, by name; of `DIGESTS` a `digest_of` it.
     """
 
     crux: str | None
@@ -49,6 +53,7 @@ class Manifest(msgspec.Struct):
     parts: list[Part] = []
     statuses: dict[str, int] = {}
     errors: dict[str, int] = {}
+    about: dict[str, str] = {}
 
     @property
     def rows(self) -> int:
@@ -75,10 +80,11 @@ class Manifest(msgspec.Struct):
         InvalidInputError
             That says what has changed.
         """
-        for name in ("v", "crux", "columns", "explain", "hand", "robot"):
-            before, wanted = getattr(self, name), getattr(now, name)
-            if before != wanted:
-                told = "" if name in ("hand", "robot") else f" ({before!r}, now {wanted!r})"
+        before, wanted = self._of(), now._of()
+        for name in dict.fromkeys([*before, *wanted]):
+            values = before.get(name), wanted.get(name)
+            if values[0] != values[1]:
+                told = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
                 raise InvalidInputError(
                     f"{path}: was begun with another {name}{told}; begin anew without it",
                     field=RESUME,
@@ -95,16 +101,25 @@ class Manifest(msgspec.Struct):
             )
         return found
 
+    def _of(self) -> dict[str, Any]:
+        """Return of what it is, by name, in the order in which that is compared."""
+        named = {name: getattr(self, name) for name in ("v", "crux", "hand", "robot", "explain")}
+        return named | self.about | {"columns": self.columns}
+
 
 def new_manifest(
-    columns: Iterable[str], explain: bool, hand: ParameterTable | None, robot: RobotFile | None
+    columns: Iterable[str],
+    explain: bool,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    about: dict[str, str] | None = None,
 ) -> Manifest:
     """Return the manifest of a table that has no rows yet."""
-    own_robot = None if robot is None else _digest_of((robot.toml, robot.urdf))
-    own_hand = None if hand is None else _digest_of(sorted(hand.sections.items()))
-    return Manifest(own_version(), list(columns), explain, own_hand, own_robot)
+    own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
+    own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
+    return Manifest(own_version(), list(columns), explain, own_hand, own_robot, about=about or {})
 
 
-def _digest_of(value: Any) -> str:
+def digest_of(value: Any) -> str:
     """Return a digest of plain values."""
     return sha256(repr(value).encode()).hexdigest()

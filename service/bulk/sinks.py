@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
@@ -13,15 +13,14 @@ import msgspec
 
 from hand_models.base import InvalidInputError
 from planner import Time
-from service.bulk.columns import Column, Row
-from service.bulk.lines import Asked, LineDigest
-from service.bulk.manifest import Manifest
+from service.bulk.columns import Row
+from service.bulk.lines import Asked
 from service.bulk.tables import Table
 from service.bulk.tally import Tally
 from service.replies import ErrorDetail
 from service.wire import Format, identifier
 
-__all__ = ["ReplyLines", "Rows", "Sink", "rows_at"]
+__all__ = ["ReplyLines", "Rows", "Sink"]
 
 REPLY: Final = b'{"v":1,'
 """How each line of replies begins."""
@@ -189,8 +188,11 @@ class Rows:
 
     def __init__(self, table: Table) -> None:
         self._table = table
-        self.columns = tuple(column.name for column in table.columns)
         self.tally = Tally.of(table.manifest.statuses, table.manifest.errors)
+
+    @property
+    def columns(self) -> tuple[str, ...] | None:
+        return tuple(column.name for column in self._table.columns)
 
     @property
     def whole(self) -> int:
@@ -203,45 +205,11 @@ class Rows:
             yield
 
     def write(self, line: bytes, payload: bytes, seconds: float) -> None:
-        row = msgspec.msgpack.decode(payload, type=Row)
+        row = self.row(payload)
         error = None if row.error is None else row.error.kind
         self.tally.add(row.status, row.error, seconds)
         self._table.write(line, row.values, row.status, error)
 
-
-def rows_at(
-    kind: type[Table],
-    path: Path,
-    columns: Sequence[Column],
-    begun: Manifest,
-    resume: bool,
-    lines: Asked,
-) -> Rows:
-    """Return a table that goes on, or that is begun anew in place of one that was there.
-
-    Parameters
-    ----------
-    kind : type of Table
-    path : Path
-    columns : sequence of Column
-    begun : Manifest
-        As it would be without rows.
-    resume : bool
-        Whether rows that are there are kept.
-    lines : Asked
-        The requests.
-
-    Raises
-    ------
-    InvalidInputError
-        If what is there is no such table, or, where it is to go on, one of other requests, numbers
-        or columns.
-    """
-    there = Manifest.read(kind.manifest_path(path))
-    if not resume or (there is None and not path.exists()):
-        kind.check(path, there is not None)
-        return Rows(kind(path, columns, begun, LineDigest()))
-    if there is None:
-        raise InvalidInputError(f"{path}: no table that a batch has written", field=RESUME)
-    digest = there.check(begun, lines, path)
-    return Rows(kind(path, columns, there, digest))
+    def row(self, payload: bytes) -> Row:
+        """Return what the table tells of an answer."""
+        return msgspec.msgpack.decode(payload, type=Row)

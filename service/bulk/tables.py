@@ -11,8 +11,9 @@ import io
 import time
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
@@ -21,8 +22,8 @@ import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
 from service.bulk.columns import INDEX, Column
-from service.bulk.lines import LineDigest
-from service.bulk.manifest import Manifest, Part
+from service.bulk.lines import Asked, LineDigest
+from service.bulk.manifest import RESUME, Manifest, Part
 
 __all__ = ["CSV", "PARQUET", "CsvTable", "ParquetTable", "Table", "table_at"]
 
@@ -75,6 +76,39 @@ class Table(ABC):
         self.path, self.columns = path, columns
         self._state = _State(manifest, digest, [])
         self._since = time.monotonic()
+
+    @classmethod
+    def opened(
+        cls, path: Path, columns: Sequence[Column], begun: Manifest, resume: bool, asked: Asked
+    ) -> Self:
+        """Return a table that goes on, or one that is begun anew in place of what was there.
+
+        Parameters
+        ----------
+        path : Path
+        columns : sequence of Column
+        begun : Manifest
+            As it would be without rows.
+        resume : bool
+            Whether rows that are there are kept.
+        asked : Asked
+            All questions, those that they answer among them.
+
+        Raises
+        ------
+        InvalidInputError
+            If what is there is no such table, or, where it is to go on, one of other questions,
+            numbers or columns.
+        """
+        there = Manifest.read(cls.manifest_path(path))
+        if not resume or (there is None and not path.exists()):
+            cls.check(path, there is not None)
+            return cls(path, columns, begun, LineDigest())
+        if there is None:
+            raise InvalidInputError(
+                f"{path}: no table that a batch has written, or a sweep", field=RESUME
+            )
+        return cls(path, columns, there, there.check(begun, asked, path))
 
     @property
     def manifest(self) -> Manifest:
@@ -162,7 +196,10 @@ class Table(ABC):
         manifest, digest, kept = self._state
         if kept:
             first = manifest.rows
-            part = self._part([[first + i, *each.values] for i, each in enumerate(kept)])
+            numbered = self.columns[0].name == INDEX
+            part = self._part(
+                [[*([first + i] if numbered else []), *each.values] for i, each in enumerate(kept)]
+            )
             digest = digest.copy()
             for each in kept:
                 digest.add(each.line)
@@ -210,11 +247,31 @@ class CsvTable(Table):
                     self.manifest, parts=[self._append([[each.name for each in self.columns]], 0)]
                 )
             )
-        elif self.path.stat().st_size < self.manifest.parts[0].bytes:
+        else:
+            self._check_length()
+
+    def _check_length(self) -> None:
+        size = self.path.stat().st_size if self.path.exists() else 0
+        if size < self.manifest.parts[0].bytes:
             raise InvalidInputError(
                 f"{self.path}: is shorter than its manifest says; begin anew without it",
-                field="--resume",
+                field=RESUME,
             )
+
+    def whole_rows(self) -> Iterator[list[str]]:
+        """Yield the cells of each row that is whole.
+
+        Raises
+        ------
+        InvalidInputError
+            If the file has become shorter.
+        """
+        if not self.manifest.parts:
+            return
+        self._check_length()
+        with self.path.open("rb") as file:
+            whole = file.read(self.manifest.parts[0].bytes).decode()
+        yield from islice(csv.reader(io.StringIO(whole, newline="")), 1, None)
 
     def _part(self, rows: list[list[Any]]) -> Part:
         return self._append(rows, len(rows))
@@ -257,7 +314,7 @@ class ParquetTable(Table):
             if not (self.path / name).is_file():
                 raise InvalidInputError(
                     f"{self.path}: its part {name} is missing; begin anew without it",
-                    field="--resume",
+                    field=RESUME,
                 )
         for file in [*self.path.glob("part-*.parquet"), *self.path.glob(".part-*.parquet")]:
             if file.name not in whole:

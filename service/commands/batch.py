@@ -102,7 +102,7 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import Lines, ReplyLines, evaluate, new_manifest, rows_at, table_at
+    from service.bulk import Lines, ReplyLines, Rows, evaluate, new_manifest, table_at
 
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
@@ -122,7 +122,7 @@ def batch(
             chosen = _columns(columns, robot, explain)
             now = new_manifest([each.name for each in chosen], explain, hand, robot)
             with writing_answers(file):
-                sink = rows_at(kind, file, chosen, now, resume, lines)
+                sink = Rows(kind.opened(file, chosen, now, resume, lines))
         before = sink.tally.count
         on, workers = place(dask, workers, lines.count - before)
         answers = partial(

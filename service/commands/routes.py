@@ -230,7 +230,7 @@ def _many(
     as_json: bool,
 ) -> int:
     """Evaluate any number of routes, and keep what they come to."""
-    from service.bulk import ReplyLines, evaluate, new_manifest, route_columns, rows_at, table_at
+    from service.bulk import ReplyLines, Rows, evaluate, new_manifest, route_columns, table_at
 
     kind = table_at(file)
     routes = _Routes(sources, hand, robot)
@@ -245,7 +245,7 @@ def _many(
         else:
             columns = route_columns()
             now = new_manifest([each.name for each in columns], not unexplained, hand, robot)
-            sink = rows_at(kind, file, columns, now, resume, routes)
+            sink = Rows(kind.opened(file, columns, now, resume, routes))
     before = sink.tally.count
     on, workers = place(dask, workers, PLANS * (routes.count - before))
     answers = partial(

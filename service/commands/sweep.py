@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import InvalidInputError
+from service.commands.batch import answer_rest, writing_answers
 from service.commands.options import (
     FiniteRange,
     asked,
@@ -22,12 +23,12 @@ from service.commands.options import (
 from service.commands.stances import read_request
 from service.processes import Interrupted
 from service.sweeping import TOLERANCE
-from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, progress, say, verbosity
+from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, say, verbosity
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.sweeping import Design, Row, Sweep
+    from service.sweeping import Design, PointRows, Sweep
 
 __all__ = ["sweep"]
 
@@ -64,6 +65,11 @@ PICTURE: Final = "sweep.png"
     show_default=True,
     help="Of where it stops holding, if one number varies: a share of the range.",
 )
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on where this sweep was broken off: points that the table of DIR has are kept.",
+)
 @workers_option
 @dask_option
 @folder_option("Where the table and the picture go.")
@@ -77,6 +83,7 @@ def sweep(
     seed: int | None,
     over: str | None,
     tolerance: float,
+    resume: bool,
     workers: int | None,
     dask: str | None,
     folder: Path,
@@ -89,12 +96,14 @@ def sweep(
     A PATH has the names of the request with dots between them, as load.mass, gravity.2 or
     hands.front_left.surface.shear_limit; hands are named by their limbs, entries of lists by their
     index, and * is all of them. Nothing is explained, and what else a request wants is left out.
+    The table grows as points are answered; one that is broken off goes on with --resume.
 
     Exit status: 0 whatever holds, 2 bad input, also where no point can be answered for it, 1 where
     a point failed or was lost.
     """
     from service.answering import robots_of
-    from service.sweeping import Design, Variation, plot_sweep
+    from service.bulk import new_manifest
+    from service.sweeping import Design, PointRows, Variation, about, columns_of, plot_sweep
     from service.tables import console, print_sweep
 
     if seed is not None and samples is None:
@@ -109,10 +118,13 @@ def sweep(
     pair = _pair(over, design)
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    result = _answered(design, folder, stance, workers, dask, robot, tolerance)
     files = {"table": folder / TABLE, "picture": folder / PICTURE}
+    with writing_answers(files["table"]):
+        columns = [each.name for each in columns_of(design)]
+        begun = new_manifest(columns, False, hand, robot, about(request, design, seed or 0))
+        sink = PointRows(design, files["table"], begun, resume)
+    result = _answered(design, sink, files["table"], stance, workers, dask, robot, tolerance)
     with filling_folder():
-        result.write_table(files["table"])
         plot_sweep(result, files["picture"], Path(stance).stem, pair)
     if as_json:
         say(result.summary() | {"files": {name: str(file) for name, file in files.items()}})
@@ -140,39 +152,26 @@ def _pair(over: str | None, design: Design) -> tuple[str, str] | None:
 
 def _answered(
     design: Design,
-    folder: Path,
+    sink: PointRows,
+    table: Path,
     stance: str,
     workers: int | None,
     dask: str | None,
     robot: RobotFile | None,
     tolerance: float,
 ) -> Sweep:
-    """Return the sweep; if it is broken off, keep the table of what is done."""
+    """Return the sweep: of points that the table does not have yet, and of its borders."""
     from service.bulk import LOCAL
-    from service.sweeping import Sweep, answered
+    from service.sweeping import Points, asking, swept
 
-    rows: list[Row] = []
+    asked = Points(design)
     on = LOCAL if dask == "local" else dask
-    try:
-        with progress(f"sweeping {stance}") as tell:
-            return answered(
-                design,
-                rows,
-                workers=workers,
-                on=on,
-                robot=robot,
-                progress=tell,
-                tolerance=tolerance,
-            )
-    except InvalidInputError:
-        raise
-    except (Interrupted, CruxError) as error:
-        with filling_folder():
-            Sweep(design, tuple(rows)).write_table(folder / TABLE)
-        kept = f"{len(rows)} of {len(design.points)} points are answered in {folder / TABLE}"
-        if isinstance(error, CruxError):
-            raise CruxError(f"{error.message}; {kept}") from None
-        raise Interrupted(kept) from None
+    with asking(asked.count - sink.tally.count, workers, robot, on) as ask:
+        answer_rest(asked, ask, sink, table, f"sweeping {stance}", "points")
+        try:
+            return swept(design, sink.points, ask, tolerance)
+        except Interrupted:
+            raise Interrupted(f"all points are answered in {table}; --resume goes on") from None
 
 
 def _status(result: Sweep) -> int:

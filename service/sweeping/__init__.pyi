@@ -6,7 +6,13 @@ from .border import (
     held as held,
 )
 from .design import Design as Design
-from .evaluation import Row as Row
+from .evaluation import Row as Row, asking as asking
 from .figures import plot_sweep as plot_sweep
-from .result import Sweep as Sweep, answered as answered, sweep as sweep
+from .result import Sweep as Sweep, sweep as sweep, swept as swept
+from .table import (
+    PointRows as PointRows,
+    Points as Points,
+    about as about,
+    columns_of as columns_of,
+)
 from .variation import Variation as Variation, word_of as word_of

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
 from planner import LimitName
-from service.bulk import Setting, answered, own_versions, pool_on
+from service.bulk import Question, Setting, answered, own_versions, pool_on
 from service.processes import worth
 from service.replies import ErrorDetail
 from service.sweeping.design import Design, Point
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from planner import RobotFile
 
-__all__ = ["Ask", "Row", "State", "asking", "rows_at"]
+__all__ = ["Ask", "Row", "State", "asking", "row_of", "rows_at"]
 
-Ask = Callable[[Iterable[bytes]], Iterator[Answer]]
+Ask = Callable[[Iterable[Question]], Generator[Answer, None, None]]
 """Yields the answers to encoded requests, in order; asked again only after the last of them."""
 
 State = Literal["holds", "overloaded", "infeasible", "error"]
@@ -128,5 +128,10 @@ def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Row]:
     """Yield the row of each point, in order."""
     answers = ask(design.payload(point) for point in points)
     for point, answer in zip(points, answers, strict=True):
-        told = msgspec.msgpack.decode(answer.payload, type=_Told)
-        yield Row(point, **msgspec.structs.asdict(told), cap=design.cap(point))
+        yield row_of(design, point, answer.payload)
+
+
+def row_of(design: Design, point: Point, payload: bytes) -> Row:
+    """Return the row of a point whose answer is there."""
+    told = msgspec.msgpack.decode(payload, type=_Told)
+    return Row(point, **msgspec.structs.asdict(told), cap=design.cap(point))

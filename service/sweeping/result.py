@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +15,7 @@ from service.requests import PlanRequest
 from service.sweeping.border import TOLERANCE, Along, Border, border_in_words, borders
 from service.sweeping.design import Design
 from service.sweeping.evaluation import Ask, Row, asking, rows_at
+from service.sweeping.table import table_text
 from service.sweeping.variation import Value, Variation
 
 if TYPE_CHECKING:
@@ -24,20 +23,7 @@ if TYPE_CHECKING:
 
     from planner import RobotFile
 
-__all__ = ["Sweep", "answered", "sweep"]
-
-COLUMNS: Final = (
-    "status",
-    "utilisation",
-    "load_factor",
-    "limb",
-    "finger",
-    "phalanx",
-    "joint",
-    "limit",
-    "error",
-)
-"""Of the table, after what varies."""
+__all__ = ["Sweep", "sweep", "swept"]
 
 STATUSES: Final = ("optimal", "overloaded", "infeasible", "failed", "error")
 
@@ -73,12 +59,8 @@ class Sweep(NamedTuple):
         OSError
             If it cannot be written.
         """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([*self.design.labels, *COLUMNS])
-        writer.writerows(map(_cells, self.rows))
         with whole_file(path) as part:
-            part.write_text(text.getvalue(), encoding="utf-8")
+            part.write_text(table_text(self.design, self.rows), encoding="utf-8")
 
     def summary(self) -> dict[str, Any]:
         """Return what a program needs to know: what varied, how many hold, and the borders."""
@@ -118,56 +100,9 @@ def _brief(row: Row, design: Design) -> dict[str, Any]:
     return {"at": dict(zip(paths, row.point, strict=True)), "utilisation": row.utilisation}
 
 
-def _cells(row: Row) -> list[str]:
-    limiting = row.limiting
-    factor = "inf" if row.load_factor_unbounded else _cell(row.load_factor)
-    names = ("limb", "finger", "phalanx", "joint", "limit")
-    return [
-        *(_cell(value, "null") for value in row.point),
-        row.status,
-        _cell(row.utilisation),
-        factor,
-        *(_cell(None if limiting is None else getattr(limiting, name)) for name in names),
-        row.complaint or "",
-    ]
-
-
-def _cell(value: Value, none: str = "") -> str:
-    if value is None:
-        return none
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def answered(
-    design: Design,
-    rows: list[Row],
-    *,
-    workers: int | None = None,
-    on: str | Client | None = None,
-    robot: RobotFile | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    tolerance: float = TOLERANCE,
-) -> Sweep:
-    """Return a sweep of which every point is answered.
-
-    Parameters
-    ----------
-    design : Design
-    rows : list
-        Empty; rows are put here as they are answered, so what is done is there if the rest is
-        broken off.
-    workers, on, robot, progress, tolerance
-        As for `sweep`.
-    """
-    total = len(design.points)
-    with asking(total, workers, robot, on) as ask:
-        if progress is not None:
-            progress(0, total)
-        for row in rows_at(design, design.points, ask):
-            rows.append(row)
-            if progress is not None:
-                progress(len(rows), total)
-        return Sweep(design, tuple(rows), tuple(_borders(design, rows, ask, tolerance)))
+def swept(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Sweep:
+    """Return a sweep of which every point is answered, with its borders, which take more plans."""
+    return Sweep(design, tuple(rows), tuple(_borders(design, rows, ask, tolerance)))
 
 
 def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Iterator[Border]:
@@ -247,12 +182,13 @@ def sweep(
     ]
     asked = with_robot(with_hand(request, hand), robot)
     design = Design.of(asked, chosen, samples, seed, robots_of(robot))
-    return answered(
-        design,
-        [],
-        workers=workers,
-        on=on,
-        robot=robot,
-        progress=progress,
-        tolerance=tolerance,
-    )
+    rows: list[Row] = []
+    total = len(design.points)
+    with asking(total, workers, robot, on) as ask:
+        if progress is not None:
+            progress(0, total)
+        for row in rows_at(design, design.points, ask):
+            rows.append(row)
+            if progress is not None:
+                progress(len(rows), total)
+        return swept(design, rows, ask, tolerance)

@@ -63,6 +63,15 @@ class Variation:
             isinstance(value, (int, float)) and not isinstance(value, bool) for value in self.values
         )
 
+    def text(self, *, sampled: bool = False) -> str:
+        """Return it as `parse` reads it; of a range for samples its ends."""
+        if not self.ranged:
+            given = ",".join(map(word_of, self.values))
+        else:
+            count = "" if sampled else f":{len(self.values)}"
+            given = f"{word_of(self.values[0])}:{word_of(self.last)}{count}"
+        return f"{self.path}={given}"
+
     @classmethod
     def over(cls, path: str, low: float, high: float, count: int = 2) -> Self:
         """Return a range, of so many values at equal distances.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import signal
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from service.bulk import answered
 from service.commands.cli import run
 from service.processes import Interrupted
 from service.wire import LostError, encode_error
+from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 
@@ -155,7 +157,7 @@ def test_what_is_answered_is_kept(
     with pytest.raises(Interrupted) as caught:
         run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
-    assert str(caught.value) == f"1 of 4 points are answered in {table}"
+    assert str(caught.value) == f"1 of 4 points are answered in {table}; --resume goes on"
     assert table.read_bytes().count(b"\n") == 2
     assert not (tmp_path / "sweep.png").exists()
 
@@ -170,3 +172,145 @@ def test_a_sweep_ends_with_its_processes(tmp_path: Path) -> None:
     assert status == FAILED
     assert error.startswith("crux: interrupted")
     assert error.count("\n") == 1
+
+
+WIDE = ["--vary", "load.mass=60:140:30", "--vary", "body.position.0=-0.06:0.06:40"]
+
+
+def manifest(folder: Path) -> dict:
+    path = folder / "sweep.csv.manifest.json"
+    return json.loads(path.read_text()) if path.exists() else {"parts": []}
+
+
+@watched
+def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, folder = tmp_path / "whole", tmp_path / "broken"
+    assert run(["sweep", "wall-300", *WIDE, "-o", str(whole), "--json"]) == DONE
+    summary = result(capfd)
+    process = begun("sweep", "wall-300", *WIDE, "-o", str(folder), "--workers", "2")
+    until(lambda: sum(part["rows"] for part in manifest(folder)["parts"]), process)
+    process.kill()
+    ended(process)
+    done = sum(part["rows"] for part in manifest(folder)["parts"])
+    assert 0 < done < 1200
+    assert not manifest(folder)["complete"]
+    # a row that is cut off, as a kill in the middle of writing leaves it
+    with (folder / "sweep.csv").open("ab") as file:
+        file.write(b"60.0,-0.0")
+    asked = []
+
+    def counting(questions, pool, form):
+        questions = list(questions)
+        asked.extend(questions)
+        return answered(questions, pool, form)
+
+    monkeypatch.setattr("service.sweeping.evaluation.answered", counting)
+    again = ["sweep", "wall-300", *WIDE, "-o", str(folder), "--json", "--resume"]
+    assert run(again) == DONE
+    assert len(asked) == 1200 - done
+    told = result(capfd)
+    assert told | {"files": 0} == summary | {"files": 0}
+    assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
+    assert manifest(folder)["complete"]
+    assert (folder / "sweep.png").exists()
+    # nothing is left to do
+    assert run(again) == DONE
+    assert len(asked) == 1200 - done
+    assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [MASS, "hands.front_left.grasp.closing_tension=1,40", "limits.utilisation=0.1:1:3"],
+)
+def test_what_is_read_again_is_told_as_before(
+    values: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given = ["sweep", "wall-300", "--vary", values, "-o", str(tmp_path)]
+    assert run(given) == DONE
+    printed = capfd.readouterr().out
+    assert run([*given, "--resume"]) == DONE
+    assert capfd.readouterr().out == printed
+    tables = [run([*given, "--json", *more]) or result(capfd) for more in ([], ["--resume"])]
+    assert tables[0] == tables[1]
+
+
+@pytest.mark.parametrize(
+    ("begun_with", "goes_on_with", "words"),
+    [
+        (
+            ["--vary", MASS],
+            ["--vary", "load.mass=60:120:5"],
+            "another --vary ('load.mass=60:120:4'",
+        ),
+        (["--vary", MASS], ["--vary", "gravity.2=-9:-8:4"], "now 'gravity.2=-9:-8:4')"),
+        (["--vary", MASS, "--samples", "4"], ["--vary", MASS], "another --samples ('4 of seed 0'"),
+        (
+            ["--vary", MASS, "--samples", "4"],
+            ["--vary", MASS, "--samples", "4", "--seed", "2"],
+            "another --samples ('4 of seed 0', now '4 of seed 2')",
+        ),
+        (["--vary", MASS], ["--vary", MASS, "--hand"], "another hand"),
+    ],
+)
+def test_a_sweep_does_not_go_on_as_another(
+    begun_with: list[str],
+    goes_on_with: list[str],
+    words: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    weak = tmp_path / "weak.toml"
+    weak.write_text(
+        '[tendon]\nmaximum_tension = { value = 60.0, unit = "N", source = "assumed" }\n',
+        encoding="utf-8",
+    )
+    folder = tmp_path / "out"
+    more = [str(weak)] if goes_on_with[-1] == "--hand" else []
+    assert run(["sweep", "wall-300", *begun_with, "-o", str(folder), "--json"]) == DONE
+    before = (folder / "sweep.csv").read_bytes()
+    capfd.readouterr()
+    given = ["sweep", "wall-300", *goes_on_with, *more, "-o", str(folder), "--resume"]
+    assert run(given) == BAD_INPUT
+    err = capfd.readouterr().err
+    assert words in err
+    assert err.count("\n") == 1
+    assert (folder / "sweep.csv").read_bytes() == before
+
+
+def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given = ["--vary", MASS, "-o", str(tmp_path)]
+    assert run(["sweep", "wall-300", *given, "--json"]) == DONE
+    capfd.readouterr()
+    assert run(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
+    assert "was begun with another stance; begin anew without it" in complaint(capfd)
+    table = tmp_path / "sweep.csv"
+    table.write_text("\n".join(table.read_text().replace(",", "").splitlines()) + 99 * "\n")
+    assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
+    capfd.readouterr()
+    (tmp_path / "sweep.csv.manifest.json").unlink()
+    assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
+    assert "no table that a batch has written, or a sweep" in complaint(capfd)
+    # one that never began begins
+    assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path / "new"), "--resume"]) == 0
+
+
+def test_a_sweep_goes_on_after_a_full_disk(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    varied = ["--vary", "load.mass=60:120:40", "-o", str(folder)]
+    status, error = limited("sweep", "wall-300", *varied, size=2000)
+    table = folder / "sweep.csv"
+    kept = f"0 of 40 points are answered in {table}; --resume goes on"
+    assert (status, error) == (FAILED, f"crux: cannot write {table}: File too large; {kept}\n")
+    assert run(["sweep", "wall-300", *varied, "--json", "--resume"]) == DONE
+    assert result(capfd)["answered"] == 40
+    with table.open(encoding="utf-8", newline="") as file:
+        masses = [float(line["load.mass [kg]"]) for line in csv.DictReader(file)]
+    assert masses == sorted(masses)
+    assert len(masses) == 40
