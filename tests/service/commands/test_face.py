@@ -151,21 +151,22 @@ def on_a_terminal(arguments: Sequence[str], stream: str = "stdout", **more: str)
     """What a command writes to a terminal that one of its streams is."""
     ours, theirs = pty.openpty()
     env = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
-    subprocess.run(
+    process = subprocess.Popen(
         [sys.executable, "-c", "from service.commands import main; main()", *arguments],
         cwd=ROOT,
         env=env | {"TERM": "xterm", "COLUMNS": "80"} | more,
-        check=True,
         **{"stdout": subprocess.DEVNULL, stream: theirs},
     )
     os.close(theirs)
     told = b""
     try:
+        # while it runs: a terminal that nobody reads is soon full
         while part := os.read(ours, 1 << 16):
             told += part
     except OSError:
         # Linux says so where nothing more can come
         pass
+    assert process.wait() == DONE
     os.close(ours)
     return told.decode()
 
