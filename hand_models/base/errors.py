@@ -14,6 +14,7 @@ __all__ = [
     "LimitError",
     "SolverError",
     "UnsupportedError",
+    "in_file",
     "within",
 ]
 
@@ -95,3 +96,18 @@ def within(path: str) -> Iterator[None]:
         yield
     except InvalidInputError as error:
         raise error.within(path) from None
+
+
+@contextmanager
+def in_file(name: str) -> Iterator[None]:
+    """Put the name of a TOML file before an error of reading it, or of what it says."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(error.strerror or str(error), field=name) from None
+    except UnicodeDecodeError:
+        raise InvalidInputError("must be TOML in UTF-8", field=name) from None
+    except RecursionError:
+        raise InvalidInputError("is nested too deep", field=name) from None
+    except (ValueError, InvalidInputError) as error:
+        raise InvalidInputError(str(error), field=name) from None

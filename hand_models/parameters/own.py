@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, in_file
 from hand_models.parameters.tables import (
     LONGEST_QUOTE,
     ParameterTable,
@@ -38,7 +38,7 @@ ONE_FOR_ALL: Final = frozenset({"tile.contact_stiffness"})
 """Lists that may be given as one number, which then stands for all of them."""
 
 
-def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTable:
+def load_own_hand(path: Path) -> ParameterTable:
     """Read a hand's own entries from a file, and check them.
 
     Parameters
@@ -46,8 +46,6 @@ def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTa
     path : Path
         TOML in the form of ``hand.toml``, with none but the entries that differ. Bare numbers are
         in the units of ``hand.toml``, and `assumed`.
-    base : ParameterTable, optional
-        The hand that they are to change; the bundled one by default.
 
     Returns
     -------
@@ -60,10 +58,8 @@ def load_own_hand(path: Path, base: ParameterTable | None = None) -> ParameterTa
         In one line that names file, entry and value.
     """
     own = ParameterTable.load(path, hand_table().units)
-    try:
-        own_hand(own, base)
-    except InvalidInputError as error:
-        raise InvalidInputError(str(error), field=str(path)) from None
+    with in_file(str(path)):
+        own_hand(own)
     return own
 
 

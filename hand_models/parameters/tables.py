@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, get_args
 
 import msgspec
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, in_file
 
 __all__ = [
     "ParameterTable",
@@ -95,12 +95,8 @@ class ParameterTable:
         InvalidInputError
             If the text is not TOML or an entry is not a quantity of finite numbers.
         """
-        try:
+        with in_file(origin):
             return cls.of(tomllib.loads(text), units)
-        except (ValueError, InvalidInputError) as error:
-            raise InvalidInputError(str(error), field=origin) from None
-        except RecursionError:
-            raise InvalidInputError("is nested too deep", field=origin) from None
 
     @classmethod
     def of(cls, raw: Mapping[str, Any], units: Units | None = None) -> ParameterTable:
@@ -131,12 +127,8 @@ class ParameterTable:
     @classmethod
     def load(cls, path: Path, units: Units | None = None) -> ParameterTable:
         """Read a parameter file from disk; raises what `read` raises, also if there is none."""
-        try:
+        with in_file(str(path)):
             text = path.read_text(encoding="utf-8")
-        except OSError as error:
-            raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
-        except UnicodeDecodeError:
-            raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
         return cls.read(text, str(path), units)
 
     @property

@@ -9,4 +9,4 @@ from .holds import (
 )
 from .mesh import Mesh as Mesh, read_mesh as read_mesh
 from .profile import Profile as Profile
-from .triangles import Triangles as Triangles, weld as weld
+from .triangles import Triangles as Triangles, drawn_out as drawn_out, grid as grid, weld as weld

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.smoothing import OutlinedHold, Scale
+from hand_models.rock.triangles import Triangles, drawn_out
 from hand_models.sections import PARALLEL
 
 __all__ = ["STRIPS", "Profile"]
@@ -74,6 +76,20 @@ class Profile(OutlinedHold):
         hand = hand or hand_table()
         inner = hand.vector("fingers", "inner_joint")[1]
         self._half_way = 0.5 * (inner + hand.vector("fingers", "outer_axis")[1])
+
+    def surface(self, low: float, high: float) -> Triangles:
+        """Return the outlines drawn out along y, each over its strip, from y = low to high."""
+        from trimesh.util import append_faces
+
+        if len(self.outlines) == 1:
+            return drawn_out(self.outlines[0], low, high)
+        bounds = np.clip([math.inf, self._half_way, 0.0, -self._half_way, -math.inf], low, high)
+        strips = [
+            drawn_out(outline, bottom, top)
+            for outline, (top, bottom) in zip(self.outlines, pairwise(bounds.tolist()), strict=True)
+        ]
+        vertices, faces = append_faces(*zip(*strips, strict=True))
+        return Triangles(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.intp))
 
     def _outline(self, y: float) -> Array:
         """Return the outline of the strip at y."""

@@ -22,7 +22,9 @@ __all__ = [
     "borders",
     "bridge",
     "cut",
+    "drawn_out",
     "edges_of",
+    "grid",
     "weld",
     "without_spikes",
     "wound_alike",
@@ -37,6 +39,22 @@ class Triangles(NamedTuple):
 
     vertices: Array
     faces: Indices
+
+
+def grid(points: Array) -> Triangles:
+    """Return the triangles between points (n, m, 3), two for each cell."""
+    rows, columns, _ = points.shape
+    place = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (
+        part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[:-1, 1:], place[1:, 1:])
+    )
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
+    return Triangles(points.reshape(-1, 3), faces)
+
+
+def drawn_out(outline: Array, low: float, high: float) -> Triangles:
+    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high."""
+    return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)], axis=1))
 
 
 def edges_of(faces: Indices) -> Indices:

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 from trimesh.intersections import slice_faces_plane
-from trimesh.util import append_faces
 
 from hand_models.base import Array, Indices, Pose
 from hand_models.hand import SettledHand
@@ -24,6 +23,8 @@ from hand_models.rock import (
     Profile,
     Sphere,
     Triangles,
+    drawn_out,
+    grid,
     weld,
 )
 
@@ -91,34 +92,18 @@ def _surface(settled: SettledHand, hand: Array) -> Triangles:
         case Plane():
             x = float(hand[0])
             outline = np.array([[x - 2.0 * AROUND, 0.0], [x + 2.0 * AROUND, 0.0]])
-            return _drawn_out(outline, *sides)
+            return drawn_out(outline, *sides)
         case Cylinder() | Edge():
-            return _drawn_out(_round_outline(hold, hand), *sides)
+            return drawn_out(_round_outline(hold, hand), *sides)
         case Sphere():
             return _cap(np.full(3, hold.diameter / 2.0), hand)
         case Ellipsoid():
             return _cap(np.array(hold.semi_axes), hand)
         case Profile():
-            return _strips(hold, settled, *sides)
+            return hold.surface(*sides)
         case Mesh():
             return hold.triangles
     return Triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
-
-
-def _drawn_out(outline: Array, low: float, high: float) -> Triangles:
-    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high."""
-    return _grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)], axis=1))
-
-
-def _grid(points: Array) -> Triangles:
-    """Return the triangles between points (n, m, 3), two for each cell."""
-    rows, columns, _ = points.shape
-    place = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (
-        part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[:-1, 1:], place[1:, 1:])
-    )
-    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
-    return Triangles(points.reshape(-1, 3), faces)
 
 
 def _round_outline(hold: Cylinder | Edge, hand: Array) -> Array:
@@ -149,18 +134,4 @@ def _cap(semi_axes: Array, hand: Array) -> Triangles:
     turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
     round_about = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
     unit = np.cos(t)[:, None, None] * pole + np.sin(t)[:, None, None] * round_about
-    return _grid(centre + unit * semi_axes)
-
-
-def _strips(hold: Profile, settled: SettledHand, low: float, high: float) -> Triangles:
-    """Return the surface of a hold that is drawn as outlines, from y = low to high."""
-    if len(hold.outlines) == 1:
-        return _drawn_out(hold.outlines[0], low, high)
-    half_way = 0.5 * float(settled.hand.inner_joint[1] + settled.hand.outer_axis[1])
-    bounds = np.clip([math.inf, half_way, 0.0, -half_way, -math.inf], low, high)
-    strips = [
-        _drawn_out(outline, float(bottom), float(top))
-        for outline, top, bottom in zip(hold.outlines, bounds, bounds[1:], strict=False)
-    ]
-    vertices, faces = append_faces(*zip(*strips, strict=True))
-    return Triangles(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.intp))
+    return grid(centre + unit * semi_axes)

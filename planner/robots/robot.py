@@ -15,7 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from hand_models.base import Array, InvalidInputError, Pose, finite_vector, wrench_transport
+from hand_models.base import (
+    Array,
+    Pose,
+    finite_vector,
+    in_file,
+    wrench_transport,
+)
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
 from planner.robots.build import build_model, pose_of
@@ -286,7 +292,5 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
         does not fit the URDF; or names a number of the hand.
     """
     hand = spiny_hand(hand_numbers)
-    try:
+    with in_file(file.origin):
         return Robot(RobotDescription.read(file.toml), file.urdf, hand)
-    except InvalidInputError as error:
-        raise InvalidInputError(str(error), field=file.origin) from None

@@ -20,7 +20,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any, Final
 
-from hand_models.base import InvalidInputError, Pose, within
+from hand_models.base import InvalidInputError, Pose, in_file, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 
 __all__ = ["Mount", "RobotDescription", "RobotFile", "section_table"]
@@ -94,12 +94,10 @@ class RobotFile:
         InvalidInputError
             If one of them cannot be read, or the file does not say which URDF it has.
         """
-        toml = _text(path, str(path), "TOML")
-        try:
+        with in_file(str(path)):
+            toml = path.read_text(encoding="utf-8")
             described = RobotDescription.read(toml)
-            urdf = _text(path.parent / described.urdf, "urdf", "a URDF")
-        except InvalidInputError as error:
-            raise InvalidInputError(str(error), field=str(path)) from None
+            urdf = _urdf(path.parent / described.urdf)
         return cls(described.name, toml, urdf, str(path))
 
     @classmethod
@@ -217,16 +215,14 @@ class RobotDescription:
         return cls(called, urdf, body, com, mounts, locked, capsules, back)
 
 
-def _text(path: Path, field: str, what: str) -> str:
+def _urdf(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidInputError(
-            reason if field == str(path) else f"{path}: {reason}", field=field
-        ) from None
-    except (UnicodeDecodeError, ValueError):
-        raise InvalidInputError(f"must be {what} in UTF-8", field=field) from None
+        reason = f"{path}: {error.strerror or error}"
+        raise InvalidInputError(reason, field="urdf") from None
+    except ValueError:
+        raise InvalidInputError("must be a URDF in UTF-8", field="urdf") from None
 
 
 def _string(value: Any, field: str) -> str:

@@ -90,7 +90,7 @@ def rock_solids(scene: Scene) -> tuple[Solid, ...]:
     """Return the rock of every hand."""
     found = []
     for hand, rock in zip(scene.hands, scene.rocks, strict=True):
-        shape, centre = KEPT.get(hand.hold, partial(_rock, hand.hold, scene))
+        shape, centre = KEPT.get(hand.hold, partial(_rock, hand.hold))
         place = rock.inverse() @ centre
         found.append(
             Solid(
@@ -104,7 +104,7 @@ def rock_solids(scene: Scene) -> tuple[Solid, ...]:
     return tuple(found)
 
 
-def _rock(hold: Hold, scene: Scene) -> tuple[Any, Pose]:
+def _rock(hold: Hold) -> tuple[Any, Pose]:
     """Return a hold's shape, and where that is in the hold's frame."""
     match hold:
         case Plane():
@@ -118,7 +118,7 @@ def _rock(hold: Hold, scene: Scene) -> tuple[Any, Pose]:
         case Mesh():
             return _surface(*hold.triangles), Pose.identity()
         case Profile():
-            return _drawn_out(hold, scene), Pose.identity()
+            return _surface(*hold.surface(-FAR, FAR)), Pose.identity()
     swept = hold.swept
     if swept is None:
         raise TypeError(f"no shape for a {type(hold).__name__}")
@@ -138,26 +138,6 @@ def _wedge(edge: Edge) -> Any:
     shape = coal.ConvexBase.convexHull(points, True, "Qt")
     shape.setSweptSphereRadius(radius)
     return shape
-
-
-def _drawn_out(profile: Profile, scene: Scene) -> Any:
-    """Return outlines drawn out along y, each over its finger's strip."""
-    hand = scene.stance.robot.hand
-    bounds = [FAR, -FAR]
-    if len(profile.outlines) > 1:
-        half_way = 0.5 * float(hand.inner_joint[1] + hand.outer_axis[1])
-        bounds = [FAR, half_way, 0.0, -half_way, -FAR]
-    vertices, faces, count = [], [], 0
-    for outline, top, bottom in zip(profile.outlines, bounds, bounds[1:], strict=False):
-        first = count + np.arange(len(outline) - 1)
-        beside = first + len(outline)
-        vertices += [np.insert(outline, 1, y, axis=1) for y in (bottom, top)]
-        faces += [
-            np.column_stack([first, first + 1, beside]),
-            np.column_stack([beside, first + 1, beside + 1]),
-        ]
-        count += 2 * len(outline)
-    return _surface(np.concatenate(vertices), np.concatenate(faces))
 
 
 def _surface(vertices: Array, faces: Indices) -> Any:

@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError, in_file, within
 from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_hand
 from planner import Robot, RobotFile, robosimian, robot_of
@@ -68,10 +68,8 @@ def read_hand(path: Path) -> ParameterTable:
         In one line that names file, entry and value.
     """
     own = load_own_hand(path)
-    try:
+    with in_file(str(path)):
         spiny_hand(own_hand(own))
-    except InvalidInputError as error:
-        raise InvalidInputError(str(error), field=str(path)) from None
     return own
 
 
@@ -83,7 +81,7 @@ def read_draws(path: Path) -> list[Draw]:
     InvalidInputError
         In one line that names file, draw, entry and value.
     """
-    try:
+    with in_file(str(path)):
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
         given = raw.get("draws")
         if list(raw) != ["draws"] or not isinstance(given, list) or not given:
@@ -95,14 +93,6 @@ def read_draws(path: Path) -> list[Draw]:
                     raise InvalidInputError("hand or surfaces is needed")
                 own_draw(draw)
             found.append(Draw(**draw))
-    except OSError as error:
-        raise InvalidInputError(error.strerror or str(error), field=str(path)) from None
-    except UnicodeDecodeError:
-        raise InvalidInputError("must be TOML in UTF-8", field=str(path)) from None
-    except (ValueError, InvalidInputError) as error:
-        raise InvalidInputError(str(error), field=str(path)) from None
-    except RecursionError:
-        raise InvalidInputError("is nested too deep", field=str(path)) from None
     return found
 
 

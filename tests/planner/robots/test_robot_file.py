@@ -380,6 +380,10 @@ def test_sixteen_limbs_are_a_robot_and_seventeen_are_not():
             "walker.toml: must be TOML in UTF-8",
         ),
         (lambda folder: (folder / "walker.toml").write_text("a = "), "walker.toml: Invalid value"),
+        (
+            lambda folder: (folder / "walker.toml").write_text(f"a = {'[' * 9999}"),
+            "walker.toml: is nested too deep",
+        ),
     ],
 )
 def test_files_that_cannot_be_read(tmp_path, spoil, message):
