@@ -45,7 +45,7 @@ KNOWN: Final = 256
 """Things that items are about of which it is kept which process had them last."""
 
 STARTS: Final = 2
-"""Processes in a row that may die before they are ready; after that no more are started."""
+"""Processes in a row that may not start, or die before they are ready; then no more are started."""
 
 NO_GUARD: Final = (
     " while it started; a program that starts processes needs its 'if __name__ == \"__main__\":'"
@@ -91,7 +91,7 @@ class Workers(Generic[T, R]):
         Items that each process has in hand by their numbers, the one in work first; of those
         processes that have been started and are not known to have died.
     stillborn : int
-        Processes in a row that have died before they were ready.
+        Processes in a row that could not be started, or have died before they were ready.
     """
 
     def __init__(self, make: Make[T, R], count: int) -> None:
@@ -250,7 +250,19 @@ class Workers(Generic[T, R]):
 
     def _hire(self) -> None:
         while len(self.hands) < self._count and self.stillborn < STARTS:
-            self.hands[Station(self._make, ahead=True).lanes[0]] = {}
+            try:
+                station = Station(self._make, ahead=True)
+            except OSError as error:
+                self._miss(f"processes do not start: {error.strerror or error}")
+            else:
+                self.hands[station.lanes[0]] = {}
+
+    def _miss(self, why: str) -> None:
+        """Count a process that did not live to be ready."""
+        self.stillborn += 1
+        self._unborn = why
+        if self.stillborn == STARTS:
+            log.warning(why)
 
     def _give(self, lane: Numbered[T, R], i: int, item: T) -> None:
         self.hands[lane][i] = item
@@ -261,12 +273,9 @@ class Workers(Generic[T, R]):
         status = self._dismiss(lane, PATIENCE)
         how = _ending(status)
         if not lane.ready:
-            self.stillborn += 1
             # nothing of this house is at work before a process is, but the program's own beginning
             hint = NO_GUARD if status == UNCAUGHT else ""
-            self._unborn = f"processes do not start: {how}{hint}"
-            if self.stillborn == STARTS:
-                log.warning(self._unborn)
+            self._miss(f"processes do not start: {how}{hint}")
         return how
 
     def _dismiss(self, lane: Numbered[T, R], patience: float = 0.0) -> int | None:

@@ -65,6 +65,8 @@ class Setting(NamedTuple):
         Of `PACKAGES`, where it is asked.
     kind : str
         Of all questions: `service.wire.PLAN` or `ROUTE`.
+    make : callable or None
+        Called once in each process; returns what answers questions that are of neither kind.
     """
 
     robot: RobotFile | None = None
@@ -75,6 +77,7 @@ class Setting(NamedTuple):
     columns: tuple[str, ...] | None = None
     versions: dict[str, str | None] = {}  # noqa: RUF012 - of a named tuple
     kind: str = PLAN
+    make: Callable[[], Answerer] | None = None
 
 
 def own_version(package: str = "crux") -> str | None:
@@ -150,6 +153,8 @@ def _answerer(pickled: bytes) -> Answerer:
             "where it is to be answered there is {}, and where it is asked {}; answers are equal "
             "to the last digit only with the same versions on both".format(*listed)
         )
+    if setting.make is not None:
+        return setting.make()
     robots = robots_of(setting.robot)
     files = None if setting.folder is None else MeshFiles(setting.folder)
     revised = partial(_revised, setting)

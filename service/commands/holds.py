@@ -13,8 +13,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import click
 import msgspec
 
-from hand_models.base import InvalidInputError, whole_file
-from service.commands.options import FiniteRange, hand_option, json_option, output_in, plot_option
+from hand_models.base import CruxError, InvalidInputError, whole_file
+from service.commands.batch import place
+from service.commands.options import (
+    FiniteRange,
+    dask_option,
+    hand_option,
+    json_option,
+    output_in,
+    plot_option,
+    workers_option,
+)
 from service.processes import Interrupted
 from service.tables import progress, say, writing
 
@@ -40,6 +49,12 @@ OUTPUT: Final = ".json"
 
 MOST: Final = 100_000
 """Places that are tried: about four hours of one core, forty times that with the seat best."""
+
+PLANS: Final = 15
+"""As which a trial counts where it is asked whether processes are worth it."""
+
+DEAR: Final = 40
+"""Trials as which one counts whose seat is searched for."""
 
 UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 """Of the file."""
@@ -96,7 +111,8 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
     metavar="N",
     help="Of the best N tell also what is left where the hand is a little elsewhere.",
 )
-@click.option("--workers", type=click.IntRange(1), help="Processes; by default one a core.")
+@workers_option
+@dask_option
 @hand_option
 @plot_option("Draw the rock there, and on it the largest pull-off at each point.")
 @json_option
@@ -110,6 +126,7 @@ def holds(
     seat: Literal["rest", "best"],
     robust: int,
     workers: int | None,
+    dask: str | None,
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,
@@ -124,7 +141,7 @@ def holds(
     from hand_models.parameters import hand_table, own_hand
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
-    from service.processes import try_everywhere
+    from service.processes import HoldTrials
     from service.tables import console
 
     Surface.named(surface)
@@ -145,24 +162,22 @@ def holds(
     with writing(output, "--output"):
         TemporaryFile(dir=output.parent).close()
 
-    def tried(places: list[Trial], robust: bool) -> Generator[tuple[int, Outcome], None, None]:
-        return try_everywhere(
-            mesh, surface, places, numbers, seat=seat, robust=robust, workers=workers
-        )
-
     outcomes: dict[int, Outcome] = {}
     scattered: dict[int, Outcome] = {}
     best: list[Pair] = []
-    broken = False
+    broken: Interrupted | CruxError | None = None
+    on, count = place(dask, workers, PLANS * (DEAR if seat == "best" else 1) * len(trials))
     try:
-        _keep(f"trying {len(trials):,} places", trials, tried(trials, False), outcomes)
-        best = _sorted(trials, outcomes)[:robust]
-        again = [trial for trial, _ in best]
-        _keep(f"scattering the best {len(best)}", again, tried(again, True), scattered)
-    except Interrupted:
+        with HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
+            _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
+            best = _sorted(trials, outcomes)[:robust]
+            again = [trial for trial, _ in best]
+            title = f"scattering the best {len(best)}"
+            _keep(title, again, tried.each(again, robust=True), scattered)
+    except (Interrupted, CruxError) as error:
         if not outcomes:
             raise
-        broken = True
+        broken = error
     found = _sorted(trials, outcomes)
     found[: len(best)] = _sorted(
         [trial for trial, _ in best], dict(enumerate(each for _, each in best)) | scattered
@@ -182,11 +197,14 @@ def holds(
     }
     with writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
-    if broken:
-        raise Interrupted(
+    if broken is not None:
+        kept = (
             f"{len(outcomes):,} of {len(trials):,} places were tried, {len(scattered)} of the best "
             f"scattered; what they hold is in {output}"
         )
+        if isinstance(broken, CruxError):
+            raise CruxError(f"{broken.message}; {kept}")
+        raise Interrupted(kept)
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:

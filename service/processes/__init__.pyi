@@ -1,4 +1,4 @@
-from .hold_trials import try_everywhere as try_everywhere
+from .hold_trials import HoldTrials as HoldTrials
 from .interruption import (
     Interrupted as Interrupted,
     interruptible as interruptible,

@@ -1,89 +1,137 @@
-"""Hands tried at many places of one rock, in processes."""
+"""Hands tried at many places of one rock: bulk work, of which a question is a batch of trials."""
 
 from __future__ import annotations
 
 import math
+import pickle
+import time
 from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from planner import Lost, Workers, cores
+from service.bulk import Setting, answered, own_versions, pool_on
+from service.replies import ErrorReply
+from service.wire import Answer, Format
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from hand_models.fixed_wrist import FoundHold, Trial
     from hand_models.rock import Mesh
 
-__all__ = ["try_everywhere"]
+__all__ = ["HoldTrials"]
 
 TOGETHER: Final = 128
 """Trials that are closed in one batch, at most: some fingers take ten times as long as most, and so
 do the batches that they are in, whatever else is in these."""
 
-Found = list["FoundHold | InvalidInputError"]
+FORM: Final = Format.MSGPACK
+"""Of errors."""
+
+PICKLED: Final = "application/python-serialized-object"
+"""Zenoh's name of how trials and what comes of them travel."""
 
 
-def try_everywhere(
-    rock: Mesh,
-    surface: str,
-    trials: Sequence[Trial],
-    hand: ParameterTable,
-    *,
-    seat: Literal["rest", "best"] = "rest",
-    robust: bool = False,
-    workers: int | None = None,
-) -> Generator[tuple[int, FoundHold | InvalidInputError], None, None]:
-    """Yield each place's index, and what a hand holds there, as they are done.
+Found = Generator[tuple[int, "FoundHold | InvalidInputError"], None, None]
+
+
+class HoldTrials:
+    """Where hands are tried on a rock, while it is entered.
 
     Parameters
     ----------
     rock : Mesh
     surface : str
         A preset's name.
-    trials : sequence of Trial
     hand : ParameterTable
         Its numbers.
     seat : {'rest', 'best'}, optional
-    robust : bool, optional
-        As of `hand_models.fixed_wrist.try_holds`.
+    on : str or distributed.Client, optional
     workers : int, optional
-        Processes, this one among them; by default one a core.
-
-    Yields
-    ------
-    index : int
-    found : FoundHold or InvalidInputError
-        An error in place of a hand that cannot be there, or whose process died.
+        As of `service.bulk.evaluate`.
     """
-    count = cores() if workers is None else workers
-    # one that is searched for, or scattered, is many already
-    most = TOGETHER if seat == "rest" and not robust else 1
+
+    def __init__(
+        self,
+        rock: Mesh,
+        surface: str,
+        hand: ParameterTable,
+        *,
+        seat: Literal["rest", "best"] = "rest",
+        on: str | Client = "processes",
+        workers: int | None = None,
+    ) -> None:
+        self._seat = seat
+        make = partial(_trying, rock, surface, hand, seat)
+        self._pool = pool_on(on, workers, Setting(versions=own_versions(), make=make))
+
+    def __enter__(self) -> Self:
+        self._pool.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._pool.__exit__(*error)
+
+    def each(self, trials: Sequence[Trial], *, robust: bool = False) -> Found:
+        """Yield each place's index, and what a hand holds there, batch by batch.
+
+        Parameters
+        ----------
+        trials : sequence of Trial
+        robust : bool, optional
+            As of `hand_models.fixed_wrist.try_holds`.
+
+        Yields
+        ------
+        index : int
+        found : FoundHold or InvalidInputError
+            An error in place of a hand that cannot be there, or whose process died.
+        """
+        # one that is searched for, or scattered, is many already
+        most = TOGETHER if self._seat == "rest" and not robust else 1
+        batches = _batches(trials, most, self._pool.width)
+        payloads = (pickle.dumps(([trials[i] for i in batch], robust)) for batch in batches)
+        for batch, answer in zip(batches, answered(payloads, self._pool, FORM), strict=True):
+            yield from zip(batch, _outcomes(answer, len(batch)), strict=True)
+
+
+def _batches(trials: Sequence[Trial], most: int, width: int) -> list[list[int]]:
+    """Return the indices of trials in batches, as many for each process."""
     # what hands at one place have alike is found once
     places = [list(of) for _, of in groupby(range(len(trials)), lambda i: trials[i][:3])]
-    # as many for each process
-    rounds = max(math.ceil(len(trials) / (most * count)), 1)
-    size = max(math.ceil(len(places) / (rounds * count)), 1)
+    rounds = max(math.ceil(len(trials) / (most * width)), 1)
+    size = max(math.ceil(len(places) / (rounds * width)), 1)
     # each all over the rock, so that what is broken off has been everywhere
     step = math.ceil(len(places) / size)
-    chunks = [[i for place in places[k::step] for i in place] for k in range(step)]
-    parts = [[trials[i] for i in chunk] for chunk in chunks]
-    make = partial(_trying, rock, surface, hand, seat, robust)
-    with Workers(make, min(count, len(chunks)) - 1) as others:
-        for k, results in others.each(parts, make()):
-            if isinstance(results, Lost):
-                results = [InvalidInputError(results.reason) for _ in chunks[k]]
-            yield from zip(chunks[k], results, strict=True)
+    return [[i for place in places[k::step] for i in place] for k in range(step)]
+
+
+def _outcomes(answer: Answer, count: int) -> list[Any]:
+    """Return what has come of so many trials; errors where they are lost."""
+    if not answer.good:
+        error = FORM.decode(answer.payload, ErrorReply).error
+        return [InvalidInputError(error.message)] * count
+    found: list[Any] = pickle.loads(answer.payload)
+    return found
 
 
 def _trying(
-    rock: Mesh, surface: str, numbers: ParameterTable, seat: Literal["rest", "best"], robust: bool
-) -> Callable[[Sequence[Trial]], Found]:
-    """Return what tries a few places; called once in each process."""
+    rock: Mesh, surface: str, numbers: ParameterTable, seat: Literal["rest", "best"]
+) -> Callable[[bytes], Answer]:
+    """Return what tries a batch of places; called once in each process."""
     from hand_models.fixed_wrist import try_holds
     from hand_models.hand import spiny_hand
     from hand_models.tile import Surface
 
-    hand = spiny_hand(numbers)
-    return partial(try_holds, hand, rock, Surface.named(surface), seat=seat, robust=robust)
+    hand, surface_there = spiny_hand(numbers), Surface.named(surface)
+
+    def answer(payload: bytes) -> Answer:
+        start = time.perf_counter()
+        trials, robust = pickle.loads(payload)
+        found = try_holds(hand, rock, surface_there, trials, seat=seat, robust=robust)
+        return Answer(pickle.dumps(found), PICKLED, seconds=time.perf_counter() - start)
+
+    return answer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from multiprocessing.connection import Connection
 from typing import Final
@@ -14,6 +15,8 @@ from service.wire import Answer
 
 __all__ = ["Crew"]
 
+log = logging.getLogger(__name__)
+
 GRACE: Final = 0.5
 """How long beyond its deadline a process may take to say that it is over [s]."""
 
@@ -21,7 +24,8 @@ HANGS: Final = 30.0
 """The same of the process that has the streams: with it, they are lost [s]."""
 
 RESTING: Final = 1.0
-"""How long no process is started after one that did not live to be ready; doubled each time [s]."""
+"""How long no process is started after one that could not be, or did not live to be ready; doubled
+each time [s]."""
 
 LONGEST_REST: Final = 30.0
 """The longest such time [s]."""
@@ -58,7 +62,7 @@ class Crew:
     rests_until : float
         When processes are started again, on the clock of `time.perf_counter`.
     stillborn : int
-        Processes in a row that died before they were ready.
+        Processes in a row that could not be started, or died before they were ready.
     """
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
@@ -85,14 +89,25 @@ class Crew:
         return self._streams in ready and len(ready) > 1
 
     def hire(self) -> None:
-        """Start the processes that are missing."""
+        """Start the processes that are missing; rest where the system refuses one."""
         if time.perf_counter() < self.rests_until:
             return
-        if self._streams is None:
-            self._streams = self._station(STREAMS_LANES)
-            self.work |= dict.fromkeys(self._streams.lanes)
-        for _ in range(1 + self.workers - len(self.stations)):
-            self.work |= dict.fromkeys(self._station(1).lanes)
+        try:
+            if self._streams is None:
+                self._streams = self._station(STREAMS_LANES)
+                self.work |= dict.fromkeys(self._streams.lanes)
+            for _ in range(1 + self.workers - len(self.stations)):
+                self.work |= dict.fromkeys(self._station(1).lanes)
+        except OSError as error:
+            rest = self._rest()
+            log.warning("no process can be started, again in %g s: %s", rest, error)
+
+    def _rest(self) -> float:
+        """Start none for a while, longer each time, and return how long [s]."""
+        rest = min(RESTING * 2.0**self.stillborn, LONGEST_REST)
+        self.rests_until = time.perf_counter() + rest
+        self.stillborn += 1
+        return rest
 
     def _station(self, lanes: int) -> Station[Job, Answer]:
         # what ends the service is for it to answer
@@ -150,9 +165,7 @@ class Crew:
         if station.ready:
             self.stillborn = 0
         else:
-            rest = min(RESTING * 2.0**self.stillborn, LONGEST_REST)
-            self.rests_until = time.perf_counter() + rest
-            self.stillborn += 1
+            self._rest()
         left = [each for each in asked if each is not None and not each.replied]
         return _ending(station.kill(LAST_MOMENT if dead else 0.0)), left
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 from collections import Counter
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from hand_models.base import CruxError
 from planner.processes.child_processes import THREADS
 from planner.processes.workers import NO_GUARD, Lost, Workers
 from tests.suite.helpers import workshop
@@ -123,6 +125,21 @@ def test_the_guard_of_a_program_is_named_only_where_that_may_be_it(monkeypatch, 
         found = done(workers, [1, 2])
     reason = f"processes do not start: a worker ended with status 1{NO_GUARD}"
     assert {result.reason for result in found.values()} == {reason}
+    assert caplog.messages == [reason]
+
+
+def test_what_the_system_does_not_start_is_told_in_a_line(monkeypatch, caplog):
+    def refused(*_, **__):
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr("planner.processes.workers.Station", refused)
+    reason = "processes do not start: Resource temporarily unavailable"
+    with Workers(workshop.naps, 2) as workers:
+        found = done(workers, [1, 2])
+        assert {result.reason for result in found.values()} == {reason}
+        workers.put(0, 1)
+        with pytest.raises(CruxError, match=reason):
+            workers.collect()
     assert caplog.messages == [reason]
 
 

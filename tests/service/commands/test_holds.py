@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from hand_models.base import CruxError
 from service import processes
 from service.commands.cli import run
 from service.processes import Interrupted
@@ -83,15 +84,15 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
     rock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     output = tmp_path / "holds.json"
-    real = processes.try_everywhere
+    real = processes.HoldTrials.each
 
-    def broken(*given: object, workers: int | None, **more: object) -> Iterator:
-        for done, each in enumerate(real(*given, workers=1, **more)):
+    def broken(self: processes.HoldTrials, trials: list, **more: object) -> Iterator:
+        for done, each in enumerate(real(self, trials, **more)):
             if done == 8:
                 raise Interrupted
             yield each
 
-    monkeypatch.setattr(processes, "try_everywhere", broken)
+    monkeypatch.setattr(processes.HoldTrials, "each", broken)
     with pytest.raises(Interrupted, match="8 of 16 places were tried, 0 of the best scattered; "):
         run(["holds", str(rock), "-o", str(output), *COARSE])
     told = json.loads(output.read_text(encoding="utf-8"))
@@ -99,6 +100,39 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
     reaches = [hold["support"]["-fz"] for hold in told["holds"]]
     assert reaches
     assert reaches == sorted(reaches, reverse=True)
+
+
+@pytest.mark.parametrize("more", [["--workers", "2"], ["--dask", "local", "--workers", "2"]])
+def test_holds_are_the_same_wherever_hands_are_tried(
+    more: list[str], rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if "--dask" in more:
+        pytest.importorskip("distributed")
+    found = []
+    for where in (["--workers", "1"], more):
+        output = tmp_path / f"{len(found)}.json"
+        options = ["-o", str(output), *COARSE, "--robust", "2", "--json", *where]
+        assert run(["holds", str(rock), *options]) == DONE
+        assert capfd.readouterr().err == ""
+        found.append(output.read_bytes())
+    assert found[0] == found[1]
+
+
+def test_what_was_tried_is_kept_when_the_cluster_is_gone(
+    rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = tmp_path / "holds.json"
+    real = processes.HoldTrials.each
+
+    def broken(self: processes.HoldTrials, trials: list, **more: object) -> Iterator:
+        yield next(real(self, trials, **more))
+        raise CruxError("the Dask scheduler is gone")
+
+    monkeypatch.setattr(processes.HoldTrials, "each", broken)
+    assert run(["holds", str(rock), "-o", str(output), *COARSE, "--workers", "1"]) == FAILED
+    kept = "1 of 16 places were tried, 0 of the best scattered; what they hold is in"
+    assert f"the Dask scheduler is gone; {kept}" in complaint(capfd)
+    assert json.loads(output.read_text(encoding="utf-8"))["tried"] == 1
 
 
 @watched

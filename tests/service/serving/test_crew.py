@@ -1,0 +1,94 @@
+"""When a service's processes are started again after what did not start."""
+
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import pytest
+
+from service.serving import PlanService, crew, open_session, zenoh_config
+from service.serving.crew import LONGEST_REST, RESTING, Crew
+from service.serving.dispatcher import STILLBORN
+from service.wire import LostError
+from tests.suite.helpers.odd_answers import obedient
+
+MEMORY = 2**31
+
+
+class Clock(SimpleNamespace):
+    """Stands for `time`."""
+
+    now = 1000.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+@contextmanager
+def no_file_more() -> Iterator[None]:
+    """Let this process open nothing, as where it has all that it may."""
+    following = os.dup(0)
+    os.close(following)
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (following, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
+def test_the_rest_grows_while_no_process_can_be_started(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(crew, "time", clock)
+    found = Crew(obedient, 1, MEMORY)
+    rests = []
+    with no_file_more():
+        for _ in range(8):
+            clock.now = max(clock.now, found.rests_until)
+            found.hire()
+            rests.append(found.rests_until - clock.now)
+            # nothing is tried before that is over
+            found.hire()
+            assert found.stillborn == len(rests)
+    assert rests == [min(RESTING * 2.0**i, LONGEST_REST) for i in range(8)]
+    assert rests[0] < rests[-1] == LONGEST_REST
+    assert len(caplog.messages) == 8
+    assert caplog.messages[1] == (
+        "no process can be started, again in 2 s: [Errno 24] Too many open files"
+    )
+    assert not found.work
+    # as soon as it can be, all are there
+    clock.now = found.rests_until
+    found.hire()
+    try:
+        assert len(found.stations) == 2
+    finally:
+        found.end()
+
+
+def test_a_service_for_which_no_process_can_be_started_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried = []
+
+    def refused(*_: object, **__: object) -> None:
+        tried.append(1)
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(crew, "Station", refused)
+    monkeypatch.setattr(crew, "RESTING", 0.05)
+    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with (
+        open_session(config) as session,
+        pytest.raises(LostError, match="do not live to be ready"),
+        PlanService(session, make=obedient),
+    ):
+        pass
+    # each after a rest, the last perhaps while the start is given up; not at each of its turns
+    assert STILLBORN <= len(tried) < 2 * STILLBORN
