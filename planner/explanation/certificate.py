@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
-import scipy
 
 from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
@@ -157,12 +156,13 @@ def _system(
         for limb, mine in zip(limbs, held, strict=True)
         for row in np.flatnonzero(np.abs(mine).any(axis=1))
     }
+    rows, balance = data.rows, len(data.wrench)
     return HardRowSystem(
-        G=np.hstack([hand.G for hand in data.hands]),
+        G=rows.whole[:balance],
         g=np.asarray(sum(hand.g for hand in data.hands)),
         wrench=data.wrench,
-        H=scipy.linalg.block_diag(*(hand.H for hand in data.hands)),
-        h=np.concatenate([hand.h for hand in data.hands]),
+        H=rows.whole[balance + rows.limits :],
+        h=rows.rest[rows.limits :],
         names=tuple(
             limit_name(limb, row)
             for limb, space in zip(limbs, spaces, strict=True)

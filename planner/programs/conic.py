@@ -19,7 +19,6 @@ from typing import Any, Final, NamedTuple
 
 import clarabel
 import numpy as np
-import scipy
 
 from hand_models.base import Array
 from planner import deadline
@@ -139,12 +138,12 @@ class Solver:
         self.pattern = Pattern.of(program)
         self._numbers = _numbers(program)
         rows, columns = len(program.b), len(program.q)
-        A = scipy.sparse.csc_matrix(Columns.beside(program.A), shape=(rows, columns))
+        A = _Matrix.of(Columns.beside(program.A), rows)
         # a program without a quadratic term begins elsewhere
         diagonal = np.arange(columns + 1)
-        P = scipy.sparse.csc_matrix((columns, columns))
-        if self.pattern.quadratic:
-            P = scipy.sparse.csc_matrix((program.P, diagonal[:-1], diagonal), shape=P.shape)
+        P = Columns(program.P, diagonal[:-1], diagonal)
+        if not self.pattern.quadratic:
+            P = Columns(P.values[:0], P.rows[:0], np.zeros_like(P.starts))
         between = rows - program.zero - program.second_order
         cones = [clarabel.ZeroConeT(program.zero), clarabel.NonnegativeConeT(between)]
         if program.second_order:
@@ -153,7 +152,9 @@ class Solver:
         chosen.verbose = False
         for name, value in settings.items():
             setattr(chosen, name, value)
-        self._solver = clarabel.DefaultSolver(P, program.q, A, program.b, cones, chosen)
+        self._solver = clarabel.DefaultSolver(
+            _Matrix.of(P, columns), program.q, A, program.b, cones, chosen
+        )
 
     def update(self, program: ConicProgram) -> None:
         """Take over a program of the pattern."""
@@ -191,6 +192,25 @@ class Solver:
         if caught:
             raise caught[0]
         return _read(raw)
+
+
+class _Matrix(NamedTuple):
+    """A matrix in compressed columns, by the names of SciPy's, which the solver reads.
+
+    It is passed as lists, which are read faster than arrays; of SciPy a plan needs nothing else.
+    """
+
+    data: list[float]
+    indices: list[int]
+    indptr: list[int]
+    shape: tuple[int, int]
+    has_canonical_format: bool = True
+
+    @classmethod
+    def of(cls, columns: Columns, height: int) -> _Matrix:
+        """Return columns of so many rows."""
+        values, rows, starts = (part.tolist() for part in columns)
+        return cls(values, rows, starts, (height, len(starts) - 1))
 
 
 class Solvers:

@@ -26,7 +26,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from hand_models.base import Array
 from planner.programs import Outcome, StanceData, parted, tie_weight
@@ -190,10 +189,12 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point:
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     S = scale[:, None] * S * scale
     S.flat[:: len(S) + 1] += SOFT
-    factor, failed = scipy.linalg.lapack.dpotrf(S, lower=1)
-    if failed:
-        raise _ApartError
-    across = scipy.linalg.lapack.dpotrs(factor, d * scale, lower=1)[0] * scale
+    try:
+        # S⁻¹ = rootᵀ root
+        root = np.linalg.inv(np.linalg.cholesky(S)) * scale
+    except np.linalg.LinAlgError:
+        raise _ApartError from None
+    across = (root @ d) @ root
     stiffness = float(d @ across)
     if not stiffness > 0.0:
         raise _ApartError
@@ -203,7 +204,7 @@ def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point:
             whole = np.zeros(len(active))
             whole[active] = multipliers
             return _Point(z, u, whole)
-        step = scipy.linalg.lapack.dpotrs(factor, (flexible @ r1 - r2) * scale, lower=1)[0] * scale
+        step = (root @ (flexible @ r1 - r2)) @ root
         rise = (float(d @ step) - r3) / stiffness
         step -= rise * across
         z, u, multipliers = z + (r1 - step @ C) / Q, u + rise, multipliers + step
