@@ -19,7 +19,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, BoundedStore, Indices
 from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
 from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
@@ -35,6 +35,9 @@ WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wri
 
 PALM_ROWS: Final = 1e5
 """Newtons per metre by which rows of the palm's travel are made commensurate."""
+
+KEPT: Final = 16
+"""Poses whose loads are kept: some more than a search comes back to."""
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
 """How a palm carries: not at all, by moving toward −x, into the rock, or both."""
@@ -68,6 +71,11 @@ class FloatingWrist(CompliantGrasp):
     palm: PalmMode = "off"
 
     columns = WRIST
+
+    @cached_property
+    def _kept(self) -> BoundedStore[bytes, HandLoads]:
+        """Loads at the complex steps from poses, by the poses."""
+        return BoundedStore("linearised wrists", KEPT)
 
     @cached_property
     def layout(self) -> RowLayout:
@@ -188,15 +196,41 @@ class FloatingWrist(CompliantGrasp):
             Columns `WRIST`; rows as of a fixed wrist, with hard rows that keep the palm's way of
             carrying, and the wrist within its range.
         """
-        at, palm = self._pose(twist), palm or self.palm
+        return self.linearised_each(self._pose(twist)[None], palm, within)[0]
+
+    def linearised_each(
+        self, twists: Array, palm: PalmMode | None = None, within: ArrayLike | None = None
+    ) -> list[WrenchSpace]:
+        """Return the sets linearised at wrist poses of shape (k, 6), as `linearised` has each.
+
+        Their loads are found at once. Those of the poses that were asked for last are kept: other
+        ways of the palm and other ranges change nothing about them.
+        """
+        palm = palm or self.palm
         carries = next(np.array(ways) for ways, mode in PALM_MODES.items() if mode == palm)
-        steps = complex_steps(at)
-        free, stiffness = self.hand.palm_loads(steps), self.hand.palm_stiffness
-        loads = self.hand.loads(steps)._replace(palm=free * carries)
-        H, h = np.zeros((0, 6)), np.zeros(0)
-        if self.hand.settled.palm.engaged:
-            # a palm that carries moves against the rock; one that does not, away from it
-            signs = np.where(carries, -PALM_ROWS, PALM_ROWS)
-            slope = slopes(free) / stiffness[:, None]
-            H, h = signs[:, None] * slope, signs * (slope @ at - free[0].real / stiffness)
-        return self._about(at, self._grasp_loads(loads), H, h, within)
+        found = []
+        for at, loads in zip(twists, self._stepped(twists), strict=True):
+            steps = complex_steps(at)
+            free, stiffness = self.hand.palm_loads(steps), self.hand.palm_stiffness
+            H, h = np.zeros((0, 6)), np.zeros(0)
+            if self.hand.settled.palm.engaged:
+                # a palm that carries moves against the rock; one that does not, away from it
+                signs = np.where(carries, -PALM_ROWS, PALM_ROWS)
+                slope = slopes(free) / stiffness[:, None]
+                H, h = signs[:, None] * slope, signs * (slope @ at - free[0].real / stiffness)
+            carried = self._grasp_loads(loads._replace(palm=free * carries))
+            found.append(self._about(at, carried, H, h, within))
+        return found
+
+    def _stepped(self, twists: Array) -> list[HandLoads]:
+        """Return the loads at the complex steps from each of some poses."""
+        keys = [at.tobytes() for at in twists]
+        known = dict(zip(keys, self._kept.find(keys), strict=True))
+        new = [at for at, key in zip(twists, keys, strict=True) if known[key] is None]
+        if new:
+            parts = self.hand.loads(np.concatenate([complex_steps(at) for at in new]))
+            each = [np.split(part, len(new)) for part in parts]
+            made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(new, *each, strict=True)]
+            self._kept.keep(made)
+            known.update(made)
+        return [loads for key in keys if (loads := known[key]) is not None]

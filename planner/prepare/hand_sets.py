@@ -37,7 +37,6 @@ __all__ = [
     "LinearisationPoint",
     "Sets",
     "are_own",
-    "slopes_of",
     "widest_at_rest",
 ]
 
@@ -222,11 +221,15 @@ class HandSets:
                 space = wrist.linearised(y, palm, reach)
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
-                spaces[i] = self.added[i].on(space)
-                part = HandData.of(spaces[i], self.transports[i], self.held[i])
-                # where a wrist is costs nothing by itself
-                data[i] = part._replace(rest=np.zeros(len(part.rest)))
+                spaces[i], data[i] = self._floating_hand(i, space)
         return Sets(tuple(spaces), StanceData(tuple(data), self.goal(point.factor)))
+
+    def _floating_hand(self, i: int, space: WrenchSpace) -> tuple[WrenchSpace, HandData]:
+        """Return the set of a floating hand with what the stance adds, and its data."""
+        whole = self.added[i].on(space)
+        part = HandData.of(whole, self.transports[i], self.held[i])
+        # where a wrist is costs nothing by itself
+        return whole, part._replace(rest=np.zeros(len(part.rest)))
 
     def goal(self, factor: float) -> Array:
         """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
@@ -246,19 +249,21 @@ class HandSets:
         ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
         of the rows of effort are none by default.
         """
-        slopes = slopes_of(self.sets(point, within), duals, efforts)
-        bent = [np.zeros((len(slope), len(slope))) for slope in slopes]
-        for j, unit in enumerate(TWIST_UNIT):
-            aside = replace(
-                point,
-                loads=tuple(
-                    y if wrist is None else y + DIFFERENCE * unit * (np.arange(len(y)) == j)
-                    for wrist, y in zip(self.wrists, point.loads, strict=True)
-                ),
-            )
-            for i, slope in enumerate(slopes_of(self.sets(aside, within), duals, efforts)):
-                if self.wrists[i] is not None:
-                    bent[i][j] = (slope - slopes[i]) / DIFFERENCE
+        balance, aside = duals.balance_dual, DIFFERENCE * np.diag(TWIST_UNIT)
+        assert balance is not None
+        bent = []
+        for i, (wrist, y) in enumerate(zip(self.wrists, point.loads, strict=True)):
+            slopes = np.zeros((1 + len(y), len(y)))
+            if wrist is not None:
+                limit, hard = duals.limit_duals[i], duals.hard_duals[i]
+                at = np.vstack([y, y + aside])
+                each = wrist.linearised_each(at, point.palms[i], within * TWIST_UNIT)
+                for j, space in enumerate(each):
+                    hand = self._floating_hand(i, space)[1]
+                    slopes[j] = hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance
+                    if efforts is not None:
+                        slopes[j] += hand.E.T @ efforts[i]
+            bent.append((slopes[1:] - slopes[0]) / DIFFERENCE)
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: LinearisationPoint) -> bool:
@@ -286,20 +291,6 @@ def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
     # rows of a range are ±ξ over its half width, in each component
     most = np.abs(space.H) @ farthest
     return replace(space, h=np.where(ranges, np.minimum(space.h, most), space.h))
-
-
-def slopes_of(sets: Sets, duals: Outcome, efforts: Sequence[Array] | None = None) -> list[Array]:
-    """Return Lᵀλ + Hᵀμ + Gᵀν + Eᵀε of each hand, shape (m,)."""
-    balance = duals.balance_dual
-    assert balance is not None
-    hands = sets.data.hands
-    weights = [np.zeros(len(hand.e0)) for hand in hands] if efforts is None else efforts
-    return [
-        hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance + hand.E.T @ effort
-        for hand, limit, hard, effort in zip(
-            hands, duals.limit_duals, duals.hard_duals, weights, strict=True
-        )
-    ]
 
 
 def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
