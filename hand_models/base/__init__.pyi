@@ -16,6 +16,7 @@ from .frames import (
     Pose as Pose,
     finite_vector as finite_vector,
     skew as skew,
+    turns_about as turns_about,
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
