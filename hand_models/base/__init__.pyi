@@ -1,4 +1,4 @@
-from .bounded_store import BoundedStore as BoundedStore, stores as stores
+from .bounded_store import BoundedStore as BoundedStore, stored as stored, stores as stores
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
@@ -16,6 +16,7 @@ from .frames import (
     Pose as Pose,
     finite_vector as finite_vector,
     skew as skew,
+    turns_about as turns_about,
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )

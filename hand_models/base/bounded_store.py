@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Sequence
+from functools import partial, wraps
 from threading import Lock
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 from weakref import WeakSet
 
-__all__ = ["BoundedStore", "StoreInfo", "stores"]
+__all__ = ["BoundedStore", "StoreInfo", "stored", "stores"]
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
+P = ParamSpec("P")
 
 
 class StoreInfo(NamedTuple):
@@ -124,3 +126,19 @@ class BoundedStore(Generic[K, V]):
 
     def _too_large(self) -> bool:
         return self._size is not None and self._size(self._answers.values()) > self._largest
+
+
+def stored(name: str, most: int) -> Callable[[Callable[P, V]], Callable[P, V]]:
+    """Keep a function's last answers, by its arguments, in a store of this name that it owns."""
+
+    def owning(function: Callable[P, V]) -> Callable[P, V]:
+        answers: BoundedStore[Hashable, V] = BoundedStore(name, most)
+
+        @wraps(function)
+        def asked(*args: P.args, **kwargs: P.kwargs) -> V:
+            question = args, frozenset(kwargs.items())
+            return answers.get(question, partial(function, *args, **kwargs))
+
+        return asked
+
+    return owning

@@ -20,7 +20,9 @@ __all__ = [
     "Array",
     "Indices",
     "Pose",
+    "finite_vector",
     "skew",
+    "turns_about",
     "wrench_transport",
     "wrench_transports",
 ]
@@ -56,6 +58,13 @@ def skew(v: ArrayLike) -> Array:
     """Return the matrix ``[v]×`` of shape (3, 3), so that ``[v]× w`` is the cross product."""
     x, y, z = np.asarray(v, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def turns_about(vectors: ArrayLike) -> Array:
+    """Return the rotations about vectors (..., 3) by their lengths [rad], shape (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(np.asarray(vectors, dtype=float)).as_matrix())
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,9 @@ import math
 from typing import Final, Literal, get_args
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import InvalidInputError, Pose, finite_vector
+from hand_models.base import InvalidInputError, Pose, finite_vector, turns_about
 from hand_models.fixed_wrist.seat_search import BEST, PULL_OFF, best_seats
 from hand_models.hand import Grasp, Placement, SettledHand, SpinyHand, spiny_hand
 from hand_models.rock import Hold
@@ -68,9 +67,7 @@ def approach_frame(
         )
     y = across / np.linalg.norm(across)
     axes = np.column_stack([np.cross(y, z), y, z])
-    turn = scipy.spatial.transform.Rotation.from_rotvec(
-        [0.0, 0.0, math.remainder(wrist_angle, math.tau)]
-    ).as_matrix()
+    turn = turns_about([0.0, 0.0, math.remainder(wrist_angle, math.tau)])
     return Pose(finite_vector(point, 3, "point"), axes @ turn)
 
 

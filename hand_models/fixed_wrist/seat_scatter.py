@@ -6,10 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on
+from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on, turns_about
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -134,11 +133,7 @@ def scattered_hands(
                 each.hold,
                 each.surface,
                 each.grasp,
-                Pose(
-                    position * by[:3],
-                    scipy.spatial.transform.Rotation.from_rotvec(angle * by[3:]).as_matrix(),
-                ).inverse()
-                @ each.seating.pose,
+                Pose(position * by[:3], turns_about(angle * by[3:])).inverse() @ each.seating.pose,
             )
             for one in drawn[start : start + step]
             for each, by in zip(settled, one, strict=True)

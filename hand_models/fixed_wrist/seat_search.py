@@ -19,7 +19,6 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from hand_models.base import (
@@ -29,6 +28,7 @@ from hand_models.base import (
     Pose,
     finite_vector,
     go_on,
+    turns_about,
 )
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand, seated
@@ -64,13 +64,9 @@ class _Move(NamedTuple):
 
     def of(self, hand: SpinyHand) -> Pose:
         """Return the frame of a hand that has moved, in that where it was seated."""
-        about = [hand.seat_tilt * self.tilt[0], hand.seat_tilt * self.tilt[1]]
-        tilted = scipy.spatial.transform.Rotation.from_rotvec([*about, 0.0])
-        turned = scipy.spatial.transform.Rotation.from_rotvec(
-            [0.0, 0.0, hand.seat_turn * self.turn]
-        )
-        position = np.array([0.0, 0.0, -hand.back_off * self.off])
-        return Pose(position, (turned * tilted).as_matrix())
+        tilted = turns_about([hand.seat_tilt * self.tilt[0], hand.seat_tilt * self.tilt[1], 0.0])
+        turned = turns_about([0.0, 0.0, hand.seat_turn * self.turn])
+        return Pose(np.array([0.0, 0.0, -hand.back_off * self.off]), turned @ tilted)
 
 
 FIRST: Final = tuple(itertools.starmap(_Move, itertools.product(OFFS, TURNS)))

@@ -13,12 +13,12 @@ reaction, but no normal load (``assumed``).
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, Pose
+from hand_models.base import BoundedStore, InvalidInputError, Pose
 from hand_models.finger import FingerModel, Fingernail, SequentialClosure
 from hand_models.hand.finger_frames import OUTER, FingerFrame, FrameStack
 from hand_models.hand.grasp import Grasp
@@ -30,9 +30,6 @@ from hand_models.sections import Section
 from hand_models.tendon import PalmTendon, TendonDrive, shear_capacity
 
 __all__ = ["HandModel"]
-
-SHARES: Final = 512
-"""Choices of palm tiles, and of what one holds, whose shares are kept."""
 
 ROTATIONS: Final = 64
 """Choices of outer rotations for which frames are kept, those used last."""
@@ -57,8 +54,9 @@ class HandModel:
     def __init__(self, table: ParameterTable | None = None) -> None:
         self.table = table = table or hand_table()
         self._hash = hash(table)
-        self.frame_stack = lru_cache(maxsize=ROTATIONS)(self._frame_stack)
-        self.palm_share = lru_cache(maxsize=SHARES)(self._palm_share)
+        self._frames: BoundedStore[tuple[float, ...], FrameStack] = BoundedStore(
+            "frames of fingers", ROTATIONS
+        )
         self.finger = FingerModel.from_table(table)
         self.drive = TendonDrive.from_table(table)
         self.structure = Structure.from_table(table)
@@ -145,8 +143,11 @@ class HandModel:
         """Return the four fingers' frames in H, in the order of `FINGERS`."""
         return self.frame_stack((outer_rotation,)).hands[0]
 
-    def _frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
+    def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
         """Return the frames of hands whose outer fingers are turned outward by these angles."""
+        return self._frames.get(outer_rotations, partial(self._frame_stack, outer_rotations))
+
+    def _frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
         outer = np.array([[name.startswith("outer")] for name in FINGERS])
         side = np.array([[1.0 if name.endswith("left") else -1.0] for name in FINGERS])
         mirror = np.insert(np.ones((len(FINGERS), 2)), [1], side, axis=1)
@@ -159,7 +160,7 @@ class HandModel:
         bases[..., 2] = self.base_tile_surface
         return FrameStack.of(joints, alongs, bases, self.palm_tiles)
 
-    def _palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
+    def palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
         """Return what shear palm tiles share of which one holds ``tile_limit`` [N]."""
         stiffness = tuple([self.palm_contact[i] for i in engaged])
         friction = self.palm_friction, tile_limit, self.palm_own_friction

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import BoundedStore, InvalidInputError, Pose
+from hand_models.base import BoundedStore, InvalidInputError, Pose, stored
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.placement import Placement, PlacementKey
@@ -227,5 +226,5 @@ def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
     return _built(table or hand_table())
 
 
-_built = lru_cache(maxsize=32)(SpinyHand)
+_built = stored("hands", 32)(SpinyHand)
 """Hands by their tables, those asked for last."""

@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import scipy
 
-from hand_models.base import Array, InvalidInputError, within
+from hand_models.base import Array, InvalidInputError, stored, within
 from hand_models.parameters.own import own_hand, own_surfaces
 from hand_models.parameters.tables import (
     ParameterTable,
@@ -105,7 +104,7 @@ def _check(draw: Draw, hand: ParameterTable | None) -> None:
         own_surfaces(draw.surfaces)
 
 
-@lru_cache(maxsize=8)
+@stored("draws", 8)
 def bundled_draws(hand: ParameterTable | None = None) -> tuple[Draw, ...]:
     """Return the draws of ``draws.toml``, one for each of its sets.
 

@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, Pose, turns_about
 from planner import programs
 from planner.advice.changes import Change, pose_message
 from planner.advice.trials import WORSE, Trials, direction
@@ -94,9 +94,7 @@ class _Tilt(NamedTuple):
 
     @property
     def turn(self) -> Array:
-        return scipy.spatial.transform.Rotation.from_rotvec(
-            self.angle * np.eye(3)[self.axis]
-        ).as_matrix()
+        return turns_about(self.angle * np.eye(3)[self.axis])
 
 
 class BodySearch:

@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-import scipy
 
-from hand_models.base import InvalidInputError, Pose
+from hand_models.base import InvalidInputError, Pose, turns_about
 from hand_models.hand import Grasp
 from planner.advice.changes import Change, hand_path, joined, pose_message
 from planner.prepare import PreparedStance, settle_each
@@ -165,10 +164,7 @@ def placed(
     """Yield one hand moved along x and y of its palm [m], and turned about z [rad]."""
     hand = prepared.question.stance.hands[index]
     for x, y, turn in motions:
-        motion = Pose(
-            np.array([x, y, 0.0]),
-            scipy.spatial.transform.Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix(),
-        )
+        motion = Pose(np.array([x, y, 0.0]), turns_about([0.0, 0.0, turn]))
         changes = _moved(prepared, index, hand.pose @ motion)
         if changes is None:
             return

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import scipy
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, Pose, turns_about
 from planner.advice.changes import Change, hand_path, pose_message
 from planner.advice.hands import GRASPS, HAND, fingers, unseated
 from planner.advice.trials import Trials, Tried
@@ -125,7 +124,7 @@ class NewHold:
         """Return the limb holding at a place as another hand does, but for its turn and grasp."""
         stance, new = self.prepared.question.stance, self.index
         hand = stance.hands[hold.like]
-        motion = scipy.spatial.transform.Rotation.from_rotvec([0.0, 0.0, hold.turn]).as_matrix()
+        motion = turns_about([0.0, 0.0, hold.turn])
         changes: dict[str, Any] = {
             hand_path(new): hand_path(hold.like),
             hand_path(new, "limb"): self.limb,

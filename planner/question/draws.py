@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, within
+from hand_models.base import Array, stored, within
 from hand_models.hand import HandModel
 from hand_models.parameters import (
     Draw,
@@ -52,7 +51,7 @@ class DrawnHand(NamedTuple):
         return replace(Surface.named(usual.name, self.surfaces), half_planes=planes)
 
 
-@lru_cache(maxsize=KEPT)
+@stored("hands of draws", KEPT)
 def drawn_hands(hand: HandModel, draws: tuple[Draw, ...] | None = None) -> tuple[DrawnHand, ...]:
     """Return what draws make of a hand.
 
@@ -110,7 +109,7 @@ def drawn_quantities(
     }
 
 
-@lru_cache(maxsize=KEPT)
+@stored("numbers that draws change", KEPT)
 def _differing(hand: HandModel, draws: tuple[Draw, ...] | None) -> dict[tuple[str, str], Array]:
     """Return all numbers in which draws differ, by section and entry."""
     drawn = drawn_hands(hand, draws)

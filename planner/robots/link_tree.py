@@ -12,9 +12,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, Pose, turns_about
 from planner.robots.robot import Robot
 from planner.robots.urdf import parse_urdf
 
@@ -69,9 +68,7 @@ class LinkTree:
         where = {**self.robot.locked, **angles}
         moved = np.array([where.get(joint.name, 0.0) * joint.axis for joint in self._joints])
         slides = np.array([[joint.type == "prismatic"] for joint in self._joints])
-        turns = scipy.spatial.transform.Rotation.from_rotvec(
-            np.where(slides, 0.0, moved)
-        ).as_matrix()
+        turns = turns_about(np.where(slides, 0.0, moved))
         for joint, turn, shift in zip(self._joints, turns, moved * slides, strict=True):
             at = joint.place @ Pose(shift, turn)
             found[joint.child] = found[joint.parent] @ at

@@ -8,13 +8,12 @@ from another of many postures whose hands are near the pose.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, Pose, stored
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.robot import Robot
@@ -140,7 +139,7 @@ def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
     return np.asarray(samples[nearest])
 
 
-@lru_cache(maxsize=32)
+@stored("postures of robots", 32)
 def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
     """Return random angles of every limb, and a tree of where they put its hand."""
     rng = np.random.default_rng(0)

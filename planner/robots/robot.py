@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from hand_models.base import (
     Pose,
     finite_vector,
     in_file,
+    stored,
     wrench_transport,
 )
 from hand_models.hand import SpinyHand, spiny_hand
@@ -275,7 +276,7 @@ def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
     return robot_of(RobotFile.bundled(), hand_numbers)
 
 
-@lru_cache(maxsize=32)
+@stored("robots", 32)
 def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Robot:
     """Return the robot of a file's content, built once.
 

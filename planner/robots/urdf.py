@@ -7,14 +7,13 @@ import re
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from textwrap import shorten
 from typing import Final
 from xml.etree import ElementTree
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, Pose, stored
 
 __all__ = ["JointElement", "Link", "Urdf", "parse_urdf"]
 
@@ -150,7 +149,7 @@ class Urdf:
             raise InvalidInputError(f"unknown link {link!r}; known are {known}")
 
 
-@lru_cache(maxsize=32)
+@stored("links and joints of robots", 32)
 def parse_urdf(text: str) -> Urdf:
     """Read the tree of a URDF, and check its numbers.
 
