@@ -6,6 +6,7 @@ from .errors import (
     LimitError as LimitError,
     SolverError as SolverError,
     UnsupportedError as UnsupportedError,
+    check_positive as check_positive,
     in_file as in_file,
     within as within,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Self
@@ -14,6 +15,7 @@ __all__ = [
     "LimitError",
     "SolverError",
     "UnsupportedError",
+    "check_positive",
     "in_file",
     "within",
 ]
@@ -87,6 +89,13 @@ class SolverError(CruxError):
     """A numerical method that gave no answer which passes its checks."""
 
     kind = "solver"
+
+
+def check_positive(value: float, unit: str, field: str, most: float = sys.float_info.max) -> None:
+    """Refuse a number that is not above 0, or above the most; without that, what is not finite."""
+    if not 0.0 < value <= most:
+        bound = "" if most >= sys.float_info.max else f" and at most {most:g}"
+        raise InvalidInputError(f"must be above 0{bound} {unit}, got {value:g}", field=field)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, check_positive
 from hand_models.compliance.compliant_finger import CompliantFinger, FingerLoads
 from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows
 from hand_models.compliance.rolling import Numbers
@@ -97,14 +97,9 @@ class Gripper(CompliantGrasp):
         table: ParameterTable | None = None,
         most_pressing: float = math.inf,
     ) -> None:
-        if not (math.isfinite(diameter) and diameter > 0.0):
-            raise InvalidInputError(f"must be above 0 m, got {diameter:g}", field="diameter")
-        if not (math.isfinite(tension) and tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="tension")
-        if not most_pressing > 0.0:
-            raise InvalidInputError(
-                f"must be above 0 N, got {most_pressing:g}", field="most_pressing"
-            )
+        check_positive(diameter, "m", "diameter")
+        check_positive(tension, "N", "tension")
+        check_positive(most_pressing, "N", "most_pressing", most=math.inf)
         self.most_pressing = most_pressing
         self.table = table = table or gripper_table()
         self.surface = surface or sandpaper(table)

@@ -15,6 +15,7 @@ from hand_models.base import (
     LimitError,
     Pose,
     Progress,
+    check_positive,
 )
 from hand_models.finger import NONE
 from hand_models.fixed_wrist.placing import UP, approach_frame
@@ -127,8 +128,7 @@ def grid_of_trials(
     """
     if not 1e-3 <= spacing < math.inf:
         raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
-    if not (0.0 < radius < math.inf):
-        raise InvalidInputError(f"must be above 0 m, got {radius:g}", field="radius")
+    check_positive(radius, "m", "radius")
     if angles < 1:
         raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")
     low, high = (end(rock.triangles.vertices, axis=0) for end in (np.min, np.max))

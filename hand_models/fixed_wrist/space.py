@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import check_positive
 from hand_models.fixed_wrist.alike_hands import (
     HELD_ROWS,
     hard_rows,
@@ -73,8 +73,8 @@ def wrench_spaces(
     A hand's sets are kept as long as the hand is, the last `KEPT` of them: asked again, the answer
     is the same set.
     """
-    if tension_limit is not None and tension_limit <= 0.0:
-        raise InvalidInputError(f"must be above 0 N, got {tension_limit:g}", field="tension_limit")
+    if tension_limit is not None:
+        check_positive(tension_limit, "N", "tension_limit", most=math.inf)
     cap = math.inf if tension_limit is None else tension_limit
     limits = [min(hand.hand.maximum_tension, cap) for hand in settled]
     found: dict[SettledHand, WrenchSpace] = {}

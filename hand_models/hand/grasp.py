@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, check_positive
 
 __all__ = ["Grasp"]
 
@@ -43,9 +43,8 @@ class Grasp:
             raise InvalidInputError(
                 f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
             )
-        tension = self.closing_tension
-        if tension is not None and not (math.isfinite(tension) and tension > 0.0):
-            raise InvalidInputError(f"must be above 0 N, got {tension:g}", field="closing_tension")
+        if self.closing_tension is not None:
+            check_positive(self.closing_tension, "N", "closing_tension")
 
     @property
     def pinch(self) -> bool:

@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, Pose, check_positive
 from hand_models.parameters import scan_table
 from hand_models.sections import PARALLEL, Section, Swept, cut_of, entry_distances
 
@@ -117,13 +117,6 @@ class Hold(ABC):
         return None
 
 
-def _positive(value: float, field: str, unit: str = "m") -> None:
-    if not 0.0 < value <= LARGEST:
-        raise InvalidInputError(
-            f"must be above 0 and at most {LARGEST:g} {unit}, got {value:g}", field=field
-        )
-
-
 class SweptHold(Hold):
     """A smooth hold: a ball that is swept along faces."""
 
@@ -175,7 +168,7 @@ class Cylinder(SweptHold):
     shape = "cylinder"
 
     def __post_init__(self) -> None:
-        _positive(self.diameter, "diameter")
+        check_positive(self.diameter, "m", "diameter", LARGEST)
 
     @property
     def swept(self) -> Swept:
@@ -203,7 +196,7 @@ class Edge(SweptHold):
     shape = "edge"
 
     def __post_init__(self) -> None:
-        _positive(self.fillet_radius, "fillet_radius")
+        check_positive(self.fillet_radius, "m", "fillet_radius", LARGEST)
         if not 0.0 < self.angle < math.pi:
             raise InvalidInputError(f"must be in (0, pi) rad, got {self.angle:g}", field="angle")
 
@@ -230,7 +223,7 @@ class Sphere(SweptHold):
     shape = "sphere"
 
     def __post_init__(self) -> None:
-        _positive(self.diameter, "diameter")
+        check_positive(self.diameter, "m", "diameter", LARGEST)
 
     @property
     def swept(self) -> Swept:
@@ -261,7 +254,7 @@ class Ellipsoid(SweptHold):
                 f"three numbers are needed, got {len(self.semi_axes)}", field="semi_axes"
             )
         for i, value in enumerate(self.semi_axes):
-            _positive(value, f"semi_axes[{i}]")
+            check_positive(value, "m", f"semi_axes[{i}]", LARGEST)
 
     @property
     def swept(self) -> Swept:

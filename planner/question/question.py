@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, finite_vector, skew, within
+from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, skew, within
 from hand_models.hand import FINGERS
 from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
@@ -58,8 +58,7 @@ class Load:
         ``f = m (a − g)`` at the centre of mass.
         """
         mass = stance.robot.mass if self.mass is None else self.mass
-        if not (math.isfinite(mass) and mass > 0.0):
-            raise InvalidInputError(f"must be above 0 kg, got {mass:g}", field="mass")
+        check_positive(mass, "kg", "mass")
         com = finite_vector(stance.robot.com if self.com is None else self.com, 3, "com")
         acceleration = finite_vector(self.acceleration, 3, "acceleration")
         if any(self.angular_acceleration):
@@ -147,8 +146,8 @@ class Limits:
             )
         for name in ("tendon_tension", "tension_change"):
             most = getattr(self, name)
-            if most is not None and not (math.isfinite(most) and most > 0.0):
-                raise InvalidInputError(f"must be above 0 N, got {most:g}", field=name)
+            if most is not None:
+                check_positive(most, "N", name)
         torque = self.joint_torque
         if torque is None:
             return
@@ -259,8 +258,8 @@ class Question:
                 field="want",
             )
         object.__setattr__(self, "want", frozenset(self.want))
-        if self.deadline is not None and not 0.0 < self.deadline < math.inf:
-            raise InvalidInputError(f"must be above 0 s, got {self.deadline:g}", field="deadline")
+        if self.deadline is not None:
+            check_positive(self.deadline, "s", "deadline")
         self._check_limits()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}

@@ -21,7 +21,7 @@ from typing import Final, Self
 
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, InvalidInputError, finite_vector
+from hand_models.base import Array, InvalidInputError, check_positive, finite_vector
 from hand_models.hand import FINGERS
 from planner.programs import SLACK
 from planner.question import Question, checked_body_wrench
@@ -67,10 +67,7 @@ class WrenchStream:
     """
 
     def __init__(self, question: Question, *, radius: float = RADIUS) -> None:
-        if not 0.0 < radius <= LARGEST:
-            raise InvalidInputError(
-                f"must be above 0 and at most {LARGEST:g} N, got {radius:g}", field="radius"
-            )
+        check_positive(radius, "N", "radius", LARGEST)
         self.radius = float(radius)
         self.question = question
         self._stance = StreamStance(question)
