@@ -51,7 +51,7 @@ def close_one(*opened, model=MODEL):
 # Everywhere ---------------------------------------------------------------------------------------
 
 
-@given_some(50, 2000, seeds)
+@given_some(20, 2000, seeds)
 @example(235630260)
 def test_wherever_a_finger_closes_it_is_clear_of_rock_whole_and_in_balance(seed):
     on_hold = random_opening(MODEL, seed)
@@ -300,7 +300,7 @@ def assert_alike(one, other, atol=1e-9):
         np.testing.assert_allclose(mine, theirs, atol=100.0 * atol * size)
 
 
-@given_some(8, 30, seeds)
+@given_some(4, 30, seeds)
 def test_fingers_close_together_as_they_do_alone(seed):
     rng = np.random.default_rng(seed)
     closings = random_closings(rng, 5)
@@ -312,7 +312,7 @@ def test_fingers_close_together_as_they_do_alone(seed):
         assert_alike(other, alone)
 
 
-@given_some(15, 40, seeds)
+@given_some(7, 40, seeds)
 def test_what_is_scaled_closes_alike(seed):
     """Lengths by a, forces by b: springs' torques by a b, stiffness of the bed by b / a."""
     rng = np.random.default_rng(seed)
@@ -341,7 +341,7 @@ def test_what_is_scaled_closes_alike(seed):
     np.testing.assert_allclose(b * loads[0], loads[1], atol=1e-4)
 
 
-@given_some(15, 40, seeds)
+@given_some(7, 40, seeds)
 def test_the_same_rock_told_otherwise_is_the_same(seed):
     """A plane with a normal, and a line drawn along it; holds drawn mirrored and seen mirrored."""
     rng = np.random.default_rng(seed)
@@ -358,7 +358,7 @@ def test_the_same_rock_told_otherwise_is_the_same(seed):
         np.testing.assert_allclose(flat.finger.joint_angles, drawn.finger.joint_angles, atol=2e-4)
 
 
-@given_some(25, 60, seeds)
+@given_some(10, 60, seeds)
 def test_a_mirrored_hold_holds_a_mirrored_finger(seed):
     """Seen along −y in a hold that is alike on both sides of its plane y = 0."""
     rng = np.random.default_rng(seed)

@@ -434,7 +434,7 @@ def test_recent_answers_are_those_asked_for_last(most, steps):
 # The bottom-up state of a finger ------------------------------------------------------------------
 
 
-@given_some(17, 50, seeds)
+@given_some(8, 50, seeds)
 def test_a_finger_is_laid_as_on_its_section(seed):
     """On planes of any tilt through smooth holds."""
     rng = np.random.default_rng(seed)

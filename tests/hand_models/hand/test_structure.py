@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
 from hand_models import InvalidInputError
 from hand_models.base import Pose
@@ -14,6 +14,7 @@ from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers.hands import HAND, changed_hand, settled_at
 from tests.suite.helpers.robots import with_hand
+from tests.suite.helpers.shares import given_some
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 
 seeds = st.integers(0, 2**32 - 1)
@@ -68,8 +69,7 @@ def test_pressing_counts_for_nothing_and_both_sides_of_the_hand_are_alike():
         assert gaps.min(axis=1).max() < 1e-12
 
 
-@settings(max_examples=60, deadline=None)
-@given(seeds)
+@given_some(15, 60, seeds)
 def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -96,8 +96,7 @@ def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     assert max(most, 0.0) <= 1.12 * held(force) / LIMIT + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
-@given(seeds)
+@given_some(15, 60, seeds)
 def test_wrench_rows_are_functions_of_the_wrench_alone(seed):
     settled = settled_at(seed)
     if settled is None:

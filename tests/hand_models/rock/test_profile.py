@@ -16,6 +16,7 @@ from hand_models.rock import Profile
 from hand_models.rock.profile import STRIPS
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import distance, random_axes, random_profile
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -75,8 +76,7 @@ def test_every_finger_has_the_strip_of_its_name(rotation):
         np.testing.assert_allclose(got.palm.gaps[rows], alone.palm.gaps[rows], atol=1e-5)
 
 
-@settings(max_examples=100, deadline=None)
-@given(seeds)
+@given_some(30, 100, seeds)
 def test_entry_is_where_a_line_first_meets_the_rock(seed):
     rng = np.random.default_rng(seed)
     hold = Profile(random_profile(rng).outlines[0])
@@ -94,8 +94,7 @@ def test_entry_is_where_a_line_first_meets_the_rock(seed):
         assert distance(hold, before).min() > -1e-12
 
 
-@settings(max_examples=60, deadline=None)
-@given(seeds)
+@given_some(20, 60, seeds)
 def test_a_section_never_leaves_raw_rock_outside(seed):
     rng = np.random.default_rng(seed)
     hold = Profile(random_profile(rng).outlines[0])

@@ -12,6 +12,7 @@ from hypothesis import given, settings, strategies as st
 from hand_models.rock import Profile
 from hand_models.sections import Disc, Face, PolylineSection, Rest
 from tests.suite.helpers.rocks import distance
+from tests.suite.helpers.shares import given_some
 
 LOW, HIGH = -0.52, 1.75
 START, END, HEIGHT = 0.0085, 0.0431, 0.0047
@@ -39,8 +40,7 @@ def outside(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
     return distance(Profile(outline), in_hold)
 
 
-@settings(max_examples=150, deadline=None)
-@given(seeds)
+@given_some(40, 150, seeds)
 def test_a_face_rests_where_it_first_meets_the_rock(seed):
     rng = np.random.default_rng(seed)
     outline = ragged(rng)

@@ -14,6 +14,7 @@ from hand_models.rock import Hold
 from hand_models.sections import Face, SmoothSection
 from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import distance, random_axes, random_ellipsoid, random_hold
+from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -63,8 +64,7 @@ def test_places_are_in_the_rock_where_their_distance_is_negative(seed):
         assert far < 1e-9 or told > 0.0
 
 
-@settings(max_examples=300, deadline=None)
-@given(seeds)
+@given_some(80, 300, seeds)
 def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
     found = random_cut(seed)
     if found is None:
@@ -83,8 +83,7 @@ def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
     assert away(contact + 1j * u * 1e-6) < 0.0
 
 
-@settings(max_examples=300, deadline=None)
-@given(seeds, st.sampled_from([FACE.start, FACE.end]))
+@given_some(80, 300, seeds, st.sampled_from([FACE.start, FACE.end]))
 def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
     found = random_cut(seed)
     if found is None:
@@ -106,8 +105,7 @@ def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
     assert len(into) <= len(told) <= len(into) + 1
 
 
-@settings(max_examples=300, deadline=None)
-@given(seeds, st.floats(-3.1, 3.1))
+@given_some(80, 300, seeds, st.floats(-3.1, 3.1))
 def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
     found = random_cut(seed)
     if found is None:
@@ -125,8 +123,7 @@ def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
         assert away(grid).min() > -1e-9
 
 
-@settings(max_examples=150, deadline=None)
-@given(seeds)
+@given_some(40, 150, seeds)
 def test_a_face_rests_where_it_first_meets_the_rock(seed):
     """By the rock's distance function alone: clear until then, and on it there."""
     found = random_cut(seed)

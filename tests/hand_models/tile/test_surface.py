@@ -111,8 +111,7 @@ def surfaces(draw):
     )
 
 
-@settings(max_examples=60, deadline=None)
-@given(surfaces())
+@given_some(20, 60, surfaces())
 def test_strength_is_the_linear_law_of_the_loading_angle(surface):
     angles = DIRECTIONS[:: len(DIRECTIONS) // 200]
     np.testing.assert_allclose(surface.strength(angles), law(surface, angles), rtol=1e-9)
@@ -128,7 +127,7 @@ def test_strength_by_hand():
     assert surface.strength(-math.pi / 4) == pytest.approx(120.0 * math.sqrt(2.0))
 
 
-@given_some(50, 150, surfaces())
+@given_some(20, 150, surfaces())
 def test_half_planes_stay_inside_the_law_in_every_direction(surface):
     assert (reach(surface, DIRECTIONS) <= law(surface, DIRECTIONS) * (1.0 + 1e-9)).all()
 
@@ -231,7 +230,7 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
     assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
 
 
-@given_some(50, 150, surfaces(), st.integers(0, 1000))
+@given_some(20, 150, surfaces(), st.integers(0, 1000))
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
@@ -299,8 +298,7 @@ def test_what_one_straight_line_costs_sideways():
     assert reaches[0] / 68.1 == pytest.approx(1.0 / least, rel=0.01)
 
 
-@settings(max_examples=50, deadline=None)
-@given(surfaces())
+@given_some(20, 50, surfaces())
 def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
     for piece in inner_half_planes(surface):
         assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 from scipy.optimize import linprog, nnls
 
 from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
@@ -17,6 +17,7 @@ from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers.named_rows import have_loads, named_rows
 from tests.suite.helpers.random_questions import explained, few_and_all
+from tests.suite.helpers.shares import given_some
 from tests.suite.helpers.stances import random_question
 
 LIMB = "front_left"
@@ -148,8 +149,7 @@ def has_loads(parts: HardRowSystem, names) -> bool:
 whole = st.integers(-3, 3)
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.data())
+@given_some(20, 60, st.data())
 def test_every_smaller_set_of_small_systems_has_loads(data):
     """Against a look at every subset."""
     size = data.draw(st.integers(1, 3))
