@@ -59,7 +59,7 @@ def counted() -> Iterator[list[int]]:
 
 
 @cache
-def planned(limbs: tuple[str, ...] = REAR) -> tuple[Question, Plan, int]:
+def planned(limbs: tuple[str, ...]) -> tuple[Question, Plan, int]:
     """These hands float, with a hard preload; last is how many programs the plan took."""
     asked = question(request(limbs, preload=70.0, want=["load_factor"]))
     with counted() as solved:
@@ -96,7 +96,7 @@ def test_utilisation_and_load_factor_agree(limbs, preload):
 
 def test_budget_ends_a_search(monkeypatch):
     """With next to no programs left an answer comes at once, and is honest."""
-    asked, whole, count = planned()
+    asked, whole, count = planned(REAR)
     assert count <= 1.2 * continuation.PROGRAMS
     monkeypatch.setattr("planner.solving.solve.PROGRAMS", 30)
     with counted() as solved:
@@ -170,7 +170,7 @@ def test_no_raw_warning_leaves(stance_file, capfd):
     ],
 )
 def test_far_wrist_is_told(twist, told):
-    _, answer, _ = planned()
+    _, answer, _ = planned(REAR)
     hand = next(each for each in answer.hands if each.wrist is not None)
     hand = replace(hand, wrist=replace(hand.wrist, twist=np.array(twist, dtype=float)))
     assert bool(list(far_wrists([hand]))) == told
