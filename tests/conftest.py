@@ -1,7 +1,9 @@
 """Settings of all tests, and what tests of different packages need."""
 
 import json
+import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,10 @@ from hypothesis import settings
 
 # what a shell has in the background ignores it, and so would commands that tests interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# commands that tests start read compiled modules, as installed ones do, whatever the shell says
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")

@@ -96,7 +96,7 @@ def on_rough_rock(first, count):
 
 
 def test_on_rough_rock_fingers_close():
-    on_rough_rock(0, 20)
+    on_rough_rock(0, 10)
 
 
 @pytest.mark.slow

@@ -386,8 +386,8 @@ def _log(diameter):
 def test_threads_share_what_is_kept():
     hand = SpinyHand()
     rng = np.random.default_rng(11)
-    placements = [random_placement(rng, rough=0.0) for _ in range(12)]
-    orders = [rng.integers(0, len(placements), 6) for _ in range(60)]
+    placements = [random_placement(rng, rough=0.0) for _ in range(8)]
+    orders = [rng.integers(0, len(placements), 6) for _ in range(20)]
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda o: hand.settle_each([placements[i] for i in o]), orders))
     alone = SpinyHand().settle_each(placements)
@@ -398,7 +398,7 @@ def test_threads_share_what_is_kept():
             else:
                 assert str(outcome) == str(alone[i])
     hits, misses, kept, _ = hand.settled.info()
-    assert hits + misses == 60 * 6
+    assert hits + misses == 20 * 6
     assert kept == sum(isinstance(each, SettledHand) for each in alone)
 
 

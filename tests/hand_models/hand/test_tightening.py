@@ -104,7 +104,7 @@ def test_it_is_told_how_fingers_end(hold, grasp, pose, closures):
 
 def test_how_fingers_end_is_what_their_contacts_say():
     seen = set()
-    for seed in range(30):
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         try:
             settled = HAND.settle(random_profile(rng), ROCK, PINCH)

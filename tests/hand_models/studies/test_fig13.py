@@ -17,8 +17,8 @@ def study(tmp_path_factory):
     steps = []
     folder = tmp_path_factory.mktemp("fig13")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fig13, "PER_AXIS", 30)
-        patch.setattr(fig13, "DIRECTIONS", 60)
+        for name, few in (("PER_AXIS", 20), ("DIRECTIONS", 40), ("PIECE_DIRECTIONS", 8)):
+            patch.setattr(fig13, name, few)
         result, files = run_study("fig13", folder, lambda *step: steps.append(step), hand_table())
     return result, files, steps
 

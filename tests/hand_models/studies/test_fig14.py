@@ -17,8 +17,8 @@ def study(tmp_path_factory):
     steps = []
     folder = tmp_path_factory.mktemp("fig14")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fig14, "PER_AXIS", 30)
-        patch.setattr(fig14, "DIRECTIONS", 60)
+        patch.setattr(fig14, "PER_AXIS", 20)
+        patch.setattr(fig14, "DIRECTIONS", 40)
         result, files = run_study("fig14", folder, lambda *step: steps.append(step))
     return result, files, steps
 

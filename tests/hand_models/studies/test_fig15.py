@@ -24,7 +24,8 @@ def coarse(module, folder, **settings):
 
 @pytest.fixture(scope="module")
 def tensions(tmp_path_factory):
-    return coarse(fig15, tmp_path_factory.mktemp("fig15"), TENSIONS=3, RAYS=100)
+    few = {"TENSIONS": 3, "RAYS": 100, "CUTS": 2, "STARTS": 1}
+    return coarse(fig15, tmp_path_factory.mktemp("fig15"), **few)
 
 
 @pytest.fixture(scope="module")

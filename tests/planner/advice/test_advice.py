@@ -177,16 +177,18 @@ def test_no_advice_takes_the_body_into_rock_or_deeper_than_it_is(seed):
 
 
 def test_a_shift_that_is_told_is_one():
-    told, _ = advise(requested(1058))
+    told, _ = advise(requested(1058), 30)
     assert told
     assert not any("[0.000, 0.000, 0.000]" in each.sentence for each in told)
 
 
 def test_the_body_stays_in_the_range_that_is_given():
     asked = replace(random_question(SEED), body_range=BodyRange(shift=0.03, tilt=0.0))
-    told, _ = advise(asked)
-    body = asked.stance.body
-    for each in of_kind(told, "body"):
+    # the body is among the first changes that are tried
+    told, _ = advise(asked, 16)
+    body, moved = asked.stance.body, of_kind(told, "body")
+    assert moved
+    for each in moved:
         there = changed(asked, each.changes).stance.body
         shift = body.rotation.T @ (there.position - body.position)
         assert np.abs(shift).max() <= 0.03 + 1e-9
@@ -196,7 +198,7 @@ def test_the_body_stays_in_the_range_that_is_given():
 def test_a_body_wrench_that_is_given_says_nothing_of_where_the_body_is():
     asked = random_question(76)
     assert asked.body_wrench is not None
-    told, _ = advise(asked)
+    told, _ = advise(asked, 20)
     assert told
     assert not any("stance.body" in each.changes for each in told)
 
@@ -233,8 +235,8 @@ def test_no_more_plans_are_made_than_are_allowed(monkeypatch):
         return tried(self, prepared)
 
     monkeypatch.setattr(Trials, "_try", counted)
-    advise(random_question(46), 40)
-    assert 0 < count <= 40
+    advise(random_question(46), 15)
+    assert 0 < count <= 15
     assert PLANS == 100
 
 
@@ -267,7 +269,7 @@ def test_what_is_told_of_least_effort_is_of_a_plan_of_least_effort():
         assert there.utilisation == pytest.approx(each.utilisation, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [28, 75])
+@pytest.mark.parametrize("seed", [pytest.param(28, marks=pytest.mark.slow), 75])
 def test_no_advice_is_told_that_would_be_warned_of_with_joints_too(seed):
     asked = requested(seed)
     told, whole = advise(asked)

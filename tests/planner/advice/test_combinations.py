@@ -22,7 +22,10 @@ ALONE = 376
 """Seed of a request with a single hand that all others help."""
 
 
-@pytest.mark.parametrize("seed", [GIVEN, OWN])
+given_and_own = pytest.mark.parametrize("seed", [GIVEN, pytest.param(OWN, marks=pytest.mark.slow)])
+
+
+@given_and_own
 def test_the_direction_of_a_plan_leaves_it_out_exactly_where_it_does_not_hold(seed):
     trials = Trials(random_question(seed))
     search, seen = CombinationSearch(trials), 0
@@ -38,7 +41,7 @@ def test_the_direction_of_a_plan_leaves_it_out_exactly_where_it_does_not_hold(se
             assert (search.known().part(choice) < 1.0 - 1e-6) == (not holds)
 
 
-@pytest.mark.parametrize("seed", [GIVEN, OWN])
+@given_and_own
 def test_no_direction_leaves_out_what_holds(seed):
     trials = Trials(random_question(seed))
     search = CombinationSearch(trials)

@@ -10,7 +10,7 @@ import pytest
 
 from hand_models.parameters import bundled_draws, experiment_table, hand_table, own_draw
 from hand_models.studies import run_study
-from planner.capability import MeasurementStudy, measured, widths
+from planner.capability import MeasurementStudy, measured, measurements, widths
 from service.commands.cli import run
 from service.commands.studies import NAMES
 from tests.suite.helpers.commands import BAD_INPUT, complaint, result
@@ -91,8 +91,14 @@ def test_the_rigs_seat_is_its_own_and_a_gripper_that_holds_nothing_pulls_nothing
     assert measured(own_draw({"surfaces": weak}), hand_table())["pull_0"] == 0.0
 
 
-def test_a_run_ranks_all_measurements(tmp_path):
+@pytest.mark.parametrize("pulled", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_run_ranks_all_measurements(pulled, tmp_path, monkeypatch):
     steps = []
+    if not pulled:
+        # what a gripper shows takes longest, and has a test of its own
+        pulls = {f"pull_{angle}": np.zeros(1) for angle in measurements.ANGLES}
+        still = pulls | {"normal_forces": np.zeros(3)}
+        monkeypatch.setattr(measurements, "_on_gripper", lambda *given: still)
     study = MeasurementStudy({"wall": ask(on_wall()), "held": ask(on_wall(off=0.2))})
     found, files = run_study(study, tmp_path, lambda done, total: steps.append((done, total)))
     assert [path.name for path in files] == ["result.json", "measure.png"]

@@ -24,11 +24,12 @@ from planner.solving import plan
 from service.answering.questions import question
 from service.commands.cli import run
 from service.commands.stances import read_request
-from service.requests import PlanRequest
+from service.requests import Load, PlanRequest
 from service.tables import terminal
 from tests.suite.helpers.commands import DONE, OVERLOADED
 
 REAR = ("rear_right", "rear_left")
+ALL = ("front_right", *REAR, "front_left")
 
 
 def request(limbs=REAR, preload=50.0, closing=None, **changes) -> PlanRequest:
@@ -46,10 +47,6 @@ def request(limbs=REAR, preload=50.0, closing=None, **changes) -> PlanRequest:
     return msgspec.structs.replace(bundled, stance=stance, **changes)
 
 
-SOLVED: list[int] = []
-"""How many programs the plan of `all_float` took."""
-
-
 @contextmanager
 def counted() -> Iterator[list[int]]:
     """Count the programs that are solved."""
@@ -62,43 +59,49 @@ def counted() -> Iterator[list[int]]:
 
 
 @cache
-def all_float() -> tuple[Question, Plan]:
-    """All four hands float."""
-    limbs = tuple(hand.limb for hand in read_request("wall-300-floating").stance.hands)
+def planned(limbs: tuple[str, ...]) -> tuple[Question, Plan, int]:
+    """These hands float, with a hard preload; last is how many programs the plan took."""
     asked = question(request(limbs, preload=70.0, want=["load_factor"]))
     with counted() as solved:
         answer = plan(asked)
-    SOLVED.append(len(solved))
-    return asked, answer
+    return asked, answer, len(solved)
 
 
 @pytest.mark.slow
 def test_load_factor_is_no_less_than_a_smaller_load_proves():
-    asked, whole = all_float()
+    asked, whole, _ = planned(ALL)
     wrench = 0.6 * whole.body_wrench
     part = plan(replace(asked, body_wrench=wrench, load=None))
     assert part.load_factor > 1.0
     assert whole.load_factor >= 0.6 * part.load_factor * (1.0 - 3e-3)
 
 
-@pytest.mark.parametrize("preload", [None, pytest.param(80.0, marks=pytest.mark.slow), 37.0])
-def test_utilisation_and_load_factor_agree(preload):
-    if preload is None:
-        _, answer = all_float()
+@pytest.mark.parametrize(
+    ("limbs", "preload"),
+    [
+        (REAR, 37.0),
+        (REAR, 70.0),
+        pytest.param(REAR, 80.0, marks=pytest.mark.slow),
+        pytest.param(ALL, 70.0, marks=pytest.mark.slow),
+    ],
+)
+def test_utilisation_and_load_factor_agree(limbs, preload):
+    if preload == 70.0:
+        _, answer, _ = planned(limbs)
     else:
-        answer = plan(question(request(preload=preload, want=["load_factor"])))
+        answer = plan(question(request(limbs, preload, want=["load_factor"])))
     assert answer.load_factor is not None
     assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.SLACK)
 
 
 def test_budget_ends_a_search(monkeypatch):
     """With next to no programs left an answer comes at once, and is honest."""
-    asked, whole = all_float()
-    assert SOLVED[0] <= 1.2 * continuation.PROGRAMS
+    asked, whole, count = planned(REAR)
+    assert count <= 1.2 * continuation.PROGRAMS
     monkeypatch.setattr("planner.solving.solve.PROGRAMS", 30)
     with counted() as solved:
         answer = plan(asked)
-    assert len(solved) <= 90 < SOLVED[0]
+    assert len(solved) <= 90 < count
     assert answer.status in ("overloaded", "failed", "infeasible")
     if answer.utilisation is not None:
         assert answer.utilisation >= whole.utilisation * (1.0 - 1e-6)
@@ -148,7 +151,8 @@ def test_preload_that_alone_overloads_is_named():
 
 
 def test_no_raw_warning_leaves(stance_file, capfd):
-    path = stance_file(msgspec.to_builtins(request(preload=20.0, closing=20.0)))
+    light = Load(mass=20.0)
+    path = stance_file(msgspec.to_builtins(request(preload=20.0, closing=20.0, load=light)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert run(["plan", path]) in (DONE, OVERLOADED)
@@ -166,8 +170,8 @@ def test_no_raw_warning_leaves(stance_file, capfd):
     ],
 )
 def test_far_wrist_is_told(twist, told):
-    _, answer = all_float()
-    hand = answer.hands[0]
+    _, answer, _ = planned(REAR)
+    hand = next(each for each in answer.hands if each.wrist is not None)
     hand = replace(hand, wrist=replace(hand.wrist, twist=np.array(twist, dtype=float)))
     assert bool(list(far_wrists([hand]))) == told
 

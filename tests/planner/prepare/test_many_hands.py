@@ -57,7 +57,7 @@ def test_hands_with_fixed_wrists(crawler, count, joints):
     [
         (1, 1, True),
         (2, 2, True),
-        (5, 2, False),
+        pytest.param(5, 2, False, marks=pytest.mark.slow),
         pytest.param(16, 1, True, marks=pytest.mark.slow),
     ],
 )

@@ -36,10 +36,11 @@ def random_loads(rng, space):
     )
 
 
-def cases():
-    yield hooked()
-    for seed in range(12):
-        yield random_stance(np.random.default_rng(seed))
+@pytest.fixture(scope="module", params=["hooked", *range(12)])
+def stance(request):
+    if request.param == "hooked":
+        return hooked()
+    return random_stance(np.random.default_rng(request.param))
 
 
 def read(stance, seed=0):
@@ -56,7 +57,6 @@ def named(space, y):
     return dict(zip(space.columns, y.tolist(), strict=True))
 
 
-@pytest.mark.parametrize("stance", list(cases()))
 def test_every_number_is_that_of_its_definition(stance):
     settled, spaces, data, loads, reader = read(stance)
     arrays, told_used, effort = reader.read(loads)
@@ -126,7 +126,6 @@ def test_every_number_is_that_of_its_definition(stance):
         np.testing.assert_allclose(plan.wrench, wrench, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("stance", list(cases()))
 def test_hands_are_read_alone_as_together(stance):
     settled, spaces, _, loads, reader = read(stance, seed=1)
     limbs = [hand.limb for hand in stance.hands]

@@ -339,7 +339,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
 @pytest.fixture(scope="module")
 def served(file: Path) -> Iterator[Served]:
     """A process that serves the robot of the file."""
-    server = Served(free_endpoint(), "--robot", str(file))
+    server = Served(free_endpoint(), "--robot", str(file), "--workers", "1")
     yield server
     server.stop(signal.SIGTERM)
     assert server.process.returncode == 0
@@ -394,6 +394,7 @@ def test_the_demo_is_of_the_robot(
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_demo_of_a_robot_that_does_not_reach_leaves_joints_out(
     lemur: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

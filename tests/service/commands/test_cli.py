@@ -488,7 +488,7 @@ def test_a_picture_that_cannot_be(
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    server = Served(free_endpoint())
+    server = Served(free_endpoint(), "--workers", "1")
     yield server
     server.process.terminate()
     server.process.communicate()

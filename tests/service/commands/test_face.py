@@ -101,18 +101,16 @@ def test_limbs_are_those_of_the_stance(stance_file) -> None:
     ]
 
 
-@pytest.mark.parametrize("place", [0, 1])
-def test_less_is_said_where_asked(
-    place: int, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_less_is_said_where_asked(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
     words = ["plan", stance_file(wall_request(HEAVY))]
     assert run(words) == OVERLOADED
     whole = capfd.readouterr().out.splitlines()
-    assert run([*words[:place], "--quiet", *words[place:]]) == OVERLOADED
-    out, error = capfd.readouterr()
-    assert out.startswith("OVERLOADED ")
-    assert len(out.splitlines()) < 5 < len(whole)
-    assert error == ""
+    for place in (0, 1):
+        assert run([*words[:place], "--quiet", *words[place:]]) == OVERLOADED
+        out, error = capfd.readouterr()
+        assert out.startswith("OVERLOADED ")
+        assert len(out.splitlines()) < 5 < len(whole)
+        assert error == ""
     # an error is said all the same
     assert run(["-q", "plan", "nowhere"]) == BAD_INPUT
     assert len(capfd.readouterr().err.splitlines()) == 1

@@ -57,7 +57,7 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(
     rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "holds.json"
-    options = ["-o", str(output), *COARSE, "--robust", "0", "--json"]
+    options = ["-o", str(output), *COARSE, "--robust", "0", "--workers", "1", "--json"]
     assert run(["holds", str(rock), *options]) == DONE
     told = result(capfd)
     best = json.loads(output.read_text(encoding="utf-8"))["holds"][0]

@@ -295,7 +295,7 @@ def test_a_server_says_what_it_serves(served: Served) -> None:
     ],
 )
 def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
-    server = Served(free_endpoint())
+    server = Served(free_endpoint(), "--workers", "1")
     payload = msgspec.json.encode(wall_request())
     with zenoh.open(client_config(server.endpoint)) as mine:
         channels = []
