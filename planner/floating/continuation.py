@@ -85,11 +85,21 @@ class _Way(NamedTuple):
     whole: WristSolution | None
 
 
-def least_use(hands: HandSets, budget: Budget) -> tuple[WristSolution, LargestFactor | None]:
+def least_use(
+    hands: HandSets, budget: Budget, near: WristSolution | None = None
+) -> tuple[WristSolution, LargestFactor | None]:
     """Find the point of least utilisation over the modes of the hands' palms.
 
     Where that is beyond 1, or there is none, the search is continued from smaller body wrenches, up
     to the largest that can be held and on to the whole: a better point may lie there.
+
+    Parameters
+    ----------
+    hands : HandSets
+    budget : Budget
+    near : WristSolution, optional
+        A plan of hands that are much the same, from which the search begins; where it leads to a
+        plan, beyond 1 from there to the largest that can be held.
 
     Returns
     -------
@@ -99,13 +109,15 @@ def least_use(hands: HandSets, budget: Budget) -> tuple[WristSolution, LargestFa
         Of the body wrench, as far as it has been sought: None for a plan within its limits.
     """
     choices = starts(hands, 1.0, budget)
-    plan = first_plan(hands, 1.0, choices, budget.part(FIRST))
+    plan = None if near is None else solve_wrists(hands, near.point, budget.part(FIRST))
+    if plan is None or not plan.exact:
+        near, plan = None, first_plan(hands, 1.0, choices, budget.part(FIRST))
     if deadline.expired():
         return plan, None
     most: LargestFactor | None = None
     if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
         along = budget.part(ALONG)
-        for way in _ways(hands, plan, along):
+        for way in _ways(hands, plan, along, up=near is None):
             if most is None or way.most.factor > most.factor:
                 most = way.most
             onward = way.whole or _carried_on(hands, way.at, along)
@@ -164,9 +176,11 @@ def _as_good(found: WristSolution, plan: WristSolution) -> bool:
     return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
 
 
-def _ways(hands: HandSets, plan: WristSolution, budget: Budget) -> Iterator[_Way]:
-    """Yield searches along the factor: up from a small one, and down from a plan."""
-    for fraction in FRACTIONS:
+def _ways(
+    hands: HandSets, plan: WristSolution, budget: Budget, *, up: bool = True
+) -> Iterator[_Way]:
+    """Yield searches along the factor: up from a small one, if so, and down from a plan."""
+    for fraction in FRACTIONS if up else ():
         if deadline.expired():
             return
         part = budget.part(FIRST)

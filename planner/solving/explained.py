@@ -105,7 +105,7 @@ def explained_plan(
         robust = find_robust_load_factor(prepared, checks.idle)
         unfinished += late("robust") if robust is None else ()
     if "spread" in question.want:
-        spread = find_spread(prepared, checks.idle)
+        spread = find_spread(prepared, checks.idle, found.least_use)
         unfinished += late("spread") if spread is None else ()
     read, hands = told.plan, None if told.plan is None else told.plan.hands
     return Plan(

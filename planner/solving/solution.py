@@ -90,11 +90,14 @@ class Solution(NamedTuple):
 
 
 def solve_question(
-    prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    budget: Budget,
+    near: WristSolution | None = None,
 ) -> Solution:
-    """Return the plan that is asked for."""
+    """Return the plan that is asked for; of floating hands sought from one that is near, if any."""
     if prepared.hands.floating:
-        found = _solve_floating(prepared, checks, budget)
+        found = _solve_floating(prepared, checks, budget, near)
     else:
         found = _solve_fixed(prepared, checks)
     if prepared.question.objective == "min_effort":
@@ -169,10 +172,13 @@ def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solutio
 
 
 def _solve_floating(
-    prepared: PreparedStance, checks: Overlap[PreparedChecks], budget: Budget
+    prepared: PreparedStance,
+    checks: Overlap[PreparedChecks],
+    budget: Budget,
+    near: WristSolution | None,
 ) -> Solution:
     """Find where floating wrists go, and return the plan there."""
-    search, factor = least_use(prepared.hands, budget)
+    search, factor = least_use(prepared.hands, budget, near)
     found = Solution(
         sets=prepared.at_rest,
         outcome=search.outcome,

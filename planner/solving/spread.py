@@ -3,7 +3,8 @@
 A draw changes what the hands are and what their tiles hold, and nothing that was asked: body,
 hands' poses, joints and body wrench stay. Hands that are seated close as the draw's hand seats
 them, H where it was; it is the rock that is elsewhere. One whose best seat was searched for stays
-where that was found. A draw's plan has neither certificate nor prices nor words.
+where that was found. Floating wrists are sought from where they are with the question's own hands.
+A draw's plan has neither certificate nor prices nor words.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
 from planner import deadline
 from planner.deadline import DeadlineError
 from planner.explanation import LimitUse
+from planner.floating import WristSolution
 from planner.prepare import PreparedStance
 from planner.programs import SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
@@ -26,7 +28,9 @@ from planner.solving.trial import try_stance
 __all__ = ["find_spread"]
 
 
-def find_spread(prepared: PreparedStance, idle: Sequence[LimitUse]) -> Spread | None:
+def find_spread(
+    prepared: PreparedStance, idle: Sequence[LimitUse], usual: WristSolution | None
+) -> Spread | None:
     """Return a stance's plans over its question's draws; None if time does not allow all of them.
 
     Parameters
@@ -34,7 +38,10 @@ def find_spread(prepared: PreparedStance, idle: Sequence[LimitUse]) -> Spread | 
     prepared : PreparedStance
     idle : sequence of LimitUse
         How much of their joints' torque limbs without a hand use: the same in every draw.
+    usual : WristSolution or None
+        Where floating wrists go with the question's own hands: each draw's search begins there.
     """
+    near = usual if usual is not None and usual.exact else None
     question, plans = prepared.question, []
     drawn = question.stance.robot.hand, question.draws
     refused: Counter[str] = Counter()
@@ -46,7 +53,7 @@ def find_spread(prepared: PreparedStance, idle: Sequence[LimitUse]) -> Spread | 
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
             whole = len(there) == len(outcomes)
-            plans.append(_planned(prepared, there, idle) if whole else DrawnPlan())
+            plans.append(_planned(prepared, there, idle, near) if whole else DrawnPlan())
         deadline.check("all draws were planned")
     except DeadlineError:
         return None
@@ -73,7 +80,10 @@ def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | I
 
 
 def _planned(
-    prepared: PreparedStance, settled: Sequence[SettledHand], idle: Sequence[LimitUse]
+    prepared: PreparedStance,
+    settled: Sequence[SettledHand],
+    idle: Sequence[LimitUse],
+    near: WristSolution | None,
 ) -> DrawnPlan:
     """Return what the verified plan says of the same stance with a draw's hands."""
     try:
@@ -81,7 +91,11 @@ def _planned(
     except InvalidInputError:
         # a preload that a floating hand does not hold
         return DrawnPlan()
-    trial = try_stance(there, idle)
+    pairs = zip(settled, prepared.batch.hands, strict=True)
+    if any(drawn.palm.engaged != usual.palm.engaged for drawn, usual in pairs):
+        # with its palms, a hand has other ways to carry
+        near = None
+    trial = try_stance(there, idle, near)
     used, factor = trial.utilisation, trial.load_factor().factor
     if math.isinf(used):
         return DrawnPlan(load_factor=factor)

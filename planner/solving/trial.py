@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from planner.deadline import Budget, Overlap
 from planner.explanation import LimitUse
-from planner.floating import PROGRAMS
+from planner.floating import PROGRAMS, WristSolution
 from planner.prepare import PreparedStance
 from planner.result import LoadRecovery
 from planner.solving.load_factor import FoundFactor, find_load_factor
@@ -52,7 +52,11 @@ class Trial(NamedTuple):
         return find_load_factor(self.prepared, self.found, self.idle, self.budget)
 
 
-def try_stance(prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Trial:
+def try_stance(
+    prepared: PreparedStance,
+    idle: Sequence[LimitUse] | None = None,
+    near: WristSolution | None = None,
+) -> Trial:
     """Return the verified plan of a stance, of which no store keeps anything.
 
     Parameters
@@ -60,10 +64,12 @@ def try_stance(prepared: PreparedStance, idle: Sequence[LimitUse] | None = None)
     prepared : PreparedStance
     idle : sequence of LimitUse, optional
         How much of their joints' torque limbs without a hand use, where that is known.
+    near : WristSolution, optional
+        Where floating wrists are in a plan of much the same stance.
     """
     bare = idle_joints(prepared) if idle is None else tuple(idle)
     checks, budget = Overlap(partial(_checks, prepared, bare)), Budget(PROGRAMS)
-    found = solve_question(prepared, checks, budget)
+    found = solve_question(prepared, checks, budget, near)
     if not found.passes:
         found, _ = look_again(prepared, checks, found, budget, prove=False)
     return Trial(prepared, found, bare, budget)

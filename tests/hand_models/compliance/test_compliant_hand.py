@@ -257,3 +257,16 @@ def test_the_sieve_lets_pass_all_that_holds():
     passed = wrist.sieve(twists)
     assert 0 < len(holds) <= len(passed) < len(twists)
     assert set(holds) <= set(passed)
+
+
+def test_sets_at_many_poses_are_those_at_each():
+    wrist = FloatingWrist(compliant("oblique"))
+    poses = np.array([5e-5, 2e-5, -8e-5, 1e-3, -1e-3, 5e-4]) * np.arange(4)[:, None]
+    within = np.full(6, 1e-3)
+    # one of them known already, with another way of the palm
+    wrist.linearised(poses[2], "drags")
+    many = wrist.linearised_each(poses, "presses", within)
+    for at, found in zip(poses, many, strict=True):
+        alone = FloatingWrist(wrist.hand).linearised(at, "presses", within)
+        for name in ("origin", "generators", "L", "l0", "s", "H", "h"):
+            np.testing.assert_allclose(getattr(found, name), getattr(alone, name), rtol=1e-12)
