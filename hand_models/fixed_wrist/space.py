@@ -6,7 +6,13 @@ and the palm's shear and pressing. Everything is affine in them:
     w = Σ_tiles W_t (c_sys + f c_act) + lateral and palm loads = o + V y,
 
 and so are the loads of the motors and of the structure. All hands of a stance are worked out
-together, those with the same rows and columns in arrays of all of them (`alike_hands`).
+together, those with the same rows and columns in arrays of all of them: sums over the tiles of each
+finger, of their places p and forces F,
+
+    Σ (1, p) ⊗ F,    F at zero tension, per newton of tension and per newton of lateral reaction,
+
+hold the wrenches of all columns, which are, one after another, tensions, lateral reactions, nails
+that hook, the palm.
 """
 
 from __future__ import annotations
@@ -18,18 +24,208 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import check_positive
-from hand_models.fixed_wrist.alike_hands import (
-    HELD_ROWS,
-    hard_rows,
-    limit_rows,
-    wrench_columns,
-)
+from hand_models.base import Array, check_positive, skew
 from hand_models.fixed_wrist.row_layout import RowLayout, layout_of
-from hand_models.hand import HandModel, SettledHand
+from hand_models.hand import FINGERS, HELD, HandModel, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["wrench_space", "wrench_spaces"]
+__all__ = [
+    "HELD_ROWS",
+    "hard_rows",
+    "limit_rows",
+    "wrench_columns",
+    "wrench_space",
+    "wrench_spaces",
+]
+
+LEAST_SLOPE: Final = 1e-6
+"""Torque on a joint's stop per newton of tension by which its row is divided, at least [m]."""
+
+TENDONS: Final = len(FINGERS)
+
+EACH_TENDON: Final = np.eye(TENDONS)
+
+EACH_PALM_LOAD: Final = np.eye(2)
+
+SIDES: Final = (1.0, -1.0)
+"""Of a lateral reaction."""
+
+WRENCH_PARTS: Final = 6 + len(HELD)
+"""A wrench, and what of its force is held along each of `HELD`."""
+
+ROUNDING: Final = 1e-14
+"""What is left of forces that cancel [N per newton, N·m per newton]: a zero, and told as one."""
+
+HELD_ROWS: Final = np.hstack([HELD, np.zeros_like(HELD)])
+"""D of every hand: the rows of `HELD` of a wrench."""
+
+HELD_ROWS.setflags(write=False)
+
+
+def _moments() -> Array:
+    """Return the matrix (`WRENCH_PARTS`, 12) from (1, p) ⊗ F to a wrench and what is held of it."""
+    wrench = np.zeros((6, 4, 3))
+    wrench[:3, 0] = np.eye(3)
+    for axis in range(3):
+        wrench[3:, 1 + axis] = skew(np.eye(3)[axis])
+    flat = wrench.reshape(6, 12)
+    return np.vstack([flat, HELD_ROWS @ flat])
+
+
+MOMENTS: Final = _moments()
+"""From (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
+
+
+def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
+    """Return wrenches at zero tension (h, p), and those of the m columns (h, p, m), of h hands.
+
+    Below each of the p = `WRENCH_PARTS` what of its force is held: the last limit rows.
+    """
+    axes, places, shares = (_of_tiles(hands, n) for n in ("axes", "positions", "lateral_shares"))
+    # F three times, first in the tile's axes, then in H
+    forces = np.zeros((*shares.shape, 3, 3))
+    forces[..., :2, :2] = _of_tiles(hands, "loads").swapaxes(2, 3)
+    forces[..., 2, 2] = shares
+    forces = (forces @ axes).reshape(*shares.shape, 1, 9)
+    arms = np.ones((*shares.shape, 4))
+    arms[..., 1:] = places
+    of_tiles = (arms[..., None] * forces).reshape(*shares.shape, 36)
+    # not as a product of matrices: its last digits would depend on how many hands there are
+    sums = _of_fingers(layout, of_tiles).reshape(len(hands), TENDONS, 4, 3, 3)
+    wrenches = MOMENTS @ sums.transpose(0, 3, 2, 4, 1).reshape(len(hands), 3, 12, -1)
+    V = np.zeros((len(hands), WRENCH_PARTS, len(layout.columns)))
+    V[:, :, :TENDONS] = wrenches[:, 1]
+    V[:, :, list(layout.lateral_columns)] = wrenches[:, 2][:, :, list(layout.reacting)]
+    if layout.nail_columns:
+        axial = arms[:, layout.nails, :, None] * axes[:, layout.nails, :1]
+        flat = axial.reshape(*axial.shape[:2], 12)
+        V[:, :, list(layout.nail_columns)] = (flat @ MOMENTS.T).swapaxes(1, 2)
+    if layout.palm:
+        x, y, z = np.array([hand.palm.centre for hand in hands]).T
+        shear, pressing = V[:, :, -2], V[:, :, -1]
+        shear[:, 0], shear[:, 4], shear[:, 5] = -1.0, -z, y
+        pressing[:, 2], pressing[:, 3], pressing[:, 4] = 1.0, y, -x
+        shear[:, 6:], pressing[:, 6:] = -HELD[:, 0], HELD[:, 2]
+    V[np.abs(V) < ROUNDING] = 0.0
+    return np.add.reduce(wrenches[:, 0], axis=2), V
+
+
+def limit_rows(
+    layout: RowLayout,
+    model: HandModel,
+    hands: Sequence[SettledHand],
+    most: Array,
+    wrenches: tuple[Array, Array],
+) -> tuple[Array, Array, Array]:
+    """Return L (h, nl, m), l0 and s (h, nl): tiles, tendons, fingers, nails, palm, the hand.
+
+    ``most``: the largest tension of each hand (h,) [N]; ``wrenches``: their `wrench_columns`.
+    """
+    (at_zero, V), finger_of = wrenches, layout.finger_of
+    loads, structure = _of_tiles(hands, "loads"), model.structure
+    shape = len(hands), len(layout.limits)
+    L, l0, s = np.zeros((*shape, V.shape[2])), np.zeros(shape), np.empty(shape)
+    tile, k = layout.plane_tiles, len(layout.plane_tiles)
+    row, of = np.arange(k), finger_of[tile]
+    planes = layout.planes([hand.surface for hand in hands])
+    planar = planes[:, :, :1] * loads[:, tile, 0] + planes[:, :, 1:2] * loads[:, tile, 1]
+    l0[:, :k], L[:, row, of] = planar.transpose(2, 0, 1)
+    s[:, :k] = planes[:, :, 3] * _of_tiles(hands, "engagement")[:, tile]
+    if layout.reacting:
+        column = np.zeros(TENDONS, dtype=np.intp)
+        column[list(layout.reacting)] = layout.lateral_columns
+        shares = _of_tiles(hands, "lateral_shares")[:, tile]
+        L[:, row, column[of]] = planes[:, :, 2] * shares
+    for slope, start, end in (
+        (1.0, 0.0, most[:, None]),
+        *model.drive.limits,
+    ):
+        own = slice(k, k + TENDONS)
+        L[:, own, :TENDONS], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
+        k += TENDONS
+    engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
+    sideways, reacting = (
+        np.repeat(np.array(each, dtype=np.intp), len(SIDES))
+        for each in (layout.lateral_columns, layout.reacting)
+    )
+    shears = _of_fingers(layout, loads[:, :, 0])[:, engaged].transpose(2, 0, 1)
+    either_way = np.array([np.zeros(len(sideways)), np.resize(SIDES, len(sideways))])
+    for of, (start, slope), end in (
+        (engaged, shears, structure.finger_shear),
+        (sideways, either_way, np.array([hand.lateral_limits[reacting] for hand in hands])),
+        (finger_of[tips], loads[:, tips, 1].transpose(2, 0, 1), structure.fingertip_force),
+    ):
+        row = k + np.arange(len(of))
+        L[:, row, of], l0[:, row], s[:, row] = slope, start, end
+        k += len(of)
+    for nail, columns in _nails(layout):
+        for h, hand in enumerate(hands):
+            t0, t1 = loads[h, nail, 1]
+            for i, limit in enumerate(hand.nail_limits(nail), k):
+                L[h, i, columns] = limit.a_normal * t1, limit.a_shear
+                l0[h, i], s[h, i] = limit.a_normal * t0, limit.capacity
+        k += 2
+    if layout.palm:
+        L[:, k : k + 2, -2:] = EACH_PALM_LOAD
+        s[:, k : k + 2] = [(hand.palm.shear_limit, hand.palm.pressing_limit) for hand in hands]
+        k += 2
+    L[:, k:], l0[:, k:], s[:, k:] = V[:, 6:], at_zero[:, 6:], structure.hand_load
+    return L, l0, s
+
+
+def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
+    """Return H (h, nh, m) and h (h, nh): tensions, tiles, stops, nails, friction, the palm."""
+    loads, shape = _of_tiles(hands, "loads"), (len(hands), len(layout.hard))
+    friction = np.array([hand.surface.friction for hand in hands])[:, None, None]
+    pressed, base = loads[:, :, 1].copy(), layout.bases
+    pressed[:, base] = _of_tiles(hands, "engagement")[:, base, None] * pressed[:, base + 1]
+    drags = loads[:, :, 0] + friction * pressed
+    H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
+    H[:, :TENDONS, :TENDONS] = -EACH_TENDON
+    k = TENDONS
+    for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
+        row, along = k + np.arange(len(tiles)), kept[:, tiles]
+        H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
+        k += len(tiles)
+    if layout.stops:
+        row, stopped = k + np.arange(len(layout.stops)), [finger for finger, _ in layout.stops]
+        torques = np.array([[torque for _, _, torque in hand.stops] for hand in hands])
+        # in newtons of tension, so that rows stay commensurate
+        torques /= np.maximum(np.abs(torques[..., 1:]), LEAST_SLOPE)
+        H[:, row, stopped], h[:, row] = -torques[..., 1], torques[..., 0]
+        k += len(row)
+    for i, (_, columns) in enumerate(_nails(layout)):
+        rows, ends = (np.array([hand.nail_rows[i][part] for hand in hands]) for part in (0, 1))
+        own = slice(k, k + ends.shape[1])
+        H[:, own, columns], h[:, own] = rows, ends
+        k = own.stop
+    if layout.sticking:
+        row, drawing = k + np.arange(len(layout.drawing)), list(layout.drawing)
+        H[:, row, drawing] = -1.0
+        h[:, row] = [[-hand.closing_tension] for hand in hands]
+    if layout.palm:
+        H[:, -2:, -2:] = -EACH_PALM_LOAD
+    return H, h
+
+
+def _nails(layout: RowLayout) -> list[tuple[int, list[int]]]:
+    """Return nails that hook, and their columns: the finger's tension, the load along the nail."""
+    fingers = layout.finger_of[layout.nails].tolist()
+    columns = [list(pair) for pair in zip(fingers, layout.nail_columns, strict=True)]
+    return list(zip(layout.nails.tolist(), columns, strict=True))
+
+
+def _of_tiles(hands: Sequence[SettledHand], name: str) -> Array:
+    """Return an array of each hand's tiles, of all hands: shape (h, n, …)."""
+    arrays: list[Array] = [getattr(hand, name) for hand in hands]
+    return np.concatenate(arrays).reshape(len(hands), *arrays[0].shape)
+
+
+def _of_fingers(layout: RowLayout, tiles: Array) -> Array:
+    """Return sums (h, 4, …) over each finger's tiles (h, n, …)."""
+    starts = np.searchsorted(layout.finger_of, np.arange(TENDONS))
+    return np.asarray(np.add.reduceat(tiles, starts, axis=1))
+
 
 KEPT: Final = 4
 """Sets that are kept of one settled hand, for different tension limits."""

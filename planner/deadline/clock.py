@@ -105,14 +105,14 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
     started : float, optional
         On the clock of `time.perf_counter`; now by default.
     """
-    clock = _clock.get()
-    if seconds is not None:
-        start = time.perf_counter() if started is None else started
-        own = _Clock(start + seconds, seconds)
-        clock = own if clock is None or own.end < clock.end else clock
-    token = _clock.set(clock)
+    if seconds is None:
+        yield
+        return
+    start = time.perf_counter() if started is None else started
+    own, clock = _Clock(start + seconds, seconds), _clock.get()
+    token = _clock.set(own if clock is None or own.end < clock.end else clock)
     try:
-        with broken_off_by(None if clock is None else _mind_hands):
+        with broken_off_by(_mind_hands):
             yield
     finally:
         _clock.reset(token)

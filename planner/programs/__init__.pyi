@@ -1,21 +1,8 @@
-from .conic import (
-    PROVEN as PROVEN,
-    UNBOUNDED as UNBOUNDED,
-    Outcome as Outcome,
-    Reached as Reached,
-)
-from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
-from .row_scaling import (
-    JOINT_TORQUE as JOINT_TORQUE,
-    LOAD_UNIT as LOAD_UNIT,
-    TWIST_UNIT as TWIST_UNIT,
-    WRIST_RANGE as WRIST_RANGE,
-    ScaledRows as ScaledRows,
-    is_effort as is_effort,
-    scaled_rows as scaled_rows,
-)
-from .solvers import (
+from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED, Outcome as Outcome, Reached as Reached
+from .program import (
     SLACK as SLACK,
+    TIE as TIE,
+    UNLIMITED as UNLIMITED,
     curved as curved,
     effort as effort,
     holds as holds,
@@ -26,17 +13,25 @@ from .solvers import (
     nearest_body as nearest_body,
     reach as reach,
     tie_break as tie_break,
+    tie_weight as tie_weight,
     unique as unique,
     vertex as vertex,
 )
 from .stance_data import (
+    JOINT_TORQUE as JOINT_TORQUE,
+    LOAD_UNIT as LOAD_UNIT,
+    TWIST_UNIT as TWIST_UNIT,
     WRENCH_UNIT as WRENCH_UNIT,
+    WRIST_RANGE as WRIST_RANGE,
     HandData as HandData,
+    ScaledRows as ScaledRows,
     StanceData as StanceData,
     beyond as beyond,
     body_wrench as body_wrench,
     hands_data as hands_data,
+    is_effort as is_effort,
     parted as parted,
+    scaled_rows as scaled_rows,
     used as used,
     used_effort as used_effort,
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
-from planner.programs.row_scaling import scaled_rows
+from planner.programs.stance_data import scaled_rows
 
 __all__ = ["SilentHighs", "Support"]
 

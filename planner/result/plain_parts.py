@@ -76,7 +76,14 @@ class Price(LimitName, frozen=True, kw_only=True):
 
 
 class Solver(Struct, frozen=True):
-    """Which solver ended how."""
+    """Which solver ended how.
+
+    Attributes
+    ----------
+    name, status : str
+    iterations : int
+        Zero where the limits that bound in a plan before led to this one without it.
+    """
 
     name: str
     status: str

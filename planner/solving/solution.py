@@ -93,19 +93,26 @@ def solve_question(
     prepared: PreparedStance,
     checks: Overlap[PreparedChecks],
     budget: Budget,
-    near: WristSolution | None = None,
+    near: WristSolution | Outcome | None = None,
 ) -> Solution:
-    """Return the plan that is asked for; of floating hands sought from one that is near, if any."""
+    """Return the plan that is asked for, sought from one that is near, if any.
+
+    ``near``: where floating wrists were, or how the program of fixed ones ended.
+    """
     if prepared.hands.floating:
-        found = _solve_floating(prepared, checks, budget, near)
+        found = _solve_floating(
+            prepared, checks, budget, near if isinstance(near, WristSolution) else None
+        )
     else:
-        found = _solve_fixed(prepared, checks)
+        found = _solve_fixed(prepared, checks, near if isinstance(near, Outcome) else None)
     if prepared.question.objective == "min_effort":
         found = solve_effort(prepared, checks, found, budget)
     return found
 
 
-def _solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> Solution:
+def _solve_fixed(
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], near: Outcome | None
+) -> Solution:
     """Return the plan of least utilisation, of these that of least tensions.
 
     One solve has its utilisation, and mostly its active rows, which give its last digits; else
@@ -113,7 +120,7 @@ def _solve_fixed(prepared: PreparedStance, checks: Overlap[PreparedChecks]) -> S
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     with checks:
-        found = least_utilisation(sets.data)
+        found = least_utilisation(sets.data, near)
     first = Solution(sets, found.outcome, cap, bound=found.bound if found.proven else None)
     if found.proven:
         if found.loads is None:

@@ -10,6 +10,7 @@ from planner import deadline
 from planner.deadline import Budget, Overlap
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
+from planner.programs import Outcome
 from planner.question import Question, checked_body_wrench
 from planner.result import Plan, Time
 from planner.solving.explained import explained_plan
@@ -41,10 +42,15 @@ def plan(question: Question) -> Plan:
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
-        return plan_on(prepare_stance(question), start)
+        return plan_on(prepare_stance(question), start)[0]
 
 
-def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None = None) -> Plan:
+def plan_on(
+    prepared: PreparedStance,
+    start: float,
+    known: PreparedChecks | None = None,
+    near: Outcome | None = None,
+) -> tuple[Plan, Outcome]:
     """Answer a question of a prepared stance.
 
     Parameters
@@ -54,6 +60,14 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
         When it began, on the clock of `time.perf_counter`.
     known : PreparedChecks, optional
         What reads and checks its plans; by default it is made beside the solver.
+    near : Outcome, optional
+        How the program of the same hands ended at another wrench.
+
+    Returns
+    -------
+    plan : Plan
+    outcome : Outcome
+        How its program ended.
 
     Raises
     ------
@@ -63,7 +77,7 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
     question, modelled = prepared.question, time.perf_counter()
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
-    found, proof = solve_question(prepared, checks, budget), None
+    found, proof = solve_question(prepared, checks, budget, near), None
     if not found.passes:
         if found.outcome.balance_dual is None:
             deadline.check("a plan was found")
@@ -75,14 +89,14 @@ def plan_on(prepared: PreparedStance, start: float, known: PreparedChecks | None
         factor = find_load_factor(prepared, found, ready.idle, budget)
     solved = time.perf_counter()
     times = Time(modelled - start, solved - modelled, 0.0)
-    return explained_plan(prepared, ready, found, proof, factor, times, start)
+    return explained_plan(prepared, ready, found, proof, factor, times, start), found.outcome
 
 
 class KnownStance:
     """A stance on its holds, for a planner that asks about one body wrench after the other.
 
-    Hands are settled, joints found and sets computed once; a query pays for its solver and for the
-    check of its plan.
+    Hands are settled, joints found and sets computed once; a query pays for the check of its plan
+    and, unless the limits bind that bound in the query before, for its solver.
 
     Parameters
     ----------
@@ -99,6 +113,7 @@ class KnownStance:
     def __init__(self, question: Question) -> None:
         self.prepared = prepared = prepare_stance(question)
         self._checks: PreparedChecks | None = None
+        self._near: Outcome | None = None
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None and not prepared.floating:
             self._checks = prepare_checks(prepared)
@@ -119,4 +134,8 @@ class KnownStance:
         start = time.perf_counter()
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         with deadline.within(self.prepared.question.deadline, started=start):
-            return plan_on(self.prepared.turned(wrench), start, self._checks)
+            prepared = self.prepared.turned(wrench)
+            answer, outcome = plan_on(prepared, start, self._checks, self._near)
+        if outcome.solved:
+            self._near = outcome
+        return answer

@@ -3,7 +3,7 @@
 Nothing here is shared with the way the plan was found. The plan's own forces must balance every
 joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors and
 winches must fit; wrenches are summed force by force; limits are Eq. 21 itself, the plan's
-half-planes (`limit_surface`) and the structure's published figures; balance is added up about the
+half-planes (`LimitCurves`) and the structure's published figures; balance is added up about the
 body's origin. What is different where a wrist floats is in `floating`, what nails need in `nails`,
 what joints and callers ask in `limbs`.
 

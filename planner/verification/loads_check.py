@@ -24,8 +24,7 @@ from planner.result import LoadRecovery, PlanArrays
 from planner.verification.check import BALANCE, Check
 from planner.verification.joint_balance import LEVER
 from planner.verification.limbs import force_use
-from planner.verification.limit_surface import LimitCurves
-from planner.verification.recomputation import held_by
+from planner.verification.recomputation import LimitCurves, held_by
 from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
 
 __all__ = ["LoadsCheck"]

@@ -11,7 +11,7 @@ from planner.prepare import HandBatch, settle_hand
 from planner.result import Plan, PlanArrays
 from planner.solving import plan
 from planner.verification import Check, recomputation
-from planner.verification.limit_surface import LimitCurves
+from planner.verification.recomputation import LimitCurves
 from tests.suite.helpers.checks import problems
 from tests.suite.helpers.hands import changed_hand
 from tests.suite.helpers.stances import (

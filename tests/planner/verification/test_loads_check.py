@@ -13,7 +13,7 @@ from planner.result import LoadRecovery, Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
 from planner.verification import loads_check, recomputation
-from planner.verification.limit_surface import LimitCurves
+from planner.verification.recomputation import LimitCurves
 from tests.suite.helpers.fingernails import STRONG, hung, one_hand
 from tests.suite.helpers.hands import changed_hand
 from tests.suite.helpers.random_questions import KINDS
