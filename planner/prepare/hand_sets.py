@@ -15,8 +15,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import scipy
 
-from hand_models.base import Array
-from hand_models.compliance import FloatingWrist, PalmMode
+from hand_models.base import Array, InvalidInputError, UnsupportedError
+from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
+from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import programs
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
@@ -30,6 +31,7 @@ from planner.programs import (
     hands_data,
     scaled_rows,
 )
+from planner.question import Stance
 
 __all__ = [
     "ExactMeasure",
@@ -38,6 +40,8 @@ __all__ = [
     "Sets",
     "are_own",
     "widest_at_rest",
+    "wrist_at",
+    "wrists_at",
 ]
 
 DIFFERENCE: Final = 1e-3
@@ -328,3 +332,25 @@ def _room(space: WrenchSpace) -> float:
         goal, A_ub=np.hstack([rows, sizes]), b_ub=space.b, bounds=bounds
     )
     return -math.inf if result.fun is None else -float(result.fun)
+
+
+def wrist_at(
+    stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
+) -> FloatingWrist | None:
+    """Return how the hand of that index gives way; None if its wrist is fixed."""
+    hand = stance.hands[index]
+    if hand.wrist == "fixed":
+        return None
+    try:
+        return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
+    except InvalidInputError as error:
+        if isinstance(error, UnsupportedError):
+            error.field = "wrist"
+        raise error.within(f"stance.hands[{index}]") from None
+
+
+def wrists_at(
+    stance: Stance, settled: Sequence[SettledHand], tension_limit: float | None = None
+) -> tuple[FloatingWrist | None, ...]:
+    """Return how each hand gives way; see `wrist_at`."""
+    return tuple([wrist_at(stance, i, hand, tension_limit) for i, hand in enumerate(settled)])

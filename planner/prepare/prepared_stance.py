@@ -16,9 +16,9 @@ from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
-from planner.prepare.hand_sets import HandSets, Sets, are_own
+from planner.prepare.hand_sets import HandSets, Sets, are_own, wrists_at
 from planner.prepare.joint_posture import Posture, posture
-from planner.prepare.settled_stance import settle_stance, wrists_at
+from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
 from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
 from planner.question import Question

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hand_models.base import InvalidInputError, UnsupportedError
-from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
+from hand_models.base import InvalidInputError
+from hand_models.compliance import FloatingWrist, PalmMode
 from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare.hand_sets import widest_at_rest
+from planner.prepare.hand_sets import widest_at_rest, wrist_at
 from planner.question import HandOnHold, Stance
 
 __all__ = [
@@ -21,8 +21,6 @@ __all__ = [
     "settle_each",
     "settle_hand",
     "settle_stance",
-    "wrist_at",
-    "wrists_at",
 ]
 
 
@@ -75,28 +73,6 @@ def settle_each(
         seated = kind.settle_each(group) if way is None else best_seats(kind, group, way)
         found.update(zip(own, seated, strict=True))
     return [found[i] for i in range(len(hands))]
-
-
-def wrist_at(
-    stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
-) -> FloatingWrist | None:
-    """Return how the hand of that index gives way; None if its wrist is fixed."""
-    hand = stance.hands[index]
-    if hand.wrist == "fixed":
-        return None
-    try:
-        return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
-    except InvalidInputError as error:
-        if isinstance(error, UnsupportedError):
-            error.field = "wrist"
-        raise error.within(f"stance.hands[{index}]") from None
-
-
-def wrists_at(
-    stance: Stance, settled: Sequence[SettledHand], tension_limit: float | None = None
-) -> tuple[FloatingWrist | None, ...]:
-    """Return how each hand gives way; see `wrist_at`."""
-    return tuple([wrist_at(stance, i, hand, tension_limit) for i, hand in enumerate(settled)])
 
 
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:

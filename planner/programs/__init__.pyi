@@ -1,8 +1,9 @@
 from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED, Outcome as Outcome, Reached as Reached
-from .program import (
+from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
+from .solvers import (
     SLACK as SLACK,
-    TIE as TIE,
-    UNLIMITED as UNLIMITED,
+    beyond as beyond,
+    body_wrench as body_wrench,
     curved as curved,
     effort as effort,
     holds as holds,
@@ -13,8 +14,9 @@ from .program import (
     nearest_body as nearest_body,
     reach as reach,
     tie_break as tie_break,
-    tie_weight as tie_weight,
     unique as unique,
+    used as used,
+    used_effort as used_effort,
     vertex as vertex,
 )
 from .stance_data import (
@@ -26,14 +28,10 @@ from .stance_data import (
     HandData as HandData,
     ScaledRows as ScaledRows,
     StanceData as StanceData,
-    beyond as beyond,
-    body_wrench as body_wrench,
     hands_data as hands_data,
     is_effort as is_effort,
     parted as parted,
     scaled_rows as scaled_rows,
-    used as used,
-    used_effort as used_effort,
 )
 from .stance_program import SOLVER as SOLVER
 from .supports import SilentHighs as SilentHighs, Support as Support

@@ -13,16 +13,15 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import clarabel
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from planner import deadline
-from planner.programs.stance_data import Columns
 
 __all__ = [
     "ENDS",
@@ -33,6 +32,7 @@ __all__ = [
     "PROVEN",
     "SOLVERS",
     "UNBOUNDED",
+    "Columns",
     "ConicProgram",
     "Outcome",
     "Reached",
@@ -72,6 +72,44 @@ UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
 
 ENDS: Final = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
 """After which nothing else is tried."""
+
+
+class Columns(NamedTuple):
+    """A matrix without its zeros, in compressed columns.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+    rows : ndarray of int, shape (n,)
+        Of the values, column by column.
+    starts : ndarray of int, shape (columns + 1,)
+        Where each column begins in them, and where the last one ends.
+    """
+
+    values: Array
+    rows: Indices
+    starts: Indices
+
+    @classmethod
+    def of(cls, matrix: Array) -> Columns:
+        """Leave the zeros of a matrix out."""
+        height, width = matrix.shape
+        flat = matrix.T.ravel()
+        # of truth values they are found six times as fast as of numbers
+        (places,) = (flat != 0.0).nonzero()
+        starts = places.searchsorted(height * np.arange(width + 1))
+        return cls(flat.take(places), places % max(height, 1), starts)
+
+    @classmethod
+    def beside(cls, parts: Sequence[Columns]) -> Columns:
+        """Put some with the same rows beside each other."""
+        ends = np.cumsum([0, *(part.starts[-1] for part in parts)])
+        starts = [part.starts[:-1] + end for part, end in zip(parts, ends, strict=False)]
+        return cls(
+            np.concatenate([part.values for part in parts]),
+            np.concatenate([part.rows for part in parts]),
+            np.concatenate([*starts, ends[-1:]]),
+        )
 
 
 class ConicProgram(NamedTuple):

@@ -22,7 +22,7 @@ Eight programs share these rows:
 =============  =============================================================================
 
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
-body wrenches over `WRENCH_UNIT`, limit rows over their capacities. The functions below solve them.
+body wrenches over `WRENCH_UNIT`, limit rows over their capacities.
 """
 
 from __future__ import annotations
@@ -36,13 +36,11 @@ import scipy
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
-from planner import deadline
-from planner.programs.conic import LATE, ConicProgram, Outcome, Reached
-from planner.programs.stance_data import Columns, StanceData, beyond, body_wrench
+from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
+from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import REFINED, SHARP, VERTEX, Definition, StanceProgram
 
 __all__ = [
-    "SLACK",
     "TIE",
     "UNLIMITED",
     "Curved",
@@ -53,19 +51,7 @@ __all__ = [
     "Reach",
     "TieBreak",
     "Unique",
-    "curved",
-    "effort",
-    "holds",
-    "least_tensions",
-    "load_factor",
-    "margin",
-    "nearest",
-    "nearest_body",
-    "reach",
-    "tie_break",
     "tie_weight",
-    "unique",
-    "vertex",
 ]
 
 UNLIMITED: Final = 1e4
@@ -379,79 +365,3 @@ class Nearest(StanceProgram):
         P, q = np.zeros((2, A.shape[1]))
         q[0] = 1.0
         return ConicProgram(P, q, (Columns.of(A),), b, zero, second_order=1 + count)
-
-
-SLACK: Final = 1e-6
-"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
-
-SHARP_SLACK: Final = 1e-9
-"""The same where the least utilisation has all its digits."""
-
-
-def margin(data: StanceData) -> Outcome:
-    """Solve `Margin`."""
-    return Margin(data).solve()
-
-
-def vertex(data: StanceData) -> Outcome:
-    """Solve `Margin` by the simplex method."""
-    return Margin(data).vertex()
-
-
-def unique(data: StanceData, share: float = 1.0) -> Outcome:
-    """Solve `Unique`."""
-    return Unique(data, share).solve()
-
-
-def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-    """Solve `Curved`."""
-    return Curved(data, root, near).solve()
-
-
-def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve `TieBreak`."""
-    return TieBreak(data, cap).solve()
-
-
-def least_tensions(data: StanceData, utilisation: float) -> Outcome:
-    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
-    outcome = LATE
-    for slack in (SHARP_SLACK, SLACK):
-        outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
-        if outcome.solved or deadline.expired():
-            break
-    return outcome
-
-
-def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve `Effort`."""
-    return Effort(data, cap).solve()
-
-
-def load_factor(data: StanceData) -> Outcome:
-    """Solve `LoadFactor`."""
-    return LoadFactor(data).solve()
-
-
-def reach(
-    data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
-) -> Reached:
-    """Solve `Reach`."""
-    return Reach(data, goal, B, cap, K).farthest()
-
-
-def nearest(data: StanceData) -> Outcome:
-    """Solve `Nearest`."""
-    return Nearest(data).solve()
-
-
-def nearest_body(data: StanceData) -> Outcome:
-    """Solve `Nearest` with all given wrenches of hands kept."""
-    return Nearest(data, len(data.wrench) - 6).solve()
-
-
-def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
-    """Whether loads y balance, and keep to hard rows and to limits at a cap, within `SLACK`."""
-    error = np.abs(body_wrench(data, loads) - data.wrench).max()
-    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
-    return balances and beyond(data, loads, cap) <= SLACK

@@ -22,6 +22,7 @@ from hand_models.base import Array, Indices
 from hand_models.compliance import WRIST, pose_units
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, TENDON_TENSION
 from hand_models.wrench_spaces import Row, WrenchSpace
+from planner.programs.conic import Columns
 
 __all__ = [
     "JOINT_TORQUE",
@@ -29,18 +30,14 @@ __all__ = [
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
-    "Columns",
     "HandData",
     "HandRows",
     "ScaledRows",
     "StanceData",
-    "beyond",
-    "body_wrench",
     "hands_data",
     "is_effort",
     "parted",
     "scaled_rows",
-    "used_effort",
 ]
 
 LOAD_UNIT: Final = 100.0
@@ -294,44 +291,6 @@ def hands_data(
     return tuple(found)
 
 
-class Columns(NamedTuple):
-    """A matrix without its zeros, in compressed columns.
-
-    Attributes
-    ----------
-    values : ndarray, shape (n,)
-    rows : ndarray of int, shape (n,)
-        Of the values, column by column.
-    starts : ndarray of int, shape (columns + 1,)
-        Where each column begins in them, and where the last one ends.
-    """
-
-    values: Array
-    rows: Indices
-    starts: Indices
-
-    @classmethod
-    def of(cls, matrix: Array) -> Columns:
-        """Leave the zeros of a matrix out."""
-        height, width = matrix.shape
-        flat = matrix.T.ravel()
-        # of truth values they are found six times as fast as of numbers
-        (places,) = (flat != 0.0).nonzero()
-        starts = places.searchsorted(height * np.arange(width + 1))
-        return cls(flat.take(places), places % max(height, 1), starts)
-
-    @classmethod
-    def beside(cls, parts: Sequence[Columns]) -> Columns:
-        """Put some with the same rows beside each other."""
-        ends = np.cumsum([0, *(part.starts[-1] for part in parts)])
-        starts = [part.starts[:-1] + end for part, end in zip(parts, ends, strict=False)]
-        return cls(
-            np.concatenate([part.values for part in parts]),
-            np.concatenate([part.rows for part in parts]),
-            np.concatenate([*starts, ends[-1:]]),
-        )
-
-
 class HandRows(NamedTuple):
     """All hands' rows in all their loads z (M,): G z of the balance, limits L z, hard rows H z.
 
@@ -410,33 +369,3 @@ def parted(whole: Array, sizes: Iterable[int]) -> tuple[Array, ...]:
     """Return the parts of an array, one after another, of these sizes."""
     ends = list(accumulate(sizes, initial=0))
     return tuple([whole[begin:end] for begin, end in pairwise(ends)])
-
-
-def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the scaled balance that the hands' loads y give, shape (nb,)."""
-    parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
-    return np.asarray(sum(parts, start=np.zeros_like(data.wrench)))
-
-
-def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
-    """Return by how much loads y exceed limits at a cap, or break hard rows, scaled; at least 0."""
-    worst = 0.0
-    for hand, y in zip(data.hands, loads, strict=True):
-        z = y / hand.unit
-        worst = max(worst, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
-        worst = max(worst, float((hand.H @ z - hand.h).max(initial=0.0)))
-    return worst
-
-
-def used(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the utilisation of every limit row, hand by hand, shape (sum of nl,)."""
-    parts = zip(data.hands, loads, strict=True)
-    return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
-
-
-def used_effort(data: StanceData, loads: Sequence[Array]) -> float:
-    """Return Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques."""
-    return sum(
-        float(np.sum((hand.E @ (y / hand.unit) + hand.e0) ** 2))
-        for hand, y in zip(data.hands, loads, strict=True)
-    )

@@ -25,11 +25,12 @@ from planner.programs.conic import (
     PRESENT,
     PROVEN,
     SOLVERS,
+    Columns,
     ConicProgram,
     Outcome,
     Solver,
 )
-from planner.programs.stance_data import Columns, StanceData, parted
+from planner.programs.stance_data import StanceData, parted
 
 if TYPE_CHECKING:
     import cvxpy as cp

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.programs import program
+from planner.programs import solvers
 from tests.benchmarks.race import race
 from tests.benchmarks.results import Line, Table, span, times
 from tests.suite.helpers import centroidal_peer
@@ -28,7 +28,7 @@ def centroidal_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
         return our_margin(cases[number % CASES])
 
     def margin(number: int) -> None:
-        program.margin(stances[number % CASES])
+        solvers.margin(stances[number % CASES])
 
     for case, other in zip(cases, margins, strict=True):
         mine = our_margin(case)

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator
 
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandSets, Sets, assemble
-from planner.programs import program
+from planner.programs import program, solvers
 from planner.question import Question
 from planner.solving import plan
 from tests.benchmarks.measured_stances import question_of, twin_of
@@ -108,7 +108,7 @@ def _curve(
 
 def _programs(size: int, sets: Sequence[Sets]) -> dict[tuple[str, int], Way]:
     raw = Clarabel([unique(scaled(each)) for each in sets], program.Unique.settings[0])
-    return {(OURS, size): lambda k: program.unique(sets[k].data), (RAW, size): raw.updated}
+    return {(OURS, size): lambda k: solvers.unique(sets[k].data), (RAW, size): raw.updated}
 
 
 def _raced(

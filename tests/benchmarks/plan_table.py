@@ -12,7 +12,7 @@ import numpy as np
 from hand_models.parameters import bundled_draws
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
-from planner.programs import conic, program, stance_program
+from planner.programs import conic, program, solvers, stance_program
 from planner.question import Question
 from planner.solving import plan
 from service.answering import dispatch
@@ -54,7 +54,7 @@ def known(number: int) -> Known:
     asked = question_of(number)
     _, hands = assemble(asked, None, asked.needed_wrench())
     sets = hands.sets(hands.at_rest(hands.idle))
-    return Known(asked, hands, sets, program.unique(sets.data).value)
+    return Known(asked, hands, sets, solvers.unique(sets.data).value)
 
 
 class Rivals:
@@ -258,7 +258,7 @@ def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
 
     def ours(number: int) -> None:
         hands = stances[number]
-        program.unique(hands.sets(hands.at_rest(hands.idle)).data)
+        solvers.unique(hands.sets(hands.at_rest(hands.idle)).data)
 
     ways: dict[str, Way] = {
         "floor": rivals.unique.updated,

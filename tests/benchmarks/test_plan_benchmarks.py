@@ -9,7 +9,7 @@ import pytest
 
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, assemble
-from planner.programs import program
+from planner.programs import program, solvers
 from planner.programs.conic import Solver
 from planner.programs.stance_program import SETTINGS
 from planner.result import LoadRecovery
@@ -53,7 +53,7 @@ def test_plan_with_its_spread(benchmark):
 @pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
 def test_margin_with_new_data(benchmark, hold):
     question = question_of(hold=hold)
-    outcome = benchmark(program.margin, program_data(question))
+    outcome = benchmark(solvers.margin, program_data(question))
     assert outcome.value == pytest.approx(peer.least_utilisation(question).fun, rel=1e-6)
 
 
@@ -77,13 +77,13 @@ def test_margin_by_a_solver_set_up_for_each_query(benchmark, hold):
 @pytest.mark.benchmark(group="other programs of four hands")
 def test_tie_break(benchmark):
     data = program_data(question_of())
-    least = program.margin(data).value
-    assert benchmark(program.tie_break, data, least + 1e-6).solved
+    least = solvers.margin(data).value
+    assert benchmark(solvers.tie_break, data, least + 1e-6).solved
 
 
 @pytest.mark.benchmark(group="other programs of four hands")
 def test_load_factor(benchmark):
-    assert benchmark(program.load_factor, program_data(question_of())).value > 1.0
+    assert benchmark(solvers.load_factor, program_data(question_of())).value > 1.0
 
 
 @pytest.mark.benchmark(group="other programs of four hands")
@@ -126,7 +126,7 @@ def solved_stance():
     wrench = question.needed_wrench()
     batch, hands = assemble(question, None, wrench)
     spaces, data = hands.sets(hands.at_rest(hands.idle))
-    return question, batch, spaces, data, program.unique(data), wrench
+    return question, batch, spaces, data, solvers.unique(data), wrench
 
 
 @pytest.mark.benchmark(group="after the solver, four hands")

@@ -10,8 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from planner.programs import HandData, StanceData, program
-from planner.programs.conic import ConicProgram
-from planner.programs.stance_data import Columns
+from planner.programs.conic import Columns, ConicProgram
 
 __all__ = ["WholeBlocks"]
 

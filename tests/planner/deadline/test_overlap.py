@@ -11,7 +11,7 @@ import pytest
 
 from planner import deadline
 from planner.deadline import Overlap, begin_overlap, overlap
-from planner.programs import program
+from planner.programs import solvers
 from planner.solving import KnownStance, solve
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
@@ -24,13 +24,13 @@ def me() -> str:
 
 def test_a_solver_that_runs_has_the_work_done_by_another_thread():
     data = program_data(ask(on_wall()))
-    program.unique(data)
+    solvers.unique(data)
     with Overlap(me) as work:
         assert work.begun is None
-        program.unique(data)
+        solvers.unique(data)
         begun = work.begun
         # the first solver has taken it
-        program.unique(data)
+        solvers.unique(data)
         assert work.begun is begun
     assert begun.result() == work.result() != me()
 

@@ -17,7 +17,7 @@ from planner.deadline import Budget
 from planner.explanation import far_wrists
 from planner.floating import continuation
 from planner.prepare import settle_hand
-from planner.programs import program, stance_program
+from planner.programs import solvers, stance_program
 from planner.question import Question
 from planner.result import Plan
 from planner.solving import plan
@@ -91,7 +91,7 @@ def test_utilisation_and_load_factor_agree(limbs, preload):
     else:
         answer = plan(question(request(limbs, preload, want=["load_factor"])))
     assert answer.load_factor is not None
-    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + program.SLACK)
+    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.SLACK)
 
 
 def test_budget_ends_a_search(monkeypatch):

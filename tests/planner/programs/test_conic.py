@@ -16,9 +16,9 @@ from scipy.sparse import csc_matrix
 
 from hand_models.rock import Cylinder
 from planner import deadline
-from planner.programs import conic, program, stance_program
-from planner.programs.conic import ConicProgram, Solver, Solvers
-from planner.programs.stance_data import Columns, HandData, StanceData
+from planner.programs import conic, program, solvers, stance_program
+from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
+from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
@@ -131,7 +131,7 @@ def test_the_solver_gets_what_cvxpy_would_give_it(kind, shapes):
 
 def real_programs(data: StanceData) -> dict[str, StanceProgram]:
     """All of a stance that can be held."""
-    loads = program.unique(data).loads
+    loads = solvers.unique(data).loads
     root = 0.1 * np.eye(len(data.rows.unit))
     up = np.eye(6)[:, 2:3]
     return {
@@ -181,10 +181,10 @@ def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, ki
 def test_an_answer_does_not_depend_on_the_questions_before(data):
     other = program_data(ask(on_wall(overhang=0.2, off=0.25)))
     conic.SOLVERS.clear()
-    fresh = program.unique(data)
+    fresh = solvers.unique(data)
     for before in (other, data, other.turned(1.2 * other.wrench), data.turned(other.wrench)):
-        program.unique(before)
-    again = program.unique(data)
+        solvers.unique(before)
+    again = solvers.unique(data)
     assert again.value == fresh.value
     for one, two in zip(again.loads, fresh.loads, strict=True):
         np.testing.assert_array_equal(one, two)
@@ -227,24 +227,24 @@ def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
     conic.SOLVERS.clear()
     with monkeypatch.context() as patch:
         patch.setattr(clarabel, "DefaultSolver", Spy)
-        program.unique(data)
+        solvers.unique(data)
     assert given == ["new"]
     wrench = 1.1 * data.wrench
-    turned = program.unique(data.turned(wrench))
+    turned = solvers.unique(data.turned(wrench))
     assert given[1:] == [{"b"}]
     weaker = tuple(hand._replace(L=1.1 * hand.L) for hand in data.hands)
-    program.unique(StanceData(weaker, wrench))
+    solvers.unique(StanceData(weaker, wrench))
     assert given[2:] == [{"A"}]
     conic.SOLVERS.clear()
-    assert program.unique(data.turned(wrench)).value == turned.value
+    assert solvers.unique(data.turned(wrench)).value == turned.value
 
 
 def test_threads_do_not_disturb_each_other(data):
     conic.SOLVERS.clear()
     wrenches = [data.wrench * (1.0 + 0.02 * i) for i in range(24)]
-    alone = [program.unique(data.turned(w)).value for w in wrenches]
+    alone = [solvers.unique(data.turned(w)).value for w in wrenches]
     with ThreadPoolExecutor(6) as pool:
-        together = list(pool.map(lambda w: program.unique(data.turned(w)).value, wrenches * 4))
+        together = list(pool.map(lambda w: solvers.unique(data.turned(w)).value, wrenches * 4))
     assert together == alone * 4
     assert len(conic.SOLVERS) <= 6
 
@@ -255,36 +255,36 @@ def test_the_solvers_that_wait_are_bounded(data):
         # another entry that is zero: another pattern
         L = hand.L.copy()
         L[j, i] = 0.0 if L[j, i] else 1.0
-        program.margin(StanceData((hand._replace(L=L), *data.hands[1:]), data.wrench))
+        solvers.margin(StanceData((hand._replace(L=L), *data.hands[1:]), data.wrench))
     assert len(conic.SOLVERS) == conic.KEPT
     conic.SOLVERS.clear()
     assert len(conic.SOLVERS) == 0
 
 
 def test_numbers_that_are_none_cost_only_their_own_question(data):
-    honest = program.unique(data)
-    lost = program.unique(data.turned(data.wrench * np.nan))
+    honest = solvers.unique(data)
+    lost = solvers.unique(data.turned(data.wrench * np.nan))
     assert not lost.solved
     assert np.isnan(lost.value)
-    assert program.unique(data).value == honest.value
+    assert solvers.unique(data).value == honest.value
     # in the weights, too: what a solver keeps of them it takes along
     for number in (np.nan, np.inf):
         hands = tuple(hand._replace(tie=hand.tie * number) for hand in data.hands)
-        assert not program.unique(StanceData(hands, data.wrench)).solved
-        again = program.unique(data)
+        assert not solvers.unique(StanceData(hands, data.wrench)).solved
+        again = solvers.unique(data)
         for one, two in zip(again.loads, honest.loads, strict=True):
             np.testing.assert_array_equal(one, two)
 
 
 def test_a_solver_is_stopped_at_the_deadline_and_goes_on_after(data):
-    honest = program.unique(data)
+    honest = solvers.unique(data)
     with deadline.within(0.0):
-        late = program.unique(data)
+        late = solvers.unique(data)
     assert late.status == conic.OUT_OF_TIME
     assert not late.solved
     with deadline.within(1e4):
-        assert program.unique(data).value == honest.value
-    assert program.unique(data).value == honest.value
+        assert solvers.unique(data).value == honest.value
+    assert solvers.unique(data).value == honest.value
 
 
 def test_an_inner_deadline_cannot_put_off_an_outer_one():
@@ -299,7 +299,7 @@ def test_an_inner_deadline_cannot_put_off_an_outer_one():
 def test_infeasible_comes_with_its_proof():
     """Farkas: ν·(W − g) + λ·h < 0 with λ ≥ 0 and Gᵀν + Hᵀλ = 0, no weight on limits."""
     data = program_data(ask(on_wall(palm=False)))
-    outcome = program.unique(data)
+    outcome = solvers.unique(data)
     assert outcome.status == cp.INFEASIBLE
     nu = outcome.balance_dual
     value = float(nu @ data.offset)
@@ -322,7 +322,7 @@ def test_the_solvers_words_are_cvxpys():
 
 
 def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
-    honest = program.unique(data)
+    honest = solvers.unique(data)
 
     def interrupted():
         raise KeyboardInterrupt
@@ -330,8 +330,8 @@ def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
     with deadline.within(1e4), monkeypatch.context() as patch:
         patch.setattr(deadline, "expired", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            program.unique(data)
-    assert program.unique(data).value == honest.value
+            solvers.unique(data)
+    assert solvers.unique(data).value == honest.value
 
 
 FORKED = """

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from hand_models.hand import FINGERS
 from hand_models.rock import Cylinder, Plane, Sphere
-from planner.programs import program
+from planner.programs import solvers
 from planner.question import Load
 from planner.result import Plan
 from planner.solving import plan
@@ -179,7 +179,7 @@ def test_a_symmetric_stance_has_a_symmetric_plan(hold, lateral):
             )
 
 
-@pytest.mark.parametrize("solve", [program.margin, program.vertex])
+@pytest.mark.parametrize("solve", [solvers.margin, solvers.vertex])
 @many
 def test_dual_bound_of_the_margin_proves_its_optimum(seeds, solve):
     """The multipliers of a linear program bound its optimum from below; the gap is nothing."""

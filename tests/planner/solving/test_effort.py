@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 from planner.prepare import assemble, hand_space, posture
-from planner.programs import HandData, StanceData, program, stance_data
+from planner.programs import HandData, StanceData, solvers
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Price
 from planner.robots import RobotFile, robot_of
@@ -100,8 +100,8 @@ class Quadratic:
         return self.hands.sets(self.hands.at_rest(self.hands.idle)).data
 
     def solved(self) -> np.ndarray:
-        """Loads of all hands by `program.effort`, proven with its small weights."""
-        outcome = program.effort(self.data, self.cap)
+        """Loads of all hands by `solvers.effort`, proven with its small weights."""
+        outcome = solvers.effort(self.data, self.cap)
         assert outcome.solved, outcome.status
         value, gap = effort_gap(self.data, self.cap, outcome.loads)
         assert -1e-6 <= gap <= 1e-6 * max(1.0, value)
@@ -291,14 +291,14 @@ def test_the_program_of_any_number_of_hands_is_proven_by_highs(count, seed):
     inside = [rng.uniform(0.0, 0.1, len(hand.unit)) for hand in hands]
     wrench = sum(hand.G @ z + hand.g for hand, z in zip(hands, inside, strict=True))
     data = StanceData(hands, wrench)
-    outcome = program.effort(data, 1.0)
+    outcome = solvers.effort(data, 1.0)
     assert outcome.solved
     value, gap = effort_gap(data, 1.0, outcome.loads)
     assert value == pytest.approx(outcome.value, abs=1e-7)
     assert -1e-6 <= gap <= 1e-5 * max(1.0, value)
     bound = dual_bounds.least_effort_bound(data, outcome, 1.0)
     assert value - 1e-5 * max(1.0, value) <= bound <= value + 1e-6
-    assert stance_data.used_effort(data, outcome.loads) <= value
+    assert solvers.used_effort(data, outcome.loads) <= value
 
 
 def test_sixteen_limbs_of_a_robot_of_its_own():
@@ -388,7 +388,7 @@ def test_prices_of_limits_are_those_of_their_rows_while_efforts_are_measured_ali
     answer = plan(question)
     by_hand = Quadratic(question)
     data, cap = by_hand.data, by_hand.cap
-    at = stance_data.used_effort(data, program.effort(data, cap).loads)
+    at = solvers.used_effort(data, solvers.effort(data, cap).loads)
     limbs = [hand.limb for hand in question.stance.hands]
     assert answer.effort_prices
     for price in answer.effort_prices[:6]:
@@ -404,7 +404,7 @@ def test_prices_of_limits_are_those_of_their_rows_while_efforts_are_measured_ali
             weaker = np.where(mine, space.s / (space.s + step), 1.0)
             other = hand._replace(L=hand.L * weaker[:, None], l0=hand.l0 * weaker)
             hands = (*data.hands[:index], other, *data.hands[index + 1 :])
-            outcome = program.effort(StanceData(hands, data.wrench), cap)
+            outcome = solvers.effort(StanceData(hands, data.wrench), cap)
             assert outcome.solved
-            gained.append((at - stance_data.used_effort(data, outcome.loads)) / step)
+            gained.append((at - solvers.used_effort(data, outcome.loads)) / step)
         assert between(price.price, gained[0], gained[1]), (name, price.price, gained)

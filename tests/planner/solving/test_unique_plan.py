@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError
-from planner.programs import program, stance_data
+from planner.programs import solvers
 from planner.question import Load
 from planner.solving import KnownStance
 from planner.solving.unique_plan import active_set_optimum
@@ -23,7 +23,7 @@ def problems(count):
             data = program_data(ask(stance, load=Load(float(rng.uniform(5.0, 60.0)))))
         except InvalidInputError:
             continue
-        outcome = program.unique(data)
+        outcome = solvers.unique(data)
         if outcome.solved and outcome.value < 1.1:
             found.append(data)
     return found
@@ -38,16 +38,16 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
     """Against the second program, at a cap as close as its solver bears; most can be polished."""
     count = 0
     for data in data_of_all:
-        outcome = program.unique(data)
+        outcome = solvers.unique(data)
         exact = active_set_optimum(data, outcome)
         if exact is None:
             continue
         count += 1
-        assert exact.outcome.value == pytest.approx(program.margin(data).value, abs=1e-6)
-        assert stance_data.beyond(data, exact.outcome.loads, exact.outcome.value) <= 1e-8
-        balance = stance_data.body_wrench(data, exact.outcome.loads)
+        assert exact.outcome.value == pytest.approx(solvers.margin(data).value, abs=1e-6)
+        assert solvers.beyond(data, exact.outcome.loads, exact.outcome.value) <= 1e-8
+        balance = solvers.body_wrench(data, exact.outcome.loads)
         np.testing.assert_allclose(balance, data.wrench, atol=1e-8)
-        other = program.tie_break(data, outcome.value + 1e-10)
+        other = solvers.tie_break(data, outcome.value + 1e-10)
         if not other.solved:
             continue
         for mine, theirs in zip(exact.outcome.loads, other.loads, strict=True):
@@ -57,7 +57,7 @@ def test_polished_tensions_are_those_of_the_tie_break(data_of_all):
 
 def test_loads_far_from_the_optimum_are_not_polished(data_of_all):
     data = data_of_all[0]
-    outcome = program.unique(data)
+    outcome = solvers.unique(data)
     lost = replace(
         outcome,
         limit_duals=tuple(np.zeros_like(dual) for dual in outcome.limit_duals),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hand_models.rock import Cylinder
-from planner.programs import WRENCH_UNIT, program
+from planner.programs import WRENCH_UNIT, solvers
 from planner.streaming.affine_bounds import affine_bound
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import ask, on_wall, program_data, random_question
@@ -18,7 +18,7 @@ QUESTIONS = {
 }
 
 
-@pytest.mark.parametrize("solve", [program.margin, program.unique])
+@pytest.mark.parametrize("solve", [solvers.margin, solvers.unique])
 @pytest.mark.parametrize("question", QUESTIONS.values(), ids=QUESTIONS.keys())
 def test_a_cut_is_the_least_utilisation_at_its_wrench_and_below_it_elsewhere(question, solve):
     data = program_data(question)
@@ -38,7 +38,7 @@ def test_a_cut_is_the_least_utilisation_at_its_wrench_and_below_it_elsewhere(que
 def test_a_cut_of_spoilt_multipliers_is_still_none_too_many(noise):
     question = QUESTIONS["wall"]
     data = program_data(question)
-    outcome = program.margin(data)
+    outcome = solvers.margin(data)
     rng = np.random.default_rng(7)
 
     def spoilt(parts):
@@ -59,7 +59,7 @@ def test_a_cut_of_spoilt_multipliers_is_still_none_too_many(noise):
 
 def test_multipliers_that_prove_nothing_give_no_cut():
     data = program_data(QUESTIONS["wall"])
-    outcome = program.margin(data)
+    outcome = solvers.margin(data)
     # the limits of one hand alone cannot keep the balance from being had otherwise
     limits = (outcome.limit_duals[0], *(0.0 * part for part in outcome.limit_duals[1:]))
     hard = tuple(0.0 * part for part in outcome.hard_duals)

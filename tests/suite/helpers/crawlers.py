@@ -12,7 +12,8 @@ from hand_models.base import Pose, wrench_transport
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import Grasp
 from hand_models.rock import Cylinder
-from planner.prepare.settled_stance import settle_stance, wrist_at
+from planner.prepare.hand_sets import wrist_at
+from planner.prepare.settled_stance import settle_stance
 from planner.question import HandOnHold, Question, Stance
 from planner.robots import Robot, RobotFile, robot_of
 from tests.suite.helpers.robots import joint, link, urdf

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.programs import WRENCH_UNIT, HandData, StanceData, program
+from planner.programs import WRENCH_UNIT, HandData, StanceData, solvers
 
 GRAVITY = 9.81
 EDGES = 4
@@ -76,7 +76,7 @@ def stance_of(case: dict) -> StanceData:
 
 
 def our_margin(case: dict) -> float | None:
-    outcome = program.margin(stance_of(case))
+    outcome = solvers.margin(stance_of(case))
     # the distance from the sum of the unit generators to the pyramid's faces, per newton of b0
     edges = pyramid(np.array(case["normals"][-1]), case["friction"])
     per_newton = np.linalg.norm(np.cross(edges.sum(axis=1), edges[:, 0]))

@@ -1,0 +1,148 @@
+"""The programs, solved, and what loads do to their rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from planner import deadline
+from planner.programs.conic import LATE, Outcome, Reached
+from planner.programs.program import (
+    Curved,
+    Effort,
+    LoadFactor,
+    Margin,
+    Nearest,
+    Reach,
+    TieBreak,
+    Unique,
+)
+from planner.programs.stance_data import StanceData
+
+__all__ = [
+    "SLACK",
+    "beyond",
+    "body_wrench",
+    "curved",
+    "effort",
+    "holds",
+    "least_tensions",
+    "load_factor",
+    "margin",
+    "nearest",
+    "nearest_body",
+    "reach",
+    "tie_break",
+    "unique",
+    "used",
+    "used_effort",
+    "vertex",
+]
+
+SLACK: Final = 1e-6
+"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+
+SHARP_SLACK: Final = 1e-9
+"""The same where the least utilisation has all its digits."""
+
+
+def margin(data: StanceData) -> Outcome:
+    """Solve `Margin`."""
+    return Margin(data).solve()
+
+
+def vertex(data: StanceData) -> Outcome:
+    """Solve `Margin` by the simplex method."""
+    return Margin(data).vertex()
+
+
+def unique(data: StanceData, share: float = 1.0) -> Outcome:
+    """Solve `Unique`."""
+    return Unique(data, share).solve()
+
+
+def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
+    """Solve `Curved`."""
+    return Curved(data, root, near).solve()
+
+
+def tie_break(data: StanceData, cap: float) -> Outcome:
+    """Solve `TieBreak`."""
+    return TieBreak(data, cap).solve()
+
+
+def least_tensions(data: StanceData, utilisation: float) -> Outcome:
+    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
+    outcome = LATE
+    for slack in (SHARP_SLACK, SLACK):
+        outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
+        if outcome.solved or deadline.expired():
+            break
+    return outcome
+
+
+def effort(data: StanceData, cap: float) -> Outcome:
+    """Solve `Effort`."""
+    return Effort(data, cap).solve()
+
+
+def load_factor(data: StanceData) -> Outcome:
+    """Solve `LoadFactor`."""
+    return LoadFactor(data).solve()
+
+
+def reach(
+    data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
+) -> Reached:
+    """Solve `Reach`."""
+    return Reach(data, goal, B, cap, K).farthest()
+
+
+def nearest(data: StanceData) -> Outcome:
+    """Solve `Nearest`."""
+    return Nearest(data).solve()
+
+
+def nearest_body(data: StanceData) -> Outcome:
+    """Solve `Nearest` with all given wrenches of hands kept."""
+    return Nearest(data, len(data.wrench) - 6).solve()
+
+
+def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+    """Whether loads y balance, and keep to hard rows and to limits at a cap, within `SLACK`."""
+    error = np.abs(body_wrench(data, loads) - data.wrench).max()
+    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
+    return balances and beyond(data, loads, cap) <= SLACK
+
+
+def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the scaled balance that the hands' loads y give, shape (nb,)."""
+    parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
+    return np.asarray(sum(parts, start=np.zeros_like(data.wrench)))
+
+
+def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
+    """Return by how much loads y exceed limits at a cap, or break hard rows, scaled; at least 0."""
+    worst = 0.0
+    for hand, y in zip(data.hands, loads, strict=True):
+        z = y / hand.unit
+        worst = max(worst, float((hand.L @ z + hand.l0 - cap).max(initial=0.0)))
+        worst = max(worst, float((hand.H @ z - hand.h).max(initial=0.0)))
+    return worst
+
+
+def used(data: StanceData, loads: Sequence[Array]) -> Array:
+    """Return the utilisation of every limit row, hand by hand, shape (sum of nl,)."""
+    parts = zip(data.hands, loads, strict=True)
+    return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
+
+
+def used_effort(data: StanceData, loads: Sequence[Array]) -> float:
+    """Return Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques."""
+    return sum(
+        float(np.sum((hand.E @ (y / hand.unit) + hand.e0) ** 2))
+        for hand, y in zip(data.hands, loads, strict=True)
+    )
