@@ -1,4 +1,10 @@
-from .bounded_store import BoundedStore as BoundedStore, stored as stored, stores as stores
+from .bounded_store import (
+    BoundedStore as BoundedStore,
+    StoreInfo as StoreInfo,
+    enlist as enlist,
+    stored as stored,
+    stores as stores,
+)
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,

@@ -7,10 +7,10 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial, wraps
 from threading import Lock
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Generic, NamedTuple, ParamSpec, Protocol, TypeVar
 from weakref import WeakSet
 
-__all__ = ["BoundedStore", "StoreInfo", "stored", "stores"]
+__all__ = ["BoundedStore", "StoreInfo", "enlist", "stored", "stores"]
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
@@ -34,8 +34,22 @@ class StoreInfo(NamedTuple):
     most: int
 
 
-_stores: WeakSet[BoundedStore[Any, Any]] = WeakSet()
+class Store(Protocol):
+    """What keeps things for later."""
+
+    name: str
+
+    def info(self) -> StoreInfo:
+        """Return how it has served."""
+
+
+_stores: WeakSet[Store] = WeakSet()
 """All that their owners still have."""
+
+
+def enlist(store: Store) -> None:
+    """Let `stores` tell of a store as long as its owner has it."""
+    _stores.add(store)
 
 
 def stores() -> dict[str, StoreInfo]:
@@ -77,7 +91,7 @@ class BoundedStore(Generic[K, V]):
         self._size, self._largest = size, largest
         self._lock = Lock()
         self.clear()
-        _stores.add(self)
+        enlist(self)
 
     def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[object, ...]]:
         return type(self), (self.name, self.most, self._size, self._largest)

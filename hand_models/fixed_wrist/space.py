@@ -227,10 +227,6 @@ def _of_fingers(layout: RowLayout, tiles: Array) -> Array:
     return np.asarray(np.add.reduceat(tiles, starts, axis=1))
 
 
-KEPT: Final = 4
-"""Sets that are kept of one settled hand, for different tension limits."""
-
-
 def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> WrenchSpace:
     """Return the wrenches on the rock, in H, that a settled hand carries with its wrist fixed.
 
@@ -266,8 +262,7 @@ def wrench_spaces(
 ) -> list[WrenchSpace]:
     """Return the set of each hand, as `wrench_space` does, all worked out together.
 
-    A hand's sets are kept as long as the hand is, the last `KEPT` of them: asked again, the answer
-    is the same set.
+    A hand's last sets are kept as long as the hand is: asked again, the answer is the same set.
     """
     if tension_limit is not None:
         check_positive(tension_limit, "N", "tension_limit", most=math.inf)
@@ -276,17 +271,15 @@ def wrench_spaces(
     found: dict[SettledHand, WrenchSpace] = {}
     new: dict[SettledHand, float] = {}
     for hand, limit in zip(settled, limits, strict=True):
-        known = hand.sets.get(limit)
+        (known,) = hand.sets.find([limit])
         if known is None:
             new[hand] = limit
         else:
             found[hand] = known
     if new:
         for hand, space in _worked_out(new):
-            found[hand] = hand.sets[new[hand]] = space
-            if len(hand.sets) > KEPT:
-                for known_limit in list(hand.sets)[:-KEPT]:
-                    hand.sets.pop(known_limit, None)
+            found[hand] = space
+            hand.sets.keep([(new[hand], space)])
     return [found[hand] for hand in settled]
 
 

@@ -6,12 +6,12 @@ import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, BoundedStore, Indices
 from hand_models.finger import BALANCE, NONE, STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
@@ -22,6 +22,9 @@ from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
+
+KEPT: Final = 4
+"""Sets that are kept of one settled hand, for different tension limits."""
 
 
 class HandPostures(NamedTuple):
@@ -176,7 +179,7 @@ class SettledHand:
     stops : tuple of (int, int, ndarray)
         Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
     palm : Palm
-    sets : dict of float to WrenchSpace
+    sets : BoundedStore of float to WrenchSpace
         What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
     """
 
@@ -198,7 +201,9 @@ class SettledHand:
     nail_rows: tuple[tuple[Array, Array], ...]
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
-    sets: dict[float, WrenchSpace] = field(default_factory=dict, init=False, repr=False)
+    sets: BoundedStore[float, WrenchSpace] = field(
+        default_factory=lambda: BoundedStore("sets of hands", KEPT), init=False, repr=False
+    )
 
     @cached_property
     def fingers(self) -> tuple[SettledFinger, ...]:

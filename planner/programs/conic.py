@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 import clarabel
 import numpy as np
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, Indices, StoreInfo, enlist
 from planner import deadline
 
 __all__ = [
@@ -262,18 +262,25 @@ class Solvers:
         That are kept; those go first that were used longest ago.
     """
 
+    name = "solvers"
+
     def __init__(self, most: int) -> None:
         self._most = most
         self._lock = threading.Lock()
         self._idle: list[Solver] = []
+        self._hits = self._misses = 0
+        enlist(self)
 
-    def __len__(self) -> int:
-        return len(self._idle)
+    def info(self) -> StoreInfo:
+        """Return how they have served."""
+        with self._lock:
+            return StoreInfo(self._hits, self._misses, len(self._idle), self._most)
 
     def clear(self) -> None:
         """Let all go that wait."""
         with self._lock:
             self._idle.clear()
+            self._hits = self._misses = 0
 
     def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> Solution:
         """Solve a program; parameters as for `Solver`."""
@@ -295,7 +302,9 @@ class Solvers:
         with self._lock:
             for i in reversed(range(len(self._idle))):
                 if self._idle[i].pattern == pattern and self._idle[i].settings == settings:
+                    self._hits += 1
                     return self._idle.pop(i)
+            self._misses += 1
         return None
 
 

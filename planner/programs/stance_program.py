@@ -208,11 +208,10 @@ class StanceProgram(ABC):
             for part in (program.P, program.q, program.b, self.data.rows.whole)
         ):
             return self.by_definition()
-        duals: tuple[Array, ...] = ()
-        if found.multipliers is not None:
-            balance = found.multipliers[program.above : program.above + len(self.G)]
-            others = found.multipliers[program.zero :]
-            duals = balance, *parted(others, [len(self.L), len(self.H)])
+        duals = found.multipliers
+        if duals is not None:
+            balance = duals[program.above : program.above + len(self.G)]
+            duals = np.concatenate([balance, duals[program.zero :]])
         return self._read(found.status, found.iterations, found.value, found.x, duals)
 
     def by_definition(self, careful: Mapping[str, Any] = CAREFUL) -> tuple[Outcome, Array | None]:
@@ -231,41 +230,47 @@ class StanceProgram(ABC):
             try:
                 problem.solve(**options)
             except cp.SolverError:
-                return self._read(FAILED, 0, math.nan, None, ())
+                return self._read(FAILED, 0, math.nan, None, None)
         status, stats = problem.status, problem.solver_stats
-        x = None
+        x = duals = None
         if status in PRESENT:
             x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
-        duals = tuple(row.dual_value for row in rows) if status in (*PRESENT, *PROVEN) else ()
+        told = [row.dual_value for row in rows if row.size]
+        if status in (*PRESENT, *PROVEN) and all(each is not None for each in told):
+            duals = np.concatenate(told)
         if status == cp.USER_LIMIT and left is not None:
             status = OUT_OF_TIME
         value = math.nan if x is None else problem.value
         return self._read(status, int(stats.num_iters or 0), value, x, duals)
 
     def _read(
-        self, status: str, iterations: int, value: float, x: Array | None, duals: Sequence[Array]
+        self,
+        status: str,
+        iterations: int,
+        value: float,
+        x: Array | None,
+        duals: Array | None,
     ) -> tuple[Outcome, Array | None]:
-        """Return how it ended; what is wanted comes first in x, and the loads last."""
-        hands = self.data.hands
-        balance, limits, hard = duals or (None, None, None)
+        """Return how it ended.
+
+        What is wanted comes first in x, and the loads last; of the multipliers, those of the
+        balance, limits and hard rows.
+        """
+        hands, unit = self.data.hands, self.data.rows.unit
         loads: tuple[Array, ...] = ()
         if x is not None and math.isfinite(value):
-            unit = self.data.rows.unit
-            loads = _by_hand(x[-len(unit) :] * unit, [len(hand.unit) for hand in hands])
+            loads = parted(x[-len(unit) :] * unit, [len(hand.unit) for hand in hands])
+        limits = [len(hand.l0) for hand in hands] if len(self.L) else []
+        sizes = [len(self.G), *limits, *(len(hand.h) for hand in hands)]
+        parts = () if duals is None else parted(duals, sizes)
         outcome = Outcome(
             solved=bool(loads),
             status=status,
             iterations=iterations,
             value=value if loads else math.nan,
             loads=loads,
-            limit_duals=_by_hand(limits, [len(hand.l0) for hand in hands] if len(self.L) else ()),
-            hard_duals=_by_hand(hard, [len(hand.h) for hand in hands]),
-            balance_dual=balance,
+            limit_duals=parts[1 : 1 + len(limits)],
+            hard_duals=parts[1 + len(limits) :],
+            balance_dual=parts[0] if parts else None,
         )
         return outcome, x[: self.wanted] if loads and x is not None else None
-
-
-def _by_hand(whole: Array | None, sizes: Sequence[int]) -> tuple[Array, ...]:
-    if whole is None or not sizes:
-        return ()
-    return parted(whole, sizes)

@@ -226,17 +226,18 @@ def active_set_optimum(
 
 def _outcome(data: StanceData, found: _Point) -> Outcome:
     """Return an optimum as a solver would that took no step."""
-    hands, rows, balance = data.hands, data.rows, len(data.wrench)
-    limits, hard = parted(found.multipliers[balance:], [rows.limits, len(rows.rest) - rows.limits])
+    hands = data.hands
+    sizes = [len(data.wrench), *(len(each.l0) for each in hands), *(len(each.h) for each in hands)]
+    balance, *others = parted(found.multipliers, sizes)
     return Outcome(
         solved=True,
         status="optimal",
         iterations=0,
         value=found.u,
-        loads=parted(found.z * rows.unit, [len(hand.unit) for hand in hands]),
-        limit_duals=parted(limits, [len(hand.l0) for hand in hands]),
-        hard_duals=parted(hard, [len(hand.h) for hand in hands]),
-        balance_dual=found.multipliers[:balance],
+        loads=parted(found.z * data.rows.unit, [len(hand.unit) for hand in hands]),
+        limit_duals=tuple(others[: len(hands)]),
+        hard_duals=tuple(others[len(hands) :]),
+        balance_dual=balance,
     )
 
 

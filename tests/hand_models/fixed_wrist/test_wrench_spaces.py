@@ -26,7 +26,6 @@ from hand_models import (
     WrenchSpace,
 )
 from hand_models.fixed_wrist import wrench_space, wrench_spaces
-from hand_models.fixed_wrist.space import KEPT
 from hand_models.hand import HELD
 from hand_models.tile import inner_half_planes
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at
@@ -313,8 +312,10 @@ def test_a_set_is_known_again_while_its_hand_is():
 
 def test_few_sets_of_a_hand_are_kept():
     hand = pinch(0.33)
-    sets = [wrench_spaces([hand], 50.0 + i)[0] for i in range(KEPT + 1)]
-    assert wrench_spaces([hand], 50.0 + KEPT)[0] is sets[-1]
+    most = hand.sets.most
+    sets = [wrench_spaces([hand], 50.0 + i)[0] for i in range(most + 1)]
+    assert hand.sets.info().kept == most
+    assert wrench_spaces([hand], 50.0 + most)[0] is sets[-1]
     again = wrench_spaces([hand], 50.0)[0]
     assert again is not sets[0]
     np.testing.assert_array_equal(again.b, sets[0].b)
