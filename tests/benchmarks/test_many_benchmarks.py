@@ -26,6 +26,7 @@ def requests(first: int) -> list:
     return [request(number) for number in range(first, first + MANY)]
 
 
+@pytest.mark.slow
 @pytest.mark.benchmark(group=f"plan_many, {MANY} new stances on {cores()} cores")
 def test_plan_many(benchmark, planners):
     rounds = iter(range(1, 100))

@@ -190,6 +190,7 @@ def test_a_finer_search_and_rays_agree():
         assert coarse.support(direction) == pytest.approx(rays.support(direction), abs=0.05 * size)
 
 
+@pytest.mark.slow
 def test_the_set_is_skew_symmetric():
     found = boundary(CAPPED, search_box(CAPPED), 16000)
     for way in np.random.default_rng(1).normal(size=(50, 3)):
@@ -204,6 +205,7 @@ def test_a_closing_that_is_too_tight_leaves_nothing():
         search(Gripper(0.3, 300.0), 15)
 
 
+@pytest.mark.slow
 def test_the_search_of_a_whole_hand_reaches_as_far_as_the_linear_programs_nearly():
     wrist = floating(surface="sandpaper-36")
     found = search(wrist, 4)
@@ -341,6 +343,7 @@ def test_the_rest_wrench_needs_no_step():
     np.testing.assert_array_equal(pose.twist, 0.0)
 
 
+@pytest.mark.slow
 def test_a_wrench_beyond_reach_is_said_to_be_so():
     pose = wrist_pose(floating().hand, [0.0, 0.0, -1e5, 0.0, 0.0, 0.0])
     assert not pose.converged

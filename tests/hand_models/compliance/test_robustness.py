@@ -61,7 +61,7 @@ def floating(name: str) -> FloatingWrist:
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if i % 3 else ()) for i, name in enumerate(HOLDS)],
+    [pytest.param(name, marks=pytest.mark.slow if i % 4 else ()) for i, name in enumerate(HOLDS)],
 )
 def test_motions_that_load_nothing_do_not_stop_the_search(name: str) -> None:
     wrist = floating(name)
@@ -122,6 +122,7 @@ def test_a_hand_that_cannot_give_way_is_refused_when_it_is_read(
         changed_hand(section, name, value)
 
 
+@pytest.mark.slow
 def test_poses_of_an_edge_are_found_from_other_starts() -> None:
     """From rest alone, Newton's steps stop short at kinks for some of them."""
     settled = settled_at(56)

@@ -156,6 +156,7 @@ def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
     assert (np.diff(moment, axis=1) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_the_command_tells_where_it_is_best(tmp_path, capsys):
     arguments = ["study", "sweep", "-o", str(tmp_path), "--measure", "normal"]
     arguments += ["--x", "gripper.pull_off_slope=2:4:2", "--y", "gripper.entry_friction=0.2:0.3:2"]

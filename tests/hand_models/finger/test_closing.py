@@ -95,6 +95,7 @@ def on_rough_rock(first, count):
             assert faults(on_hold, closed) == []
 
 
+@pytest.mark.slow
 def test_on_rough_rock_fingers_close():
     on_rough_rock(0, 10)
 
@@ -135,6 +136,7 @@ def test_a_hand_closes_around_a_knob(height, slope):
         assert finger.contacts[-1].angle > 0.5 * math.radians(slope)
 
 
+@pytest.mark.slow
 def test_beside_a_low_knob_fingertips_cling_to_the_ground():
     """The distal joint's 72 N·mm at 37 N do not draw the tip off the ground and in to the knob."""
     hold = knob(0.04, 60.0)

@@ -100,6 +100,7 @@ def test_the_grid_does_not_depend_on_how_finely_triangles_tell_the_rock():
         np.testing.assert_allclose(np.hstack(one), np.hstack(other), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_robust_is_that_of_the_hand(wall):
     trial = Trial((0.1, 0.1, 0.0), (0.0, 0.0, 1.0), 0.3, 0.0)
     (found,) = try_holds(HAND, wall, ROCK, [trial], robust=True)

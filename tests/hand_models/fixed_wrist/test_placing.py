@@ -97,6 +97,7 @@ def test_a_rock_in_another_frame_is_the_same_rock(seed):
     assert placed.seating.backed_off == pytest.approx(seated.seating.backed_off, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_best_seat_at_a_point_is_near_it_and_holds_no_less():
     rock = random_profile(np.random.default_rng(1))
     at = [0.002, 0.01, 0.0], [0.05, 0.0, 1.0], 0.2
@@ -128,7 +129,8 @@ def cropped(vertices, faces, middle, half):
     return vertices, faces[inside[faces].all(axis=1)]
 
 
-@some_and_all("seeds", range(12), 6)
+@pytest.mark.slow
+@some_and_all("seeds", range(12), 12)
 def test_rock_told_finer_or_with_less_around_it_is_the_same_rock(seeds):
     vertices, faces = fractal_wall(5, size=1.6, count=201, height=0.01)
     wall = Mesh(vertices, faces, anywhere=True)

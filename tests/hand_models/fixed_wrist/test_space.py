@@ -216,7 +216,12 @@ def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_she
 
 
 @pytest.mark.parametrize(
-    ("hold", "rotation"), [(Plane(), 0.0), (Cylinder(0.3), 0.0), (Cylinder(0.3), math.pi)]
+    ("hold", "rotation"),
+    [
+        (Plane(), 0.0),
+        pytest.param(Cylinder(0.3), 0.0, marks=pytest.mark.slow),
+        pytest.param(Cylinder(0.3), math.pi, marks=pytest.mark.slow),
+    ],
 )
 def test_what_a_hand_can_do_does_not_jump_where_its_base_tiles_lose_the_rock(hold, rotation):
     """A nanometre to either side, along and about all axes."""

@@ -383,6 +383,7 @@ def _log(diameter):
     return Mesh(*cylinder_mesh(diameter, around=74))
 
 
+@pytest.mark.slow
 def test_threads_share_what_is_kept():
     hand = SpinyHand()
     rng = np.random.default_rng(11)

@@ -10,6 +10,8 @@ from hand_models import Surface
 from hand_models.studies import fig10, run_study
 from hand_models.tile import SpineArray, directional_strength, inner_half_planes
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):

@@ -11,6 +11,8 @@ from hand_models.experiments import UNITS, in_paper_signs
 from hand_models.parameters import hand_table
 from hand_models.studies import fig13, run_study
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):

@@ -9,6 +9,8 @@ from hand_models.experiments import distance_along
 from hand_models.studies import fig14, run_study
 from hand_models.studies.fig14 import loading_planes
 
+pytestmark = pytest.mark.slow
+
 BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in (-1.0, 1.0)])
 
 

@@ -11,6 +11,8 @@ from hand_models.experiments import Conditions, radius_axes, rest_state
 from hand_models.parameters import experiment_table
 from hand_models.studies import as_json, fig15, fig16, load_study, run_study
 
+pytestmark = pytest.mark.slow
+
 PROXIMAL, DISTAL = 0, 2
 
 
@@ -33,7 +35,7 @@ def radii(tmp_path_factory):
     return coarse(fig16, tmp_path_factory.mktemp("fig16"), POINTS=3, COARSE_POINTS=2)
 
 
-@pytest.mark.parametrize("name", ["tensions", pytest.param("radii", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["tensions", "radii"])
 def test_results_pictures_and_progress_are_complete(name, request):
     result, files, told = request.getfixturevalue(name)
     assert json.loads(files[0].read_text(encoding="utf-8")) == json.loads(
@@ -95,7 +97,6 @@ def test_states_of_the_curves_are_those_of_the_grippers(tensions):
             assert rest_state(grasp) == state
 
 
-@pytest.mark.slow
 def test_maps_have_limits_just_where_the_gripper_holds(radii):
     data, table = radii[0].data, gripper_table()
     x, y = radius_axes(table, 3)
@@ -120,7 +121,6 @@ def test_maps_have_limits_just_where_the_gripper_holds(radii):
         assert found["state"][-1][0] == rest_state(grasp)
 
 
-@pytest.mark.slow
 def test_claims_of_the_distal_radius_are_those_of_the_maps(radii):
     result = radii[0]
     for name, claims in (("A", result.claims[0:2]), ("B", result.claims[2:4])):
@@ -131,7 +131,6 @@ def test_claims_of_the_distal_radius_are_those_of_the_maps(radii):
         assert claims[1].holds == fails[above].all()
 
 
-@pytest.mark.slow
 def test_the_lower_tension_is_lower(radii):
     table = experiment_table()
     assert table.scalar("fig16", "lower_tension") < table.scalar("fig16", "tension")
@@ -147,7 +146,6 @@ def test_the_lower_tension_is_lower(radii):
         assert claim.holds == (low["failing"] < high["failing"])
 
 
-@pytest.mark.slow
 def test_a_pulley_changes_the_normal_forces_of_its_own_and_earlier_phalanges_only(radii):
     """Each joint's balance has the forces beyond it: ∂N₃/∂r₃ = f₃/c₃, and none after the joint."""
     slopes = np.array(radii[0].data["normal_slopes"])

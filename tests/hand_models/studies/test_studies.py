@@ -118,6 +118,7 @@ def test_springs_of_two_kinds_give_eight_sequences_of_each_pair(results):
         assert {v["configurations"] for v in group["variants"].values()} == {8}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PALM_STUDIES)
 def test_a_study_leaves_its_result_and_pictures(name, tmp_path):
     folder = tmp_path / "new" / "folder"

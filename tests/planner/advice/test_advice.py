@@ -176,12 +176,14 @@ def test_no_advice_takes_the_body_into_rock_or_deeper_than_it_is(seed):
         assert clear_of_rock(changed(asked, each.changes)) >= min(now, 0.0) - 1.1e-3
 
 
+@pytest.mark.slow
 def test_a_shift_that_is_told_is_one():
     told, _ = advise(requested(1058), 30)
     assert told
     assert not any("[0.000, 0.000, 0.000]" in each.sentence for each in told)
 
 
+@pytest.mark.slow
 def test_the_body_stays_in_the_range_that_is_given():
     asked = replace(random_question(SEED), body_range=BodyRange(shift=0.03, tilt=0.0))
     # the body is among the first changes that are tried
@@ -225,6 +227,7 @@ def test_advice_is_the_same_elsewhere_and_in_another_order():
         )
 
 
+@pytest.mark.slow
 def test_no_more_plans_are_made_than_are_allowed(monkeypatch):
     count = 0
     tried = Trials._try
@@ -258,6 +261,7 @@ def test_where_time_is_over_what_was_found_is_told_and_that_it_is_not_all(monkey
     assert "before all changes were tried" in answer.warnings[-1]
 
 
+@pytest.mark.slow
 def test_what_is_told_of_least_effort_is_of_a_plan_of_least_effort():
     asked = replace(random_question(84), objective="min_effort")
     told, whole = advise(asked)
@@ -269,7 +273,8 @@ def test_what_is_told_of_least_effort_is_of_a_plan_of_least_effort():
         assert there.utilisation == pytest.approx(each.utilisation, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(28, marks=pytest.mark.slow), 75])
+@pytest.mark.parametrize("seed", [28, 75])
+@pytest.mark.slow
 def test_no_advice_is_told_that_would_be_warned_of_with_joints_too(seed):
     asked = requested(seed)
     told, whole = advise(asked)

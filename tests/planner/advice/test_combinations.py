@@ -41,6 +41,7 @@ def test_the_direction_of_a_plan_leaves_it_out_exactly_where_it_does_not_hold(se
             assert (search.known().part(choice) < 1.0 - 1e-6) == (not holds)
 
 
+@pytest.mark.slow
 @given_and_own
 def test_no_direction_leaves_out_what_holds(seed):
     trials = Trials(random_question(seed))
@@ -69,6 +70,7 @@ def test_a_stance_that_no_single_change_helps_is_told_some_that_hold_together(se
     assert all(each.size >= first.size for each in told if each.holds)
 
 
+@pytest.mark.slow
 def test_hands_of_several_free_limbs_are_put_together():
     message = convert(random_request(ALONE), PlanRequest)
     asked = question(message)

@@ -430,6 +430,7 @@ def test_a_search_for_floating_wrists_gives_the_best_plan_it_has_come_to(monkeyp
         assert np.all(np.diff(values) <= 1e-6 * np.array(values[:-1]))
 
 
+@pytest.mark.slow
 def test_a_search_that_is_cut_short_after_its_first_plan_gives_that_plan(monkeypatch, clock):
     question = questions.question(read_request("wall-300-floating"))
     whole = plan(question)

@@ -80,7 +80,7 @@ def test_load_factor_is_no_less_than_a_smaller_load_proves():
     ("limbs", "preload"),
     [
         (REAR, 37.0),
-        (REAR, 70.0),
+        pytest.param(REAR, 70.0, marks=pytest.mark.slow),
         pytest.param(REAR, 80.0, marks=pytest.mark.slow),
         pytest.param(ALL, 70.0, marks=pytest.mark.slow),
     ],

@@ -14,6 +14,7 @@ def factor_of(request):
     return plan(question(msgspec.structs.replace(request, want=["load_factor"])))
 
 
+@pytest.mark.slow
 def test_a_load_factor_that_a_limit_ends_has_no_warning():
     request = read_request("wall-300-floating")
     light = Load(mass=95.0)

@@ -47,7 +47,15 @@ def test_every_hold_has_a_picture(hold, rotation, tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", ["cylinder", "ellipsoid", "mesh", "too small to hold"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cylinder",
+        "too small to hold",
+        pytest.param("ellipsoid", marks=pytest.mark.slow),
+        pytest.param("mesh", marks=pytest.mark.slow),
+    ],
+)
 def test_titles_and_labels_lie_on_nothing_else_that_is_written(name):
     hold, rotation = HOLDS[name]
     settled = HAND.settle(hold, ROCK, Grasp(rotation, lateral=False))

@@ -77,6 +77,7 @@ def within_limits(robot, found):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
 def test_a_thousand_reachable_poses(loaded):
     """At least 99 % of them are met, and those that are said to be met are."""

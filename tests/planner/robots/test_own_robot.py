@@ -146,6 +146,7 @@ def test_a_stance_is_planned_for_the_robot_of_the_file(
         assert reply["joint_torque_limit"][limb] == [80.0] * 6
 
 
+@pytest.mark.slow
 def test_a_person_reads_the_torques_of_every_joint(
     file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -364,6 +364,7 @@ def test_what_is_wrong_with_a_stance_on_the_way_is_told_where_the_route_has_it(r
 # Joints -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_stage_that_no_joints_reach_is_marked_and_the_climb_goes_on(route, tmp_path: Path):
     there = replace(route, start=replace(route.start, joints="solve"), moves=route.moves[:2])
     climbed = evaluate(there)

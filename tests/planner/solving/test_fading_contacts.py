@@ -56,13 +56,17 @@ LIMITING = pytest.mark.xfail(
 )
 
 CASES = [
-    *((name, "fixed", CALIBRATION_LOAD) for name in FADING),
+    *(
+        pytest.param(name, "fixed", CALIBRATION_LOAD, marks=pytest.mark.slow if i else ())
+        for i, name in enumerate(FADING)
+    ),
     pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]),
     pytest.param("base tiles of pinches", "floating", CALIBRATION_LOAD, marks=pytest.mark.slow),
     ("two rows of the palm", "floating", CALIBRATION_LOAD),
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "wrist", "load"), CASES)
 def test_plans_do_not_jump_where_tiles_lose_the_rock(name, wrist, load):
     stance, engagement, most = FADING[name]
@@ -78,6 +82,7 @@ def test_plans_do_not_jump_where_tiles_lose_the_rock(name, wrist, load):
     assert near == pytest.approx(far, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_palms_that_lose_the_rock_leave_nothing_that_holds():
     """Less and less of them is used more and more; a millionth of their spines is none."""
     stance, share = on_wall(), lambda hand: sum(hand.palm.engagement)

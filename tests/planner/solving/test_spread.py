@@ -110,7 +110,7 @@ MIXED = replace(
 @pytest.mark.parametrize(
     "asked",
     [
-        ask(MIXED, "spread"),
+        pytest.param(ask(MIXED, "spread"), marks=pytest.mark.slow),
         ask(on_wall(), "spread", draws=FEW, limits=Limits(utilisation=0.8, tendon_tension=150.0)),
         ask(on_wall(), "spread", draws=FEW, objective="min_effort"),
         asked_of("wall-300-joints", draws=FEW),

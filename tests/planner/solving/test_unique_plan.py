@@ -29,7 +29,7 @@ def problems(count):
     return found
 
 
-@pytest.fixture(scope="module", params=[5, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[4, pytest.param(12, marks=pytest.mark.slow)])
 def data_of_all(request):
     return problems(request.param)
 

@@ -87,6 +87,7 @@ def test_in_the_world_the_hand_points_up_unless_told_otherwise() -> None:
     assert x[2] > 0.0
 
 
+@pytest.mark.slow
 def test_a_wrench_space_and_a_best_seat_at_a_place() -> None:
     request = placed()
     hand = request["stance"]["hands"][0]

@@ -51,6 +51,7 @@ def test_plans_travel(status, form, objective):
     assert reply["status"] == status
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_plans_of_stances_with_joints_and_floating_wrists_travel(form):
     assert answered("plan", request_with_joints() | {"want": WANT}, form)["joint_torque"]

@@ -219,6 +219,7 @@ def test_what_a_question_is_about_are_its_rocks_and_its_hands():
     assert about(b"{", Format.JSON) == about(b'{"v":1}', Format.JSON) == About()
 
 
+@pytest.mark.slow
 def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
     log = tmp_path / "log"
     with Letters(log, 2) as pool:

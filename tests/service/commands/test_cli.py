@@ -184,7 +184,11 @@ def test_a_file_of_draws_that_cannot_be_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(
-    ("stance", "what"), [("wall-300", "would be better"), ("boulders", "would hold")]
+    ("stance", "what"),
+    [
+        ("wall-300", "would be better"),
+        pytest.param("boulders", "would hold", marks=pytest.mark.slow),
+    ],
 )
 def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
     stance: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -394,6 +398,7 @@ def test_a_picture_of_a_wrench_space(stance_file, tmp_path: Path) -> None:
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_wrench_space_of_too_many_vertices_is_drawn_all_the_same(
     stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -185,6 +185,7 @@ def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
     assert "\x1b" not in piped.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
 def test_a_study_shows_how_far_it_is(tmp_path: Path) -> None:
     words = ["study", "fig06", "-o", str(tmp_path)]

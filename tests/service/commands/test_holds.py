@@ -102,7 +102,15 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
     assert reaches == sorted(reaches, reverse=True)
 
 
-@pytest.mark.parametrize("more", [["--workers", "2"], ["--dask", "local", "--workers", "2"]])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "more",
+    [
+        ["--workers", "2"],
+        ["--dask", "local", "--workers", "2"],
+    ],
+    ids=["processes", "cluster"],
+)
 def test_holds_are_the_same_wherever_hands_are_tried(
     more: list[str], rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_signal_while_modules_are_imported(library: str) -> None:
     assert ended(process) == (FAILED, "crux: interrupted\n")
 
 
+@pytest.mark.slow
 @watched
 def test_processes_end_soon_after_the_command_is_killed(lines: Path, tmp_path: Path) -> None:
     output = tmp_path / "replies.jsonl"

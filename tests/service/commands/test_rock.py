@@ -155,6 +155,7 @@ def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
         assert said == bool(holes)
 
 
+@pytest.mark.slow
 def test_a_scan_that_is_a_sieve_is_told_to_be_one(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -182,6 +182,7 @@ def manifest(folder: Path) -> dict:
     return json.loads(path.read_text()) if path.exists() else {"parts": []}
 
 
+@pytest.mark.slow
 @watched
 def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -198,6 +198,7 @@ def test_a_query_that_cannot_be_read_is_replied_to(
     assert "pid" in client.ask({"echo": 1})
 
 
+@pytest.mark.slow
 def test_a_process_that_stands_still_takes_nothing_and_stops_nobody(
     site: Site, client: Client
 ) -> None:
