@@ -59,10 +59,8 @@ def floating(name: str) -> FloatingWrist:
     return FloatingWrist(CompliantHand(HAND.settle(hold, ROCK, grasp, pose)))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.slow if i % 4 else ()) for i, name in enumerate(HOLDS)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HOLDS)
 def test_motions_that_load_nothing_do_not_stop_the_search(name: str) -> None:
     wrist = floating(name)
     found = boundary(wrist, search_box(wrist), 40)

@@ -114,6 +114,7 @@ def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
         )
 
 
+@pytest.mark.slow
 def test_a_hand_of_ones_own_is_where_the_sweep_begins():
     radii = hand_table().quantity("finger", "pulley_radii")
     own = Quantity([0.0055, 0.0040, 0.0020], radii.unit, "assumed")

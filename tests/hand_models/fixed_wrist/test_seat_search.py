@@ -50,6 +50,7 @@ def random_rock(seed):
     return random_mesh(rng) if seed % 3 == 0 else random_profile(rng)
 
 
+@pytest.mark.slow
 @some_and_all("seeds", range(18), 18)
 def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
     more = 0

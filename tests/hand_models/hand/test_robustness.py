@@ -91,6 +91,7 @@ def test_holds_from_a_millimetre_to_a_kilometre_can_be_taken(cases):
     assert "held" in ends
 
 
+@pytest.mark.slow
 @some_and_all(
     "cases",
     itertools.product(

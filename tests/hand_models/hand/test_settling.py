@@ -482,6 +482,7 @@ def test_hands_at_one_place_are_seated_on_rock_that_is_cut_once(monkeypatch):
     assert len(cuts) == 7 + 4 * len(placements)
 
 
+@pytest.mark.slow
 def test_hands_of_the_same_numbers_are_equal_in_every_process():
     one, other = SpinyHand(HAND.table), spiny_hand()
     assert one is not other

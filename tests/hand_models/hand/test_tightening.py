@@ -102,6 +102,7 @@ def test_it_is_told_how_fingers_end(hold, grasp, pose, closures):
     assert [each.closure for each in closing_sequence(settled)] == closures.split()
 
 
+@pytest.mark.slow
 def test_how_fingers_end_is_what_their_contacts_say():
     seen = set()
     for seed in range(12):

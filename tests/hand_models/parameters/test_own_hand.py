@@ -444,7 +444,8 @@ def test_a_study_is_of_the_hand_and_says_so(
     assert pair["load_with_friction"] == pytest.approx(by_hand)
 
 
-@pytest.mark.parametrize("friction", [0.0, pytest.param(1.9, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.0, 1.9])
 def test_the_studies_of_the_palm_bear_any_possible_palm(
     friction: float, file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

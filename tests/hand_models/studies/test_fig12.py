@@ -79,6 +79,7 @@ def test_the_pull_ends_at_the_limit_of_the_phalanx_named(study):
     np.testing.assert_allclose(beyond["normal"][-1], slip["normal"], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(tmp_path, capsys):
     assert run(["study", "fig12", "-o", str(tmp_path / "out"), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

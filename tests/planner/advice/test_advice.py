@@ -197,6 +197,7 @@ def test_the_body_stays_in_the_range_that_is_given():
         assert there.rotation == pytest.approx(body.rotation, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_body_wrench_that_is_given_says_nothing_of_where_the_body_is():
     asked = random_question(76)
     assert asked.body_wrench is not None

@@ -22,9 +22,10 @@ ALONE = 376
 """Seed of a request with a single hand that all others help."""
 
 
-given_and_own = pytest.mark.parametrize("seed", [GIVEN, pytest.param(OWN, marks=pytest.mark.slow)])
+given_and_own = pytest.mark.parametrize("seed", [GIVEN, OWN])
 
 
+@pytest.mark.slow
 @given_and_own
 def test_the_direction_of_a_plan_leaves_it_out_exactly_where_it_does_not_hold(seed):
     trials = Trials(random_question(seed))

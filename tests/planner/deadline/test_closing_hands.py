@@ -64,6 +64,7 @@ def test_the_best_seat_is_not_looked_for_beyond_a_deadline(wall: Mesh) -> None:
         best_seats(SpinyHand(HAND.table), placements)
 
 
+@pytest.mark.slow
 def test_what_is_robust_is_left_out_where_there_is_no_time_for_all_draws(wall: Mesh) -> None:
     asked = ask(on_wall(wall, outer_rotation=0.0), "robust")
     # the plan itself is quick then

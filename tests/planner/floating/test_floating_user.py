@@ -28,6 +28,8 @@ from service.requests import Load, PlanRequest
 from service.tables import terminal
 from tests.suite.helpers.commands import DONE, OVERLOADED
 
+pytestmark = pytest.mark.slow
+
 REAR = ("rear_right", "rear_left")
 ALL = ("front_right", *REAR, "front_left")
 
@@ -67,7 +69,6 @@ def planned(limbs: tuple[str, ...]) -> tuple[Question, Plan, int]:
     return asked, answer, len(solved)
 
 
-@pytest.mark.slow
 def test_load_factor_is_no_less_than_a_smaller_load_proves():
     asked, whole, _ = planned(ALL)
     wrench = 0.6 * whole.body_wrench
@@ -80,9 +81,9 @@ def test_load_factor_is_no_less_than_a_smaller_load_proves():
     ("limbs", "preload"),
     [
         (REAR, 37.0),
-        pytest.param(REAR, 70.0, marks=pytest.mark.slow),
-        pytest.param(REAR, 80.0, marks=pytest.mark.slow),
-        pytest.param(ALL, 70.0, marks=pytest.mark.slow),
+        (REAR, 70.0),
+        (REAR, 80.0),
+        (ALL, 70.0),
     ],
 )
 def test_utilisation_and_load_factor_agree(limbs, preload):
@@ -135,7 +136,6 @@ def test_tension_that_a_slack_hand_needs_holds_its_tiles():
         assert bool((loads.shears[0][hand.touching] >= -1e-6).all()) == holds
 
 
-@pytest.mark.slow
 def test_preload_that_alone_overloads_is_named():
     asked = question(request(("rear_right", "rear_left"), preload=95.0, want=["load_factor"]))
     answer = plan(asked)

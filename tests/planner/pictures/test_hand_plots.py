@@ -51,7 +51,7 @@ def test_every_hold_has_a_picture(hold, rotation, tmp_path):
     "name",
     [
         "cylinder",
-        "too small to hold",
+        pytest.param("too small to hold", marks=pytest.mark.slow),
         pytest.param("ellipsoid", marks=pytest.mark.slow),
         pytest.param("mesh", marks=pytest.mark.slow),
     ],

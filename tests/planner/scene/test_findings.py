@@ -70,6 +70,7 @@ def test_nothing_is_odd_about_three_hundred_sound_stances():
     assert odd == []
 
 
+@pytest.mark.slow
 def test_nor_about_some_of_them_and_the_bundled_ones():
     assert not any(look(stance) for stance in sound_stances(6, seed=1))
     assert not any(look(question(read_request(name)).stance) for name in EXAMPLES)

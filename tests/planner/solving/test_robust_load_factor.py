@@ -106,6 +106,7 @@ def test_without_scatter_it_is_the_load_factor(monkeypatch):
     assert answer.robust.tenth == pytest.approx(answer.load_factor, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_hands_that_cannot_be_there_are_named():
     """On a plane with its palm on it, half of the places are in the rock."""
     first, *others = on_wall(limbs=("front_left", "front_right")).hands

@@ -39,11 +39,10 @@ def answered(key: str, request: dict, form: Format, streams: Streams | None = No
     return form.decode(answer.payload, dict)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("status", STANCES)
-@pytest.mark.parametrize(
-    "objective", ["min_effort", pytest.param("max_margin", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("objective", ["min_effort", "max_margin"])
 def test_plans_travel(status, form, objective):
     asked = STANCES[status] | {"want": WANT, "objective": objective}
     asked["present"] = {hand["limb"]: [5.0] * 4 for hand in asked["stance"]["hands"]}

@@ -101,6 +101,7 @@ def test_limbs_are_those_of_the_stance(stance_file) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_less_is_said_where_asked(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
     words = ["plan", stance_file(wall_request(HEAVY))]
     assert run(words) == OVERLOADED
