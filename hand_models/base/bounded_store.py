@@ -46,16 +46,22 @@ class Store(Protocol):
 _stores: WeakSet[Store] = WeakSet()
 """All that their owners still have."""
 
+_listing = Lock()
+"""Held while that is changed or read: stores are made by any thread."""
+
 
 def enlist(store: Store) -> None:
     """Let `stores` tell of a store as long as its owner has it."""
-    _stores.add(store)
+    with _listing:
+        _stores.add(store)
 
 
 def stores() -> dict[str, StoreInfo]:
     """Return how the stores of this process have served, those of one name together."""
     found: dict[str, StoreInfo] = {}
-    for store in sorted(_stores, key=lambda each: each.name):
+    with _listing:
+        kept = list(_stores)
+    for store in sorted(kept, key=lambda each: each.name):
         own, known = store.info(), found.get(store.name)
         found[store.name] = (
             own if known is None else StoreInfo(*map(sum, zip(own, known, strict=True)))

@@ -8,6 +8,7 @@ import math
 import pickle
 import subprocess
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -512,6 +513,22 @@ def test_one_function_tells_of_all_stores():
     assert after.misses - before.misses == 2
     assert after.most - before.most == hand.settled.most
     assert {"settled hands on scans", "best seats"} < set(stores())
+
+
+def test_stores_are_told_while_another_thread_makes_some():
+    made = []
+
+    def make() -> None:
+        for _ in range(20_000):
+            made.append(BoundedStore("made meanwhile", 1))
+
+    thread = threading.Thread(target=make)
+    thread.start()
+    while thread.is_alive():
+        stores()
+        made.clear()
+    thread.join()
+    assert "settled hands" in stores()
 
 
 def test_what_a_store_does_not_know_is_made_once():
