@@ -519,15 +519,19 @@ def test_stores_are_told_while_another_thread_makes_some():
     made = []
 
     def make() -> None:
-        for _ in range(20_000):
+        for _ in range(3000):
             made.append(BoundedStore("made meanwhile", 1))
 
     thread = threading.Thread(target=make)
-    thread.start()
-    while thread.is_alive():
-        stores()
-        made.clear()
-    thread.join()
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        thread.start()
+        while thread.is_alive():
+            stores()
+    finally:
+        sys.setswitchinterval(before)
+        thread.join()
     assert "settled hands" in stores()
 
 
