@@ -358,6 +358,18 @@ class StanceData:
         """All hands' rows below each other."""
         return HandRows.of(self.hands, len(self.wrench))
 
+    def by_rows(
+        self, values: Array, *, limits: bool = True
+    ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
+        """Return values of rows apart: the balance's, each hand's limits', each one's hard rows'.
+
+        ``limits``: whether the rows of limits are among them.
+        """
+        of_limits = [len(hand.l0) for hand in self.hands] if limits else []
+        sizes = [len(self.wrench), *of_limits, *(len(hand.h) for hand in self.hands)]
+        balance, *others = parted(values, sizes)
+        return balance, tuple(others[: len(of_limits)]), tuple(others[len(of_limits) :])
+
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
         turned = StanceData(self.hands, wrench)

@@ -260,17 +260,17 @@ class StanceProgram(ABC):
         loads: tuple[Array, ...] = ()
         if x is not None and math.isfinite(value):
             loads = parted(x[-len(unit) :] * unit, [len(hand.unit) for hand in hands])
-        limits = [len(hand.l0) for hand in hands] if len(self.L) else []
-        sizes = [len(self.G), *limits, *(len(hand.h) for hand in hands)]
-        parts = () if duals is None else parted(duals, sizes)
+        balance, limits, hard = (
+            (None, (), ()) if duals is None else self.data.by_rows(duals, limits=len(self.L) > 0)
+        )
         outcome = Outcome(
             solved=bool(loads),
             status=status,
             iterations=iterations,
             value=value if loads else math.nan,
             loads=loads,
-            limit_duals=parts[1 : 1 + len(limits)],
-            hard_duals=parts[1 + len(limits) :],
-            balance_dual=parts[0] if parts else None,
+            limit_duals=limits,
+            hard_duals=hard,
+            balance_dual=balance,
         )
         return outcome, x[: self.wanted] if loads and x is not None else None

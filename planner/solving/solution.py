@@ -93,25 +93,25 @@ def solve_question(
     prepared: PreparedStance,
     checks: Overlap[PreparedChecks],
     budget: Budget,
-    near: WristSolution | Outcome | None = None,
+    near: WristSolution | None = None,
+    before: Outcome | None = None,
 ) -> Solution:
-    """Return the plan that is asked for, sought from one that is near, if any.
+    """Return the plan that is asked for.
 
-    ``near``: where floating wrists were, or how the program of fixed ones ended.
+    ``near``: where floating wrists are sought from; ``before``: how the program of the same fixed
+    hands ended at another wrench.
     """
     if prepared.hands.floating:
-        found = _solve_floating(
-            prepared, checks, budget, near if isinstance(near, WristSolution) else None
-        )
+        found = _solve_floating(prepared, checks, budget, near)
     else:
-        found = _solve_fixed(prepared, checks, near if isinstance(near, Outcome) else None)
+        found = _solve_fixed(prepared, checks, before)
     if prepared.question.objective == "min_effort":
         found = solve_effort(prepared, checks, found, budget)
     return found
 
 
 def _solve_fixed(
-    prepared: PreparedStance, checks: Overlap[PreparedChecks], near: Outcome | None
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], before: Outcome | None
 ) -> Solution:
     """Return the plan of least utilisation, of these that of least tensions.
 
@@ -120,7 +120,7 @@ def _solve_fixed(
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     with checks:
-        found = least_utilisation(sets.data, near)
+        found = least_utilisation(sets.data, before)
     first = Solution(sets, found.outcome, cap, bound=found.bound if found.proven else None)
     if found.proven:
         if found.loads is None:

@@ -49,7 +49,7 @@ def plan_on(
     prepared: PreparedStance,
     start: float,
     known: PreparedChecks | None = None,
-    near: Outcome | None = None,
+    before: Outcome | None = None,
 ) -> tuple[Plan, Outcome]:
     """Answer a question of a prepared stance.
 
@@ -60,7 +60,7 @@ def plan_on(
         When it began, on the clock of `time.perf_counter`.
     known : PreparedChecks, optional
         What reads and checks its plans; by default it is made beside the solver.
-    near : Outcome, optional
+    before : Outcome, optional
         How the program of the same hands ended at another wrench.
 
     Returns
@@ -77,7 +77,7 @@ def plan_on(
     question, modelled = prepared.question, time.perf_counter()
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
-    found, proof = solve_question(prepared, checks, budget, near), None
+    found, proof = solve_question(prepared, checks, budget, before=before), None
     if not found.passes:
         if found.outcome.balance_dual is None:
             deadline.check("a plan was found")
@@ -113,7 +113,7 @@ class KnownStance:
     def __init__(self, question: Question) -> None:
         self.prepared = prepared = prepare_stance(question)
         self._checks: PreparedChecks | None = None
-        self._near: Outcome | None = None
+        self._before: Outcome | None = None
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None and not prepared.floating:
             self._checks = prepare_checks(prepared)
@@ -135,7 +135,7 @@ class KnownStance:
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         with deadline.within(self.prepared.question.deadline, started=start):
             prepared = self.prepared.turned(wrench)
-            answer, outcome = plan_on(prepared, start, self._checks, self._near)
+            answer, outcome = plan_on(prepared, start, self._checks, self._before)
         if outcome.solved:
-            self._near = outcome
+            self._before = outcome
         return answer

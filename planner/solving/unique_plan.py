@@ -226,17 +226,15 @@ def active_set_optimum(
 
 def _outcome(data: StanceData, found: _Point) -> Outcome:
     """Return an optimum as a solver would that took no step."""
-    hands = data.hands
-    sizes = [len(data.wrench), *(len(each.l0) for each in hands), *(len(each.h) for each in hands)]
-    balance, *others = parted(found.multipliers, sizes)
+    balance, limits, hard = data.by_rows(found.multipliers)
     return Outcome(
         solved=True,
         status="optimal",
         iterations=0,
         value=found.u,
-        loads=parted(found.z * data.rows.unit, [len(hand.unit) for hand in hands]),
-        limit_duals=tuple(others[: len(hands)]),
-        hard_duals=tuple(others[len(hands) :]),
+        loads=parted(found.z * data.rows.unit, [len(hand.unit) for hand in data.hands]),
+        limit_duals=limits,
+        hard_duals=hard,
         balance_dual=balance,
     )
 

@@ -56,10 +56,7 @@ LIMITING = pytest.mark.xfail(
 )
 
 CASES = [
-    *(
-        pytest.param(name, "fixed", CALIBRATION_LOAD, marks=pytest.mark.slow if i else ())
-        for i, name in enumerate(FADING)
-    ),
+    *((name, "fixed", CALIBRATION_LOAD) for name in FADING),
     pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]),
     pytest.param("base tiles of pinches", "floating", CALIBRATION_LOAD, marks=pytest.mark.slow),
     ("two rows of the palm", "floating", CALIBRATION_LOAD),
