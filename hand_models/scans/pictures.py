@@ -28,6 +28,10 @@ DARK: Final = 0.35
 NAMED: Final = 12
 """Holes whose width is written beside them."""
 
+APART: Final = np.array([0.11, 0.04])
+"""How far apart widths are that are written, sideways and upward, as part of the rock's longer
+side."""
+
 COLOURS: Final = "viridis"
 
 ARROW: Final = 0.06
@@ -55,19 +59,31 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     colours = _paint(axes, rock.vertices, rock.faces, COLOURS)
     axes.set_title(title)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
-    for hole in rock.holes[:NAMED]:
-        axes.annotate(
-            f"{1e3 * hole.width:.0f} mm",
-            (hole.place[1], hole.place[0]),
-            ha="center",
-            va="center",
-            color="red",
-            fontsize=8,
-        )
-    axes.legend(loc="upper right")
+    _name_holes(axes, rock)
+    figure.legend(loc="outside lower center")
     figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
     with whole_file(path) as part:
         figure.savefig(part, dpi=150)
+
+
+def _name_holes(axes: Axes, rock: ScannedRock) -> None:
+    """Write the widths of the widest holes beside them, but none over that of a wider one."""
+    apart = APART * float(np.ptp(rock.vertices[:, :2], axis=0).max())
+    named: list[Array] = []
+    for hole in rock.holes[:NAMED]:
+        spot = hole.place[[1, 0]]
+        if any((np.abs(spot - other) < apart).all() for other in named):
+            continue
+        named.append(spot)
+        axes.text(
+            *spot,
+            f"{1e3 * hole.width:.0f} mm",
+            color="red",
+            fontsize=8,
+            ha="center",
+            va="center",
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"},
+        )
 
 
 def plot_holds(

@@ -115,7 +115,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
         len(parts), 1, left=0.785, right=0.94, height_ratios=parts, hspace=0.22, **places
     )
     if plan.hands:
-        draw_tiles(figure.add_subplot(tables[0]), plan)
+        draw_tiles(figure.add_subplot(tables[0]), plan, question)
     else:
         draw_shortfall(figure.add_axes(WORDS), plan)
     if joints:

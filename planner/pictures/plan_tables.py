@@ -14,6 +14,7 @@ from hand_models.hand import NAIL
 from planner.explanation import constraint_words
 from planner.pictures.plan_scene import DrawnLimb
 from planner.pictures.plan_views import COLOURS, UTILISATION
+from planner.question import Question
 from planner.result import Certificate, LimitName, Plan
 
 __all__ = ["draw_joints", "draw_shortfall", "draw_tiles"]
@@ -43,40 +44,49 @@ WRENCHES: Final = 0.26
 SAID: Final[dict[str, Any]] = {"fontsize": 8, "ha": "left", "va": "top"}
 
 
-def draw_tiles(axes: Any, plan: Plan) -> None:
-    """Draw the utilisation of every tile and palm as a table of colours.
+def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
+    """Draw the utilisation of tiles, tendons with their motors, palms and hands as colours.
 
-    A palm's cell is as high as the rows of its hand's fingers.
+    Cells of a palm and of the hand, whichever limit of it is used most, are as high as the rows of
+    the hand's fingers.
     """
     hands = plan.hands or ()
+    body, cap = question.stance.robot.hand, question.limits.tendon_tension
+    strength = body.maximum_tension if cap is None else min(cap, body.maximum_tension)
     clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
     columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
     names: list[str] = []
     rows: list[list[float]] = []
-    palms: list[float] = []
+    whole: list[tuple[float, float]] = []
     for hand in hands:
         for finger in hand.fingers:
             touching = (tile for tile in finger.tiles if tile.contact != "none")
             used = {tile.phalanx: tile.utilisation for tile in touching}
-            rows.append([used.get(phalanx, np.nan) for phalanx in columns])
+            tendon = max(
+                finger.tendon_tension / strength,
+                finger.motor_torque / body.drive.maximum_torque,
+                finger.motor_current / body.drive.maximum_current,
+            )
+            rows.append([*(used.get(phalanx, np.nan) for phalanx in columns), tendon])
             names.append(
                 f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
                 f"  {finger.tendon_tension:3.0f} N"
             )
         palm = hand.palm.utilisation if hand.palm.engaged else np.nan
-        palms += [palm] * len(hand.fingers)
-    values = np.column_stack([rows, palms])
-    _draw_colours(axes, values, [*columns, "palm"], names)
-    _write_numbers(axes, values[:, :-1])
-    axes.axvline(len(columns) - 0.5, color="white", linewidth=3.0)
+        whole += [(palm, hand.utilisation)] * len(hand.fingers)
+    values = np.column_stack([rows, whole])
+    _draw_colours(axes, values, [*columns, "tendon", "palm", "hand"], names)
+    _write_numbers(axes, values[:, :-2])
+    for part in range(len(columns), values.shape[1]):
+        axes.axvline(part - 0.5, color="white", linewidth=3.0)
     done = 0
     for hand in hands:
         middle = done + 0.5 * (len(hand.fingers) - 1)
-        _write_numbers(axes, values[done : done + 1, -1:], (middle, len(columns)))
+        _write_numbers(axes, values[done : done + 1, -2:], (middle, len(columns) + 1))
         done += len(hand.fingers)
         if hand is not hands[-1]:
             axes.axhline(done - 0.5, color="black", linewidth=1.0)
-    axes.set_title("utilisation of each tile; tension of each tendon", fontsize=10, loc="right")
+    axes.set_title("utilisation of each tile, tendon, palm and hand", fontsize=10, loc="right")
 
 
 def draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:

@@ -57,6 +57,9 @@ STEPS_UP: Final = 8
 COVERED: Final = 0.6
 """What a covered dot of a line or an arrow weighs, in steps aside."""
 
+HEAD: Final = 12
+"""As so many dots weighs the head of an arrow."""
+
 PADDING: Final = 1.0
 """Around a note [printer's points]."""
 
@@ -132,7 +135,7 @@ class View:
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
         """Draw an arrow, and return where it is seen to begin and to end, shape (2,) each."""
         begin, tip = self.flat(np.array([start, start + step]))
-        self.seen.append(np.array([begin, tip]))
+        self.seen.extend([np.array([begin, tip]), *np.repeat(tip[None, None], HEAD, axis=0)])
         style = {"arrowstyle": "-|>", "color": colour, "lw": 2.0, "shrinkA": 0.0, "shrinkB": 0.0}
         ends = tuple(tip), tuple(begin)
         self.axes.annotate("", *ends, arrowprops=style, annotation_clip=False, zorder=7)

@@ -21,6 +21,9 @@ __all__ = ["draw_route", "summary", "write_report"]
 CUT: Final = 2.0
 """Largest utilisation that a route's picture shows in full."""
 
+BROKEN: Final = (0.78, 0.82)
+"""Where such a bar is seen to be broken, at its left and right edge, over the tallest bar."""
+
 HEADROOM: Final = 1.2
 """Height of the utilisations' panel, over the tallest bar or the limit: for the crux's name."""
 
@@ -181,6 +184,7 @@ def draw_route(result: RouteResult) -> Figure:
     upper.bar(index, np.nan_to_num(used), color=colours)
     for i in np.flatnonzero(used > height):
         upper.text(i, 0.9 * height, f"{used[i]:.1f}", ha="center", color="white", weight="bold")
+        upper.plot([i - 0.5, i + 0.5], np.multiply(BROKEN, height), color="white", linewidth=3.0)
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
         upper.text(i, height / 2, result.plans[i].status, rotation=90, ha="center", va="center")
@@ -211,6 +215,9 @@ def draw_route(result: RouteResult) -> Figure:
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color="tab:red")
+    for i in np.flatnonzero(np.isnan(factor)):
+        told = "unbounded" if result.plans[i].load_factor_unbounded else "none"
+        lower.text(i, 0.05, told, rotation=90, ha="center", va="bottom", fontsize=8, color="0.4")
     lower.set(ylabel="load factor [1]", xlabel="stance")
     lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))
     labels = [

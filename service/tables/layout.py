@@ -48,7 +48,7 @@ def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()
     for name in names:
         table.add_column(name, no_wrap=True)
     for name in numbers:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for name in words:
         table.add_column(name)
     return table

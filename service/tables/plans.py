@@ -45,6 +45,12 @@ NEARLY: Final = 0.02
 JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
 
+LONG: Final = 1e4
+"""From here on a number has no digits after its point in the hands' table, from a tenth of it one."""
+
+WIDEST: Final = 5
+"""Letters of that table's numbers that fit with two spaces between them, rather than one."""
+
 CARRIES: Final[Mapping[str, str]] = {
     "off": "carries nothing",
     "drags": "drags on the rock",
@@ -318,11 +324,20 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
     table = table_of("hand", numbers=(*AXES, *parts))
     for hand in hands:
         shear, _, press = hand.palm.force
-        cells = [f"{value:z.0f}" for value in hand.wrench[:3]]
-        cells += [f"{value:z.1f}" for value in hand.wrench[3:]]
-        used = f"{hand.utilisation:z.2f}"
-        table.add_row(hand.limb, *cells, used, f"{-shear:z.0f}", f"{press:z.0f}")
+        cells = [_short(value, 0) for value in hand.wrench[:3]]
+        cells += [_short(value, 1) for value in hand.wrench[3:]]
+        cells += [_short(hand.utilisation, 2), _short(-shear, 0), _short(press, 0)]
+        if max(map(len, cells)) > WIDEST:
+            table.padding = (0, 1, 0, 0)
+        table.add_row(hand.limb, *cells)
     return table
+
+
+def _short(value: float, digits: int) -> str:
+    """Write a number with as many digits after its point as leave it short."""
+    while digits and abs(value) >= LONG / 10.0**digits:
+        digits -= 1
+    return f"{value:z.{digits}f}"
 
 
 def _wrist_table(hands: Iterable[Hand]) -> Table:

@@ -73,6 +73,7 @@ def answered(name):
         "infeasible": lambda: Question(bare, body_wrench=np.array([0.0, 100, 800, 300, 0, 0])),
         "flat wall": lambda: Question(on_wall(Plane(), off=OFF, outer_rotation=0.0)),
         "nails": lambda: requested("ledge"),
+        "bundled": lambda: requested("wall-300-joints"),
         "one limb": lambda: Question(standing("leg")),
         "two limbs": lambda: Question(
             own, body_wrench=attainable_wrench(own, np.random.default_rng(0))
@@ -216,7 +217,7 @@ def test_notes_do_not_lie_on_each_other(name):
         assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
-@pytest.mark.parametrize("name", ["solved", "ceiling", "two limbs"])
+@pytest.mark.parametrize("name", ["solved", "bundled", "ceiling", "two limbs"])
 def test_notes_stay_in_the_frame_and_off_the_tips_of_arrows(name):
     figure = drawn(name)
     figure.draw_without_rendering()
@@ -313,6 +314,28 @@ def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, cr
     assert legend.y0 >= frame.y1
 
 
+def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is_told():
+    question, plan = answered("plain")
+    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(3)]
+    plans = [
+        replace(plan, utilisation=0.5, load_factor=2.0),
+        replace(plan, utilisation=7.5, load_factor=None),
+        replace(plan, utilisation=0.1, load_factor=None, load_factor_unbounded=True),
+    ]
+    route = SimpleNamespace(name="up", limits=Limits())
+    upper, lower = draw_route(
+        SimpleNamespace(plans=plans, stages=stages, route=route, crux=1)
+    ).axes
+    assert "7.5" in words(upper)
+    (broken,) = (line for line in upper.lines if line.get_color() == "white")
+    assert (min(broken.get_xdata()), max(broken.get_xdata())) == (0.5, 1.5)
+    assert max(broken.get_ydata()) < upper.patches[1].get_height()
+    assert [(text.get_text(), text.get_position()[0]) for text in lower.texts] == [
+        ("none", 1),
+        ("unbounded", 2),
+    ]
+
+
 @pytest.mark.parametrize("name", ["solved", "overloaded"])
 def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
     question, plan = answered(name)
@@ -373,17 +396,29 @@ def test_joints_have_the_colour_and_the_number_of_their_torque():
     assert table.get_title(loc="right").startswith("utilisation of each joint")
 
 
-def test_the_table_has_the_utilisation_of_every_tile():
+def test_the_table_has_the_utilisation_of_every_tile_tendon_palm_and_hand():
     _, plan = answered("plain")
     table = drawn("plain").axes[3]
     want = []
     for hand in plan.hands:
         for finger in hand.fingers:
             want += [tile.utilisation for tile in finger.tiles if tile.contact != "none"]
-    palms = [hand.palm.utilisation for hand in plan.hands if hand.palm.engaged]
-    assert len(palms) == len(plan.hands)
-    assert words(table) == [f"{value:.2f}" for value in want + palms]
+            # at rest a motor's current tells first
+            want.append(finger.motor_current / HAND.drive.maximum_current)
+            assert want[-1] > finger.tendon_tension / 700.0
+    assert all(hand.palm.engaged for hand in plan.hands)
+    whole = [used for hand in plan.hands for used in (hand.palm.utilisation, hand.utilisation)]
+    assert words(table) == [f"{value:.2f}" for value in want + whole]
     assert len(table.get_yticklabels()) == 4 * len(plan.hands)
+
+
+def test_the_table_tells_that_a_tendon_is_at_its_limit():
+    question = replace(answered("plain")[0], limits=Limits(tendon_tension=60.0))
+    plan = solve.plan(question)
+    assert plan.limiting.limit == "tendon_tension"
+    table = draw_plan(plan, question).axes[3].images[0].get_array()
+    np.testing.assert_allclose(table[:, 4].max(), plan.utilisation)
+    np.testing.assert_allclose(table[:, 4], np.concatenate([h.tensions for h in plan.hands]) / 60.0)
 
 
 def test_a_palm_has_a_cell_as_high_as_its_hand():
@@ -394,11 +429,11 @@ def test_a_palm_has_a_cell_as_high_as_its_hand():
     palms[1] = replace(palms[1], engaged=())
     hands = (replace(hand, palm=palm) for hand, palm in zip(plan.hands, palms, strict=True))
     table = draw_plan(replace(plan, hands=tuple(hands)), question).axes[3]
-    assert [label.get_text() for label in table.get_xticklabels()][-1] == "palm"
+    assert [label.get_text() for label in table.get_xticklabels()][-2] == "palm"
     (cell,) = (text for text in table.texts if text.get_text() == "0.37")
     # in the palm's column, in the middle of the hand's four fingers
-    assert cell.get_position() == (4, 1.5)
-    column = table.images[0].get_array()[:, 4]
+    assert cell.get_position() == (5, 1.5)
+    column = table.images[0].get_array()[:, 5]
     np.testing.assert_allclose(column[:4], used)
     assert column.mask.tolist() == [False] * 4 + [True] * 4 + [False] * 8
 

@@ -327,6 +327,22 @@ def test_a_person_reads_torques_effort_and_whose_joint_it_is(
     assert all(joint in prices for joint in joints)
 
 
+def test_numbers_however_long_are_told_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    reply = dispatch.plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
+    longest = "rear_right"
+    hand = next(hand for hand in reply.hands if hand.limb == longest)
+    hand.wrench = [-309073.0, -333.2, 126883.4, 10.26, -16361.4, 0.04]
+    hand.utilisation = 901.51
+    hand.palm.force = [-97178.3, 0.0, 209575.1]
+    print_plan(reply, Console(width=80))
+    out = capsys.readouterr().out
+    assert "…" not in out
+    table = out.partition("wrench on the rock")[2].splitlines()
+    assert max(len(row) for row in table) <= 80
+    told = "rear_right -309073 -333 126883 10.3 -16361 0.0 901.5 97178 209575"
+    assert told.split() in [row.split() for row in table]
+
+
 def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFixture[str]) -> None:
     request = wall_request(LIGHT) | {"want": []}
     reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
