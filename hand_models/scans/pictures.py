@@ -76,7 +76,8 @@ def _name_holes(axes: Axes, rock: ScannedRock) -> None:
             continue
         named.append(spot)
         axes.text(
-            *spot,
+            float(spot[0]),
+            float(spot[1]),
             f"{1e3 * hole.width:.0f} mm",
             color="red",
             fontsize=8,

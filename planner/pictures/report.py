@@ -181,7 +181,7 @@ def draw_route(result: RouteResult) -> Figure:
     # what is far beyond the limit is cut off and written in, so that the rest can be seen
     height = min(float(np.nanmax([*used, *bands[0][1], cap])), CUT) * 1.1
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
-    upper.bar(index, np.nan_to_num(used), color=colours)
+    upper.bar(index, np.nan_to_num(np.minimum(used, height)), color=colours)
     for i in np.flatnonzero(used > height):
         upper.text(i, 0.9 * height, f"{used[i]:.1f}", ha="center", color="white", weight="bold")
         upper.plot([i - 0.5, i + 0.5], np.multiply(BROKEN, height), color="white", linewidth=3.0)

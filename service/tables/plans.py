@@ -46,7 +46,7 @@ JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
 
 LONG: Final = 1e4
-"""From here on a number has no digits after its point in the hands' table, from a tenth of it one."""
+"""From here on a number of the hands' table is whole; from a tenth of it on it has one decimal."""
 
 WIDEST: Final = 5
 """Letters of that table's numbers that fit with two spaces between them, rather than one."""
