@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["console", "in_colour", "show", "table_of", "unit_of"]
+__all__ = ["console", "in_colour", "short", "show", "table_of", "unit_of"]
 
 
 def console(stderr: bool = False) -> Console:
@@ -31,6 +31,17 @@ COLOURS: Final = {
 def in_colour(status: str, word: str | None = None) -> str:
     """Return a status, or a word in its place, as markup in bold and in its colour."""
     return f"[bold {COLOURS.get(status, 'default')}]{word or status}[/]"
+
+
+LONG: Final = 1e4
+"""From here on a number is written as a whole one, from a tenth of it on with one decimal."""
+
+
+def short(value: float, digits: int) -> str:
+    """Return a number with as many digits after its point, up to so many, as leave it short."""
+    while digits and abs(value) >= LONG / 10.0**digits:
+        digits -= 1
+    return f"{value:z.{digits}f}"
 
 
 def show(title: str, table: Table, out: Console) -> None:

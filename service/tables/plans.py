@@ -31,7 +31,7 @@ from service.replies import (
 )
 from service.tables.advice import print_advice
 from service.tables.clearances import print_clearance
-from service.tables.layout import in_colour, show, table_of, unit_of
+from service.tables.layout import in_colour, short, show, table_of, unit_of
 from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = ["print_plan", "print_robust", "print_wrench_space"]
@@ -45,11 +45,8 @@ NEARLY: Final = 0.02
 JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
 
-LONG: Final = 1e4
-"""From here on a number of the hands' table is whole; from a tenth of it on it has one decimal."""
-
 WIDEST: Final = 5
-"""Letters of that table's numbers that fit with two spaces between them, rather than one."""
+"""Letters of numbers in the hands' table that fit with two spaces between them, rather than one."""
 
 CARRIES: Final[Mapping[str, str]] = {
     "off": "carries nothing",
@@ -324,20 +321,13 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
     table = table_of("hand", numbers=(*AXES, *parts))
     for hand in hands:
         shear, _, press = hand.palm.force
-        cells = [_short(value, 0) for value in hand.wrench[:3]]
-        cells += [_short(value, 1) for value in hand.wrench[3:]]
-        cells += [_short(hand.utilisation, 2), _short(-shear, 0), _short(press, 0)]
+        cells = [short(value, 0) for value in hand.wrench[:3]]
+        cells += [short(value, 1) for value in hand.wrench[3:]]
+        cells += [short(hand.utilisation, 2), short(-shear, 0), short(press, 0)]
         if max(map(len, cells)) > WIDEST:
             table.padding = (0, 1, 0, 0)
         table.add_row(hand.limb, *cells)
     return table
-
-
-def _short(value: float, digits: int) -> str:
-    """Write a number with as many digits after its point as leave it short."""
-    while digits and abs(value) >= LONG / 10.0**digits:
-        digits -= 1
-    return f"{value:z.{digits}f}"
 
 
 def _wrist_table(hands: Iterable[Hand]) -> Table:
