@@ -17,7 +17,7 @@ from planner.solving.explained import explained_plan
 from planner.solving.load_factor import FoundFactor, find_load_factor
 from planner.solving.prepared_checks import PreparedChecks, prepare_checks
 from planner.solving.solution import solve_question
-from planner.solving.why_not import look_again
+from planner.solving.why_not import beyond_all_loads, look_again
 
 __all__ = ["KnownStance", "plan", "plan_on"]
 
@@ -78,7 +78,7 @@ def plan_on(
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
     found, proof = solve_question(prepared, checks, budget, before=before), None
-    if not found.passes:
+    if not found.passes or beyond_all_loads(prepared, found):
         if found.outcome.balance_dual is None:
             deadline.check("a plan was found")
         found, proof = look_again(prepared, checks, found, budget)

@@ -12,16 +12,27 @@ from planner import deadline, programs
 from planner.deadline import Budget, Overlap, Unfinished, late
 from planner.explanation import LimitUse, certify, certify_idle
 from planner.prepare import PreparedStance
-from planner.programs import SLACK, Outcome
+from planner.programs import LOAD_UNIT, SLACK, UNLIMITED, Outcome
 from planner.result import Certificate
 from planner.solving.prepared_checks import PreparedChecks
 from planner.solving.solution import Solution, solve_at_vertex, solve_effort, solve_in_two
 
-__all__ = ["given_wrench", "look_again", "overload", "unexplained"]
+__all__ = ["beyond_all_loads", "given_wrench", "look_again", "overload", "unexplained"]
 
 
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
+
+
+def beyond_all_loads(prepared: PreparedStance, found: Solution) -> bool:
+    """Whether a plan of fixed wrists balances the body with loads beyond `UNLIMITED`.
+
+    Rows that all but contradict the balance let it be had so, a hair before they do.
+    """
+    if prepared.floating or found.utilisation <= 1.0:
+        return False
+    most = max(np.abs(loads).max(initial=0.0) for loads in found.outcome.loads)
+    return bool(most > UNLIMITED * LOAD_UNIT)
 
 
 def look_again(
@@ -38,7 +49,7 @@ def look_again(
     far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
     missed = found
     if nearest.solved and nearest.value <= far:
-        if prepared.hands.floating:
+        if prepared.hands.floating or found.passes:
             return found, None
         # rounding put the wrench a hair outside: plan for the nearest that can be had
         inside = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))

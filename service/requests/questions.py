@@ -68,11 +68,8 @@ AxisForce = Force | ForceRange | None
 AxisForces = Annotated[list[AxisForce], Meta(min_length=3, max_length=3)]
 Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
 ObjectiveName = Annotated[
-    Literal["max_margin", "min_effort", "max_reliability"],
-    Meta(
-        description="least utilisation, or least effort within limits.utilisation; "
-        "max_reliability is not supported in this version"
-    ),
+    Literal["max_margin", "min_effort"],
+    Meta(description="least utilisation, or least effort within limits.utilisation"),
 ]
 Explain = Annotated[
     bool,

@@ -62,18 +62,13 @@ ALIASES: Final = {
 }
 
 
-class _Later(NamedTuple):
-    """Values of a field that this version supports, and what to tell who gives another."""
+LATER: Final = {"confidence": "leave it out: tile limits are nominal"}
+"""Fields that later versions will have, and what to tell who gives them."""
 
-    supported: tuple[object, ...]
-    advice: str
-
-
-LATER: Final = {
-    "objective": _Later(("max_margin", "min_effort"), "valid are max_margin and min_effort"),
-    "confidence": _Later((None,), "leave it out: tile limits are nominal"),
+LATER_VALUES: Final = {
+    ("objective", "max_reliability"): "valid are max_margin and min_effort",
 }
-"""What this version supports of the fields that later versions will."""
+"""The same of values of fields."""
 
 BULK: Final = ("vertices", "faces")
 """Long lists of numbers of a mesh, which its model checks as arrays."""
@@ -181,6 +176,11 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             partial(_plain, payload, form),
             lambda part: form.decode(form.encode(part), kind),
         )
+        for (name, value), advice in LATER_VALUES.items():
+            if field == name and f"value '{value}'" in str(error):
+                raise UnsupportedError(
+                    f"{value} is not supported in this version; {advice}", field=field
+                ) from None
         raise InvalidInputError(message, field=field) from None
     try:
         if form is Format.JSON:
@@ -209,11 +209,8 @@ def _check(value: object, path: str = "") -> None:
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:
             part, field = getattr(value, name), f"{path}.{name}" if path else name
-            if name in LATER and part not in LATER[name].supported:
-                given = f"{part} is " if isinstance(part, str) else ""
-                raise UnsupportedError(
-                    f"{given}not supported in this version; {LATER[name].advice}", field=field
-                )
+            if name in LATER and part is not None:
+                raise UnsupportedError(f"not supported in this version; {LATER[name]}", field=field)
             if name not in BULK:
                 _check(part, field)
     elif isinstance(value, Mapping):

@@ -27,6 +27,7 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
+from service.wire.codec import LATER
 from service.wire.keys import (
     BODY_SPACE,
     HEALTH,
@@ -83,6 +84,9 @@ def schema() -> dict[str, Any]:
     names = {name: _plain_name(name) for name in parts}
     assert len({*names.values()}) == len(parts)
     for part in parts.values():
+        # what later versions will have is not offered
+        for name in LATER.keys() & part.get("properties", {}).keys():
+            del part["properties"][name]
         # of a docstring that says more, its first sentence
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]

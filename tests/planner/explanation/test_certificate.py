@@ -160,3 +160,13 @@ def test_a_plan_that_the_checks_refuse_by_a_hair_is_sought_next_to_what_is_neede
     answer = plan(replace(asked, body_wrench=needed))
     assert answer.status == "optimal"
     assert np.linalg.norm(answer.residual) <= 1e-6
+
+
+def test_loads_beyond_all_strength_are_none():
+    """Fingers all but parallel could squeeze with 80 MN sideways: no more than if they were."""
+    for turned in (math.pi, 3.14159):
+        answer = plan(ask(on_wall(Edge(0.02, math.pi / 2), off=0.45, outer_rotation=turned)))
+        assert answer.status == "infeasible"
+        assert answer.certificate.utilisation is None
+        assert answer.certificate.supremum < answer.certificate.needed
+        assert answer.certificate.irreducible
