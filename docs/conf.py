@@ -24,6 +24,7 @@ extensions = [
     "numpydoc",
     "sphinx_click",
 ]
+smartquotes = False  # which would make a dash of --hand
 html_theme = "furo"
 html_title = f"crux {release}"
 exclude_patterns = ["reference/generated/bytes"]

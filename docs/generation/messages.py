@@ -107,7 +107,11 @@ def _need(field: str, entry: Schema, required: list[str]) -> str:
 def _meaning(entry: Schema) -> str:
     said = [entry.get("description", "")]
     said += [part.get("description", "") for part in entry.get("anyOf", [])]
-    return "; ".join(dict.fromkeys(text for text in said if text))
+    texts = list(dict.fromkeys(filter(None, said)))
+    # what another text has, such as a unit, is told once
+    return "; ".join(
+        text for text in texts if not any(text in other for other in texts if other != text)
+    )
 
 
 def _type(entry: Schema) -> str:

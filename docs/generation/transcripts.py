@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from importlib import resources
 from typing import Any, Final, NamedTuple
@@ -21,6 +22,9 @@ ROBOT: Final = "robosimian"
 
 SHOWN: Final = 1024
 """Bytes of a payload that a page shows; the whole of it is a file beside it."""
+
+WIDEST: Final = 100
+"""Characters of a line of JSON on a page, unless nothing in it can be parted."""
 
 ENCODINGS: Final = {"json": "application/json", "msgpack": "application/msgpack"}
 
@@ -120,7 +124,7 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
             pages[name] = payload
             text += [
                 f"The {part}, {len(payload):,} bytes, encoding `{coded}`"
-                f" ({{download}}`the whole of it <../{name}>`):\n",
+                f" ({{download}}`download <../{name}>`):\n",
                 f"```{{code-block}} text\n{_shown(payload, form)}\n```\n",
             ]
     pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
@@ -161,7 +165,12 @@ def _shown(payload: bytes, form: str) -> str:
     part, rest = payload[:SHOWN], len(payload) - SHOWN
     if form == "json":
         text = part.decode(errors="ignore")
-        lines = [text[i : i + 100] for i in range(0, len(text), 100)]
+        lines = [""]
+        # after commas, where a line break means nothing
+        for piece in re.findall("[^,]*,?", text):
+            if lines[-1] and len(lines[-1]) + len(piece) > WIDEST:
+                lines.append("")
+            lines[-1] += piece
     else:
         lines = [
             f"{i:06x}  {row.hex(' '):<47}  {''.join(chr(b) if 32 <= b < 127 else '.' for b in row)}"

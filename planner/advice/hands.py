@@ -170,10 +170,12 @@ def placed(
             return
         told = []
         if x or y:
-            told.append(f"move {hand.limb} by [{1e3 * x:z.0f}, {1e3 * y:z.0f}] mm along its palm")
+            told.append(
+                f"move {hand.limb} by [{1e3 * x:z.0f}, {1e3 * y:z.0f}] mm along x and y of its H"
+            )
         if turn:
             whom = "it" if told else hand.limb
-            told.append(f"turn {whom} by {math.degrees(turn):.0f}° about its palm's z")
+            told.append(f"turn {whom} by {math.degrees(turn):.0f}° about z of its H")
         size = math.hypot(x, y) / WAY_UNIT + abs(turn) / TURN_UNIT
         yield Change("place", (hand.limb,), " and ".join(told), changes, size)
 

@@ -211,7 +211,7 @@ def shortfall_sentence(
     certificate : Certificate
         Of a body wrench that cannot be had at any utilisation.
     touching : bool
-        Whether any hand touches rock at all.
+        Whether a spine of any hand is on rock.
     floating : collection of str, optional
         Limbs whose hands float.
     """
@@ -226,7 +226,7 @@ def shortfall_sentence(
     if certificate.shortfall is not None:
         sentence += f": missing {_missing(certificate.shortfall)} (in B)"
     if not touching:
-        return f"{sentence}; no hand touches rock"
+        return f"{sentence}; no spine of any hand is on rock"
     if names == ():
         return f"{sentence}; these hands have no loads at all, of any sign, that give it{note}"
     return (f"{sentence}; {constraints}" if constraints else sentence) + note

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable
 from contextlib import suppress
 from pathlib import Path
@@ -56,6 +57,35 @@ class MeshFiles:
         if isinstance(request, RouteRequest):
             request = replace(request, moves=self._hands(request.moves, "moves"))
         return request
+
+    def named(self, request: PlanRequest, given: PlanRequest, folder: Path) -> PlanRequest:
+        """Return a whole request with files in place of vertices and faces again.
+
+        Parameters
+        ----------
+        request : PlanRequest
+        given : PlanRequest
+            What it was made of, with its files.
+        folder : Path
+            That their names are to be relative to, unless they are absolute.
+        """
+        replace = msgspec.structs.replace
+
+        def renamed(hold: K, before: Hold) -> K:
+            if not isinstance(hold, Mesh) or not isinstance(before, Mesh) or before.file is None:
+                return hold
+            file = before.file
+            if not Path(file).is_absolute():
+                file = os.path.relpath(self._folder / file, folder)
+            return replace(hold, vertices=None, faces=None, file=file)
+
+        stance, before = request.stance, given.stance
+        rocks = {name: renamed(rock, before.rocks[name]) for name, rock in stance.rocks.items()}
+        hands = [
+            replace(hand, hold=renamed(hand.hold, other.hold))
+            for hand, other in zip(stance.hands, before.hands, strict=True)
+        ]
+        return replace(request, stance=replace(stance, rocks=rocks, hands=hands))
 
     def _hands(self, hands: list[H], path: str) -> list[H]:
         return [

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, Literal, cast
+from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 import numpy as np
@@ -23,7 +23,6 @@ from planner import (
     HandOnHold,
     Limits,
     Load,
-    Objective,
     Question,
     Stance,
     settle_each,
@@ -75,7 +74,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         load=_load(request.load),
         limits=_limits(request.limits),
         want=frozenset(request.want),
-        objective=cast(Objective, request.objective),
+        objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
         draws=_draws(request.draws),
@@ -104,7 +103,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies)),
         load=_load(request.load),
         limits=_limits(request.limits),
-        objective=cast(Objective, request.objective),
+        objective=request.objective,
         explain=request.explain,
         want=frozenset(request.want),
         draws=_draws(request.draws),

@@ -205,7 +205,7 @@ def query(
     "picture",
     type=click.Path(path_type=Path),
     callback=output_in(*PICTURES),
-    default=Path("crux-demo.png"),
+    default="crux-demo.png",
     show_default=True,
     metavar="FILE",
     help="Where the picture goes.",

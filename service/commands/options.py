@@ -46,6 +46,7 @@ __all__ = [
 R = TypeVar("R", PlanRequest, RouteRequest)
 
 PICTURES: Final = (".png", ".pdf", ".svg")
+TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
 HAND_FILE: Final = ".toml"
 EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
@@ -271,6 +272,13 @@ def plot_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
     )
 
 
+def _folder_in(_: click.Context, __: click.Parameter, path: Path) -> Path:
+    """Refuse a folder that is named as a table or a picture is."""
+    if path.suffix.lower() in (*TABLES, *PICTURES) and not path.is_dir():
+        raise click.BadParameter(f"{path}: names a folder, into which several files go")
+    return path
+
+
 def folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return an option that names where files go, which is passed on as ``folder``."""
     return click.option(
@@ -278,6 +286,7 @@ def folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any
         "--output",
         "folder",
         type=click.Path(path_type=Path, file_okay=False),
+        callback=_folder_in,
         required=True,
         metavar="DIR",
         help=text,

@@ -20,7 +20,7 @@ from service.commands.options import (
     stance_argument,
     with_extras,
 )
-from service.commands.stances import read_request
+from service.commands.stances import named_files, read_request
 from service.requests import Draw, PlanRequest, Want
 from service.tables import (
     EXIT_STATUS,
@@ -36,7 +36,7 @@ from service.tables import (
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.answering import Robots
+    from service.answering import MeshFiles, Robots
     from service.replies import PlanReply
 
 __all__ = ["plan"]
@@ -103,44 +103,57 @@ def plan(
     if advice_folder is not None and request.detail != "full":
         raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
     robots = robots_of(robot)
-    with waiting(f"planning {stance}", request):
+    brief = not as_json and verbosity() < 0
+    with waiting(f"planning {stance}", request) as tell:
         with deadline.within(request.deadline):
             answer = answering.planned(request, robots)
-            if not as_json and answer.reply.status in ("overloaded", "infeasible"):
+            seeks = not (as_json or brief) and answer.reply.status in ("overloaded", "infeasible")
+            if seeks:
+                tell("looking for what would make it hold")
                 # --advice is looked for as long as it takes
                 with deadline.within(request.deadline or ADVICE_SECONDS):
                     answer = answering.with_advice(answer)
-            full = request.detail == "full" and (as_json or verbosity() >= 0)
+            full = request.detail == "full" and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
             draw_plan(answer, picture)
     written: list[Path] = []
     if advice_folder is not None:
         assert isinstance(answer.reply, PlanReply)  # of a whole request
-        written = _write_advice(request, answer.reply, advice_folder)
+        written = _write_advice(request, answer.reply, advice_folder, named_files(stance))
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
     elif as_json:
         without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
         say(msgspec.to_builtins(answer.reply) | without)
     else:
-        from service.tables import console, print_plan
+        from service.tables import console, print_plan, words_of
 
-        print_plan(answer.reply, console(), without_palm=bare, brief=verbosity() < 0)
+        out = console()
+        print_plan(answer.reply, out, without_palm=bare, brief=brief)
         tell_solver(answer.reply)
-        if written:
-            last = f" to {written[-1].name}, the best first" if len(written) > 1 else ""
-            click.echo(f"advice: {written[0]}{last}")
+        holding = answer.reply.status == "optimal"
+        for file, advice in zip(written, answer.reply.advice or (), strict=False):
+            told = words_of(advice, holding=holding)
+            out.print(f"{file}: {told}", markup=False, soft_wrap=True)
     return EXIT_STATUS.get(answer.reply.status, FAILED)
 
 
-def _write_advice(request: PlanRequest, reply: PlanReply, folder: Path) -> list[Path]:
+def _write_advice(
+    request: PlanRequest,
+    reply: PlanReply,
+    folder: Path,
+    given: tuple[PlanRequest, MeshFiles] | None,
+) -> list[Path]:
     """Write each advice as a request whose plan gives what it promises, and none of another.
 
-    Returns their paths.
+    Scans stay in their files where the request was ``given`` with these. Returns their paths.
     """
     from service import answering
 
+    if given is not None:
+        before, files = given
+        request = files.named(request, before, folder)
     written = []
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)

@@ -10,19 +10,22 @@ from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import msgspec
 
 from hand_models.base import InvalidInputError
 from service.requests import PlanRequest, Request, RouteRequest
 
-__all__ = ["bundled", "limbs_of", "read_request", "read_route"]
+__all__ = ["bundled", "limbs_of", "named_files", "read_request", "read_route"]
 
 LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
 """Of the bundled robot."""
 
 R = TypeVar("R", bound=Request)
+
+if TYPE_CHECKING:
+    from service.answering import MeshFiles
 
 
 def bundled(kind: type[Request] = PlanRequest) -> tuple[str, ...]:
@@ -45,6 +48,20 @@ def read_request(source: str) -> PlanRequest:
         If there is none, or it is not a plan request.
     """
     return _read(source, PlanRequest, "STANCE", "stance")
+
+
+def named_files(source: str) -> tuple[PlanRequest, MeshFiles] | None:
+    """Return a request as its file has it, with the names of its meshes; None of any other source.
+
+    The file is one that `read_request` has read.
+    """
+    from service.answering import MeshFiles
+    from service.wire import decode_request
+
+    path = Path(source)
+    if source == "-" or not path.is_file():
+        return None
+    return decode_request(_text(path), PlanRequest), MeshFiles(path.parent)
 
 
 def read_route(source: str) -> RouteRequest:

@@ -128,7 +128,9 @@ class Paths:
         else:
             known = {key: key for key in entries}
         if not entries:
-            raise InvalidInputError(f"{where} has no entries", field=path)
+            raise InvalidInputError(
+                f"{where} has no entries in the request; give there what is to vary", field=path
+            )
         if name == EVERY and (isinstance(value, list) or _free_keys(places)):
             chosen = list(dict.fromkeys(known.values()))
         elif name in known:

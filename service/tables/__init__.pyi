@@ -1,3 +1,4 @@
+from .advice import words_of as words_of
 from .body_spaces import print_body_space as print_body_space
 from .layout import console as console, table_of as table_of, unit_of as unit_of
 from .plans import (

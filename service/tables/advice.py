@@ -10,14 +10,19 @@ from rich.console import Console
 
 from planner import Advice
 
-__all__ = ["print_advice"]
+__all__ = ["print_advice", "words_of"]
 
 MOST: Final = 3
 """Changes shown; the best first."""
 
 
+def words_of(advice: Advice, *, holding: bool = False) -> str:
+    """Return what one change would do, of a stance that is ``holding`` already, or is not."""
+    what = "would be better" if holding else "would hold" if advice.holds else "would help"
+    return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
+
+
 def print_advice(told: Iterable[Advice], out: Console, *, holding: bool = False) -> None:
     """Print what would make a stance hold, or be better where it is ``holding`` already."""
     for advice in islice(told, MOST):
-        what = "would be better" if holding else "would hold" if advice.holds else "would help"
-        out.print(f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}", markup=False)
+        out.print(words_of(advice, holding=holding), markup=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -189,9 +189,20 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 @contextmanager
-def waiting(title: str, request: PlanRequest) -> Iterator[None]:
-    """Show on a terminal's standard error that hands with floating wrists take a while."""
-    slow = verbosity() >= 0 and any(hand.wrist == "floating" for hand in request.stance.hands)
-    screen = console(stderr=True) if slow else None
-    with nullcontext() if screen is None or not screen.is_terminal else screen.status(title):
-        yield
+def waiting(title: str, request: PlanRequest) -> Iterator[Callable[[str], None]]:
+    """Show on a terminal's standard error what takes a while; yields what tells of something else.
+
+    From the beginning that is hands with floating wrists.
+    """
+    with ExitStack() as lines:
+
+        def tell(title: str) -> None:
+            if verbosity() >= 0:
+                screen = console(stderr=True)
+                if screen.is_terminal:
+                    lines.close()
+                    lines.enter_context(screen.status(title))
+
+        if any(hand.wrist == "floating" for hand in request.stance.hands):
+            tell(title)
+        yield tell

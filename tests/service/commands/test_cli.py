@@ -196,13 +196,55 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
     run(["plan", stance, "--advice", str(tmp_path / "advised")])
     lines = capfd.readouterr().out.splitlines()
     files = sorted((tmp_path / "advised").iterdir(), key=lambda file: (len(file.name), file.name))
-    first, last = files[0].name, files[-1].name
-    assert lines[-1] == f"advice: {tmp_path / 'advised' / first} to {last}, the best first"
-    told = [line for line in lines if line.startswith("would ")]
-    assert len(told) == 3
-    for line, file in zip(told, files, strict=False):
+    assert len([line for line in lines if line.startswith("would ")]) == 3
+    # the last lines tell what is in which file
+    for line, file in zip(lines[-len(files) :], files, strict=True):
         assert run(["plan", str(file), "--json"]) == DONE
-        assert line.startswith(f"{what}, utilisation {result(capfd)['utilisation']:.2f}: ")
+        used = f"{result(capfd)['utilisation']:.2f}"
+        assert line.startswith(f"{file}: {what}, utilisation {used}: ")
+
+
+def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    folder = tmp_path / "stances"
+    folder.mkdir()
+    vertices, faces = cylinder_mesh(0.3)
+    trimesh.Trimesh(vertices, faces, process=False).export(folder / "log.ply")
+    request = wall_request(HEAVY)
+    hand = request["stance"]["hands"][0]
+    hand["hold"] = {"shape": "mesh", "file": "log.ply"}
+    (folder / "stance.json").write_text(json.dumps(request))
+    run(["plan", str(folder / "stance.json"), "--advice", str(tmp_path / "advised"), "-q"])
+    capfd.readouterr()
+    files = list((tmp_path / "advised").iterdir())
+    assert files
+    for file in files:
+        holds = [each["hold"] for each in json.loads(file.read_text())["stance"]["hands"]]
+        meshes = [hold for hold in holds if hold["shape"] == "mesh"]
+        assert all("vertices" not in hold for hold in meshes)
+        assert all((file.parent / hold["file"]).samefile(folder / "log.ply") for hold in meshes)
+        assert run(["plan", str(file), "--json"]) in (DONE, OVERLOADED)
+
+
+def test_who_asks_for_less_waits_for_no_advice(
+    stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(answering, "with_advice", lambda answer: asked.append(answer) or answer)
+    path = stance_file(wall_request(HEAVY))
+    assert run(["plan", path, "-q"]) == OVERLOADED
+    assert not asked
+    assert run(["plan", path]) == OVERLOADED
+    assert len(asked) == 1
+    capfd.readouterr()
+
+
+def test_a_folder_that_is_named_as_a_table_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["sweep", "wall-300", "--vary", "load.mass=50:60:2", "-o"]
+    assert run([*arguments, str(tmp_path / "sweep.parquet")]) == BAD_INPUT
+    assert "names a folder, into which several files go" in complaint(capfd)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_mark_that_editors_put_before_a_text_is_no_part_of_it(
