@@ -60,7 +60,9 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     axes.set_title(title)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
     _name_holes(axes, rock)
-    figure.legend(loc="outside lower center")
+    if rock.holes:
+        axes.plot([], [], " ", label="in red: widths of the widest holes")
+    figure.legend(loc="outside lower center", ncols=2)
     figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
     with whole_file(path) as part:
         figure.savefig(part, dpi=150)
@@ -71,7 +73,7 @@ def _name_holes(axes: Axes, rock: ScannedRock) -> None:
     apart = APART * float(np.ptp(rock.vertices[:, :2], axis=0).max())
     named: list[Array] = []
     for hole in rock.holes[:NAMED]:
-        spot = hole.place[[1, 0]]
+        spot = hole.place[[1, 0]] + [0.0, 0.5 * hole.width]  # above it
         if any((np.abs(spot - other) < apart).all() for other in named):
             continue
         named.append(spot)
@@ -82,8 +84,8 @@ def _name_holes(axes: Axes, rock: ScannedRock) -> None:
             color="red",
             fontsize=8,
             ha="center",
-            va="center",
-            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"},
+            va="bottom",
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"},
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -11,6 +12,7 @@ import scipy
 
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
+from hand_models.rock import Mesh
 from planner.pictures.rock_patches import rock_patch
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
@@ -201,13 +203,16 @@ def scene_of(plan: Plan, question: Question) -> Scene:
     """Return what there is to see of a plan for a question."""
     stance = question.stance
     plans = {hand.limb: hand for hand in plan.hands or ()}
+    settled = [settle_hand(hand, stance) for hand in stance.hands]
+    rocks = _rocks(stance.hands, settled)
     limbs = _limbs(plan, question)
     body, links = _capsules(plan, stance)
     hull = [stance.body.position, *(limb.chain[0] for limb in limbs)]
     return Scene(
         body=stance.body,
         hands=tuple(
-            _hand(hand, settle_hand(hand, stance), plans.get(hand.limb)) for hand in stance.hands
+            _hand(hand, known, rock, plans.get(hand.limb))
+            for hand, known, rock in zip(stance.hands, settled, rocks, strict=True)
         ),
         limbs=limbs,
         body_capsules=body,
@@ -217,7 +222,30 @@ def scene_of(plan: Plan, question: Question) -> Scene:
     )
 
 
-def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> DrawnHand:
+def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[Array]:
+    """Return the rock of each hand in W; that of a scan which several hold, with the first."""
+    placed = [hand.pose @ known.seating.pose for hand, known in zip(hands, settled, strict=True)]
+
+    def alike(i: int, j: int) -> bool:
+        return (
+            isinstance(hands[i].hold, Mesh)
+            and hands[i].hold is hands[j].hold
+            and np.allclose(placed[i].position, placed[j].position, atol=1e-6)
+            and np.allclose(placed[i].rotation, placed[j].rotation, atol=1e-6)
+        )
+
+    rocks = []
+    for i, (hand, known) in enumerate(zip(hands, settled, strict=True)):
+        if any(alike(i, j) for j in range(i)):
+            rocks.append(np.zeros((0, 3, 3)))
+            continue
+        there = [hands[j].pose.position for j in range(len(hands)) if j == i or alike(i, j)]
+        patch = rock_patch(known, hand.pose.inverse().apply(np.array(there)))
+        rocks.append(hand.pose.apply(patch.reshape(-1, 3)).reshape(-1, 3, 3))
+    return rocks
+
+
+def _hand(hand: HandOnHold, settled: SettledHand, rock: Array, plan: HandPlan | None) -> DrawnHand:
     kind = settled.hand
     x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
     into_world, frames = hand.pose.apply, kind.frames(settled.grasp.outer_rotation)
@@ -231,7 +259,7 @@ def _hand(hand: HandOnHold, settled: SettledHand, plan: HandPlan | None) -> Draw
             for frame, finger in zip(frames, settled.fingers, strict=True)
         ),
         touching=into_world(settled.positions[settled.holding]),
-        rock=into_world(rock_patch(settled)),
+        rock=rock,
         force=None if plan is None else -hand.pose.rotation @ plan.wrench[:3],
         utilisation=None if plan is None else plan.utilisation,
     )

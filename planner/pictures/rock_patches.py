@@ -43,41 +43,53 @@ COARSE: Final = 0.02
 """Size of what is drawn of such a mesh [m]."""
 
 
-def rock_patch(settled: SettledHand) -> Array:
+HERE: Final = np.zeros((1, 3))
+"""Of a hand alone, its own place in H."""
+
+
+def rock_patch(settled: SettledHand, beside: Array = HERE) -> Array:
     """Return the rock within ±`AROUND` of a hand along each axis of H, shape (n, 3, 3) [m].
 
     Triangles in H; none where the hold is farther away.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    beside : ndarray, shape (n, 3), optional
+        Places in H of all hands on this rock, if it is a mesh; its rock reaches so far beyond them.
     """
     in_hand = settled.seating.pose
     vertices, faces = _surface(settled, in_hand.inverse().position)
-    near = _near(in_hand, vertices, faces)
+    low, high = beside.min(axis=0) - AROUND, beside.max(axis=0) + AROUND
+    near = _near(in_hand, vertices, faces, low, high)
     if not len(near.faces):
         return np.zeros((0, 3, 3))
     vertices, faces = near.vertices, near.faces
     for inward in np.vstack([np.eye(3), -np.eye(3)]):
         # slicing a whole mesh would need a further package
-        vertices, faces, _ = slice_faces_plane(vertices, faces, inward, -AROUND * inward)
+        vertices, faces, _ = slice_faces_plane(
+            vertices, faces, inward, np.where(inward > 0.0, low, high) * np.abs(inward)
+        )
     return np.asarray(vertices[faces], dtype=float)
 
 
-def _near(in_hand: Pose, vertices: Array, faces: Indices) -> Triangles:
+def _near(in_hand: Pose, vertices: Array, faces: Indices, low: Array, high: Array) -> Triangles:
     """Return, in H, the triangles whose bounds meet the box; coarsely if they are many."""
     moved = in_hand.apply(vertices)
     corners = moved[faces]
-    near = (corners.min(axis=1) <= AROUND).all(axis=1) & (corners.max(axis=1) >= -AROUND).all(
-        axis=1
-    )
+    near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
     found = Triangles(moved, faces[near])
     if len(found.faces) > MOST:
-        found = _coarse(found)
+        # the farther it goes, the coarser, but not as much
+        found = _coarse(found, COARSE * math.sqrt((high - low).max() / (2.0 * AROUND)))
     return found
 
 
-def _coarse(triangles: Triangles) -> Triangles:
+def _coarse(triangles: Triangles, size: float) -> Triangles:
     """Return triangles whose vertices within a cell of a grid are one, in their middle."""
     used, faces = np.unique(triangles.faces, return_inverse=True)
     places = triangles.vertices[used]
-    _, cell = np.unique(np.round(places / COARSE), axis=0, return_inverse=True)
+    _, cell = np.unique(np.round(places / size), axis=0, return_inverse=True)
     cell = cell.ravel()
     counts = np.bincount(cell)
     middles = np.column_stack([np.bincount(cell, x) / counts for x in places.T])

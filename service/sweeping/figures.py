@@ -153,9 +153,8 @@ def _finish_curves(
     caps = {row.cap for row in sweep.rows}
     handles: list[Any] = []
     if len(caps) == 1:
-        cap = caps.pop()
-        handles.append(upper.axhline(cap, color="tab:red", linestyle="--", linewidth=1.0,
-                                     label=f"cap on the utilisation: {cap:g}"))  # fmt: skip
+        upper.axhline(*caps, color="tab:red", linestyle="--", linewidth=1.0)
+        handles.append(_cap_line(*caps))
     lower.axhline(1.0, color="tab:red", linestyle="--", linewidth=1.0)
     for border in sweep.borders:
         for axes in (upper, lower):
@@ -278,5 +277,13 @@ def _each_alone(sweep: Sweep, varying: Sequence[int]) -> Figure:
         axes.margins(y=0.12)
     for axes in every[len(varying) :]:
         axes.remove()
-    figure.legend(handles=state_words(sweep.rows), loc="outside lower center", ncols=2, fontsize=9)
+    handles = state_words(sweep.rows)
+    if len(caps) == 1:
+        handles.append(_cap_line(*caps))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
     return figure
+
+
+def _cap_line(cap: float) -> Line2D:
+    words = f"cap on the utilisation: {cap:g}"
+    return Line2D([], [], color="tab:red", linestyle="--", linewidth=1.0, label=words)

@@ -33,6 +33,9 @@ LEAST, LESS_RED, MOST = 0.5, 1.5, 2.0
 """Of the scale, over the cap: it goes at least from the first to the second, and at most to the
 last; what is beyond is as red as that."""
 
+MARKED: Final = 600
+"""So many points of a map at most have a dot each."""
+
 BORDER: Final = "black"
 WIDTH: Final = 1.8
 """Of the border [pt]."""
@@ -142,6 +145,9 @@ def draw_map(axes: Any, x: Side, y: Side, rows: Sequence[Sequence[Row]], colours
         margins = np.ma.masked_invalid(np.full(margins.shape, np.nan))
     segments = _edges_of_holding(rows, margins, across, up)
     axes.add_collection(LineCollection(segments, colors=BORDER, linewidths=WIDTH))
+    spots = np.array([(a, b) for b in y.places for a in x.places])
+    if len(spots) <= MARKED:
+        axes.plot(*spots.T, ".", color="0.3", markersize=2.5, clip_on=False)
     axes.set(xlabel=x.label, ylabel=y.label, xlim=x.span(), ylim=y.span())
     x.tick(axes.xaxis)
     y.tick(axes.yaxis)

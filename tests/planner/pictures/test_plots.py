@@ -675,6 +675,31 @@ def test_a_flat_wall_is_drawn_to_the_edge_of_the_box():
     assert area.sum() / 2.0 == pytest.approx((2.0 * AROUND) ** 2, rel=1e-9)
 
 
+def test_a_scan_that_hands_share_is_drawn_once_and_whole():
+    corners = np.array([(x, y, 0.0) for x in (-1.5, 1.5) for y in (-1.0, 1.0)])
+    scan = Mesh(corners, np.array([(0, 1, 2), (1, 3, 2)]), anywhere=True)
+    stance = on_wall(Plane(), outer_rotation=0.0)
+    places = np.array([hand.pose.position for hand in stance.hands])
+    there = Pose(places.mean(axis=0), stance.hands[0].pose.rotation)
+    hands = tuple(replace(hand, hold=scan, hold_pose=there) for hand in stance.hands)
+    shared = Question(replace(stance, hands=hands))
+    drawn_hands = scene_of(solve.plan(shared), shared).hands
+    first, *others = (hand.rock for hand in drawn_hands)
+    assert all(not len(rock) for rock in others)
+    (low, high), reach = np.sort([first.min(axis=(0, 1)), first.max(axis=(0, 1))], axis=0), 0.4
+    flat = np.ptp(places, axis=0) > 0.1
+    assert (low <= places.min(axis=0) - reach)[flat].all()
+    assert (high >= places.max(axis=0) + reach)[flat].all()
+    sides = np.diff(first, axis=1)
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2.0
+    assert area == pytest.approx(np.prod((high - low)[flat]), rel=1e-6)
+    # of a copy each hand has its own
+    apart = [replace(hands[0], hold=Mesh(corners, scan.triangles.faces, anywhere=True)), *hands[1:]]
+    apart = Question(replace(stance, hands=tuple(apart)))
+    rocks = [len(hand.rock) for hand in scene_of(solve.plan(apart), apart).hands]
+    assert [count > 0 for count in rocks] == [True, True, False, False]
+
+
 def test_rock_that_is_far_away_is_not_drawn():
     away = Pose(np.array([0.0, 0.0, 0.6]), np.eye(3))
     settled = HAND.settle(Sphere(0.2), ROCK, Grasp(), away)
