@@ -160,7 +160,7 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
             field="cell",
         )
     if not all(math.isfinite(side) and side > 0.0 for side in sides):
-        raise InvalidInputError(f"must be above zero, got {min(sides):g}", field="cell")
+        raise InvalidInputError(f"must be finite and above zero, got {min(sides):g}", field="cell")
     return sides
 
 

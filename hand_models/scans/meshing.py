@@ -127,7 +127,7 @@ def _in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
 
 def _length(value: float, field: str) -> float:
     if not (math.isfinite(value) and value > 0.0):
-        raise InvalidInputError(f"must be above zero, got {value:g}", field=field)
+        raise InvalidInputError(f"must be finite and above zero, got {value:g}", field=field)
     return value
 
 

@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import Triangles
@@ -27,6 +28,15 @@ DARK: Final = 0.35
 
 NAMED: Final = 12
 """Holes whose width is written beside them."""
+
+MARGIN: Final = 0.03
+"""Around the rock, over its longer side."""
+
+LEAST_SPREAD: Final = 1e-2
+"""Half of a scale of colours at least, over what is in its middle, or over one."""
+
+TICKS: Final = 8
+"""Along the rock's longer side, about."""
 
 APART: Final = np.array([0.11, 0.04])
 """How far apart widths are that are written, sideways and upward, as part of the rock's longer
@@ -57,7 +67,7 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     axes = figure.add_subplot()
     colours = _paint(axes, rock.vertices, rock.faces, COLOURS)
-    axes.set_title(title)
+    axes.set_title(title, parse_math=False)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
     _name_holes(axes, rock)
     if rock.holes:
@@ -117,11 +127,12 @@ def plot_holds(
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     axes = figure.add_subplot()
     _paint(axes, *rock, "gray")
-    axes.set_title(title)
+    axes.set_title(title, parse_math=False)
     shown = axes.scatter(
         points[:, 1],
         points[:, 0],
         c=values,
+        norm=_scale(values),
         s=36,
         cmap="plasma",
         edgecolors="white",
@@ -175,7 +186,7 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
     """Draw triangles as the scanner saw them, and return what their colours mean: heights [mm]."""
     corners = vertices[faces]
     heights = -1e3 * corners[:, :, 2].mean(axis=1)
-    scale = Normalize(*np.percentile(heights, [0.5, 99.5]))
+    scale = _scale(np.percentile(heights, [0.5, 99.5]))
     colours = ScalarMappable(scale, palette)
     painted = np.array(colours.to_rgba(heights))
     painted[:, :3] *= _brightness(corners)[:, None]
@@ -190,7 +201,10 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
         autolim=False,
     )
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    margin = 0.03 * (high - low)[:2].max()
+    margin = MARGIN * (high - low)[:2].max()
+    for axis, size in ((axes.xaxis, high[1] - low[1]), (axes.yaxis, high[0] - low[0])):
+        count = round(TICKS * size / (high - low)[:2].max())
+        axis.set_major_locator(MaxNLocator(count) if count > 1 else FixedLocator([0.0]))
     axes.set(
         xlim=(low[1] - margin, high[1] + margin),
         ylim=(low[0] - margin, high[0] + margin),
@@ -199,6 +213,14 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
         ylabel="x of the rock's frame [m]",
     )
     return colours
+
+
+def _scale(values: Array) -> Normalize:
+    """Return the scale of colours of numbers, which are not spread where they are all but alike."""
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), LEAST_SPREAD * max(abs(middle), 1.0))
+    return Normalize(middle - half, middle + half)
 
 
 def _brightness(corners: Array) -> Array:

@@ -21,6 +21,9 @@ ENDINGS: Final = (".pcd", ".ply", ".xyz", ".txt", ".csv", ".npy", ".npz", ".tif"
 FEWEST: Final = 3
 """Points of a triangle."""
 
+LARGEST: Final = 1e12
+"""Of a file's numbers; what is beyond that is lost in rounding."""
+
 
 def read_scan(
     path: Path,
@@ -76,6 +79,9 @@ def read_scan(
         raise InvalidInputError(
             f"at least three points are needed, {path} has {len(finite)}{told}", field="file"
         )
+    largest = float(np.abs(finite).max())
+    if largest > LARGEST:
+        raise InvalidInputError(f"numbers up to {largest:.3g} are no lengths", field="file")
     scale, turn = _scale(finite, unit, width), UPS[up]
 
     def placed(point: ArrayLike, field: str) -> Array:
@@ -107,15 +113,19 @@ def _raw(path: Path, cell: float | None) -> RawScan:
         raise InvalidInputError(f"no such file: {path}", field="file")
     try:
         match ending:
-            case ".pcd":
-                return read_pcd(path)
-            case ".ply":
-                return read_ply(path)
             case ".npy" | ".npz":
                 return read_numpy(path, cell)
             case ".tif" | ".tiff":
                 return read_geotiff(path, cell)
-        return read_esri(path, cell) if is_esri(path) else read_columns(path)
+            case ".pcd" | ".ply":
+                read = read_pcd if ending == ".pcd" else read_ply
+            case _:
+                if is_esri(path):
+                    return read_esri(path, cell)
+                read = read_columns
+        if cell is not None:
+            raise InvalidInputError(f"is of grids of heights, {path} has points", field="cell")
+        return read(path)
     except CruxError:
         raise
     except UnicodeDecodeError:
@@ -134,7 +144,7 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
     if unit != "m":
         raise InvalidInputError("give a unit or a width, not both", field="width")
     if not (math.isfinite(width) and width > 0.0):
-        raise InvalidInputError(f"must be above zero, got {width:g}", field="width")
+        raise InvalidInputError(f"must be finite and above zero, got {width:g}", field="width")
     longest = float(np.ptp(points, axis=0).max())
     if longest == 0.0:
         raise InvalidInputError("all points are at one place", field="file")

@@ -80,7 +80,7 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     about = f"the body wrench asked for: {space.plan.status}{asked}"
     if not space.exact:
         about += "; floating hands' sets linearised where the plan puts their wrists"
-    figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=11)
+    figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=11, parse_math=False)
     with whole_file(path) as part:
         figure.savefig(part, dpi=120, facecolor="white")
 

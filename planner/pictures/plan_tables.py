@@ -35,6 +35,9 @@ FIRST: Final = 24
 LETTERS: Final = 64
 """Of such a line."""
 
+ENDLESS: Final = 999.0
+"""A utilisation that is written no more."""
+
 GAP: Final = 0.025
 """Above and below a table, over the panel's height."""
 
@@ -119,7 +122,9 @@ def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value > 1.0 else "black"
-            axes.text(first[1] + j, first[0] + i, f"{value:.2f}", color=colour, **style)
+            told = f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+            told = told if value < ENDLESS else f"{ENDLESS:.0f}+"
+            axes.text(first[1] + j, first[0] + i, told, color=colour, **style)
 
 
 def draw_shortfall(axes: Any, plan: Plan) -> None:

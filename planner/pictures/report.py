@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +22,24 @@ __all__ = ["draw_route", "summary", "write_report"]
 CUT: Final = 2.0
 """Largest utilisation that a route's picture shows in full."""
 
-BROKEN: Final = (0.78, 0.82)
+STAGE: Final = 0.32
+"""Width of a route's picture that a stage needs [inch]."""
+
+WIDTHS: Final = (11.0, 60.0)
+"""Least and largest width of a route's picture [inch]."""
+
+IN_BAR: Final[dict[str, Any]] = {
+    "rotation": 90,
+    "ha": "center",
+    "va": "top",
+    "weight": "bold",
+    "fontsize": 9,
+}
+"""What is written in a bar, from its upper end."""
+
+ON_WHITE: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+
+BROKEN: Final = (0.7, 0.73)
 """Where such a bar is seen to be broken, at its left and right edge, over the tallest bar."""
 
 HEADROOM: Final = 1.2
@@ -172,9 +190,10 @@ def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 
 def draw_route(result: RouteResult) -> Figure:
     """Draw utilisation and load factor along a climb, with its crux, and their spread."""
-    figure = Figure(figsize=(11.0, 6.5), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True)
     index = np.arange(len(result.plans))
+    wide = float(np.clip(STAGE * len(index), *WIDTHS))
+    figure = Figure(figsize=(wide, 6.5), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
     used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
     bands = [_band(result.plans, name) for name in ("utilisation", "load_factor")]
     cap = result.route.limits.utilisation
@@ -183,11 +202,11 @@ def draw_route(result: RouteResult) -> Figure:
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(np.minimum(used, height)), color=colours)
     for i in np.flatnonzero(used > height):
-        upper.text(i, 0.9 * height, f"{used[i]:.1f}", ha="center", color="white", weight="bold")
+        upper.text(i, 0.97 * height, f"{used[i]:.3g}", color="white", **IN_BAR)
         upper.plot([i - 0.5, i + 0.5], np.multiply(BROKEN, height), color="white", linewidth=3.0)
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
-        upper.text(i, height / 2, result.plans[i].status, rotation=90, ha="center", va="center")
+        upper.text(i, 0.97 * height, result.plans[i].status, bbox=ON_WHITE, **IN_BAR)
     upper.axhline(cap, color="tab:red", label=f"limit {cap:g}")
     for phase, colour in PHASE_COLOURS.items():
         if any(stage.phase == phase for stage in result.stages):
@@ -201,14 +220,14 @@ def draw_route(result: RouteResult) -> Figure:
         textcoords="offset points",
         ha="center",
         weight="bold",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        bbox=ON_WHITE,
         arrowprops={"arrowstyle": "-|>"},
     )
     upper.set(
         ylabel="utilisation [1]",
         ylim=(0.0, height * HEADROOM),
     )
-    figure.suptitle(result.route.name)
+    figure.suptitle(result.route.name, parse_math=False)
     for axes, band in zip((upper, lower), bands, strict=True):
         _draw_band(axes, band, _of_draws(result.plans))
     upper.legend(**OVER, ncols=7, fontsize=8, frameon=False)
@@ -224,7 +243,9 @@ def draw_route(result: RouteResult) -> Figure:
         "start" if s.move == 0 else f"{s.move} {s.phase}\n{str(s.limb).replace('_', ' ')}"
         for s in result.stages
     ]
-    lower.set_xticks(index, labels, rotation=90, fontsize=8)
+    shown = slice(None, None, math.ceil(STAGE * len(index) / wide))
+    lower.set_xticks(index[shown], labels[shown], rotation=90, fontsize=8)
+    lower.set_xlim(-1.0, len(index))
     for axes in (upper, lower):
         axes.grid(axis="y", alpha=0.3)
     return figure

@@ -42,6 +42,9 @@ __all__ = ["holds"]
 SHOWN: Final = 10
 """Holds that are printed."""
 
+LEAST: Final = 0.1
+"""What a hand holds that holds something [N]."""
+
 REASONS: Final = 3
 """Reasons that are printed why hands cannot be at places."""
 
@@ -150,7 +153,13 @@ def holds(
     radius = 0.5 * numbers.scalar("palm", "length")
     with progress("laying the grid") as tell:
         trials = grid_of_trials(
-            mesh, spacing, angles, rotations, radius=radius, most=MOST, tell=tell
+            mesh,
+            spacing,
+            angles,
+            tuple(dict.fromkeys(rotations)),
+            radius=radius,
+            most=MOST,
+            tell=tell,
         )
     if not trials:
         raise InvalidInputError(
@@ -234,7 +243,7 @@ def _sorted(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[Pa
     pairs = [
         (trials[i], each)
         for i, each in sorted(outcomes.items())
-        if not isinstance(each, InvalidInputError) and math.isfinite(each.support[0])
+        if not isinstance(each, InvalidInputError) and each.support.max() >= LEAST
     ]
     return sorted(pairs, key=lambda pair: -pair[1].support[0])
 
@@ -316,12 +325,12 @@ def _print(
             for values in (each.tenth, each.worst)
         ]
         table.add_row(
-            ", ".join(f"{1e3 * value:.0f}" for value in trial.point),
+            ", ".join(f"{1e3 * value:z.0f}" for value in trial.point),
             f"{math.degrees(trial.wrist_angle):.0f}",
             f"{math.degrees(trial.outer_rotation):.0f}",
-            f"{each.support[0]:.1f}",
+            f"{each.support[0]:z.1f}",
             f"{each.pure:.1f}" if math.isfinite(each.pure) else "-",
-            f"{each.support[1:].min():.1f}",
+            f"{each.support[1:].min():z.1f}",
             *left,
         )
     out.print(table)

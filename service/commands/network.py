@@ -13,6 +13,7 @@ import msgspec
 
 from service.commands.options import (
     PICTURES,
+    FiniteRange,
     asked,
     hand_option,
     json_option,
@@ -70,7 +71,7 @@ DEMO_STANCE: Final = "wall-300-joints"
 @click.option(
     "--deadline",
     "seconds",
-    type=click.FloatRange(0.0, min_open=True, max=LONGEST_DEADLINE),
+    type=FiniteRange(0.0, min_open=True, max=LONGEST_DEADLINE),
     default=DEFAULT_DEADLINE,
     show_default=True,
     metavar="SECONDS",

@@ -15,6 +15,7 @@ from service.commands.options import (
     explain_option,
     hand_option,
     json_option,
+    plot_option,
     robot_option,
     spread_option,
     stance_argument,
@@ -47,9 +48,7 @@ ADVICE_SECONDS: Final = 30.0
 
 @click.command()
 @stance_argument
-@click.option(
-    "--plot", "picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw it there."
-)
+@plot_option("Draw it there.")
 @click.option(
     "--robust",
     is_flag=True,

@@ -140,6 +140,8 @@ def rock(
 
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
+    if output.exists() and output.samefile(file):
+        raise InvalidInputError(f"{output} is the scan itself", field="--output")
     with progress(f"meshing {file.name}") as tell:
         scan = read_scan(file, **reading)
         made = mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)

@@ -96,7 +96,7 @@ def _read(source: str, kind: type[R], field: str, noun: str) -> R:
     if source == "-":
         return MeshFiles(Path()).whole(decode_request(sys.stdin.buffer.read(), kind))
     path = Path(source)
-    if path.is_file():
+    if path.is_file() or path.is_fifo():
         try:
             return MeshFiles(path.parent).whole(decode_request(_text(path), kind))
         except OSError as error:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
+from click.core import ParameterSource
 
 from hand_models.base import InvalidInputError
 from service.commands.batch import answer_rest, writing_answers
@@ -103,7 +104,15 @@ def sweep(
     """
     from service.answering import robots_of
     from service.bulk import new_manifest
-    from service.sweeping import Design, PointRows, Variation, about, columns_of, plot_sweep
+    from service.sweeping import (
+        Design,
+        PointRows,
+        Variation,
+        about,
+        columns_of,
+        has_borders,
+        plot_sweep,
+    )
     from service.tables import console, print_sweep
 
     if seed is not None and samples is None:
@@ -115,6 +124,9 @@ def sweep(
     except InvalidInputError as error:
         where = "--vary" if error.field is None else f"--vary {error.field}"
         raise InvalidInputError(error.message, field=where) from None
+    given = click.get_current_context().get_parameter_source("tolerance")
+    if given is ParameterSource.COMMANDLINE and not has_borders(design):
+        raise InvalidInputError("is of one number that varies alone", field="--tolerance")
     pair = _pair(over, design)
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)

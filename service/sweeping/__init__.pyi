@@ -8,7 +8,12 @@ from .border import (
 from .design import Design as Design
 from .evaluation import Row as Row, asking as asking
 from .figures import plot_sweep as plot_sweep
-from .result import Sweep as Sweep, sweep as sweep, swept as swept
+from .result import (
+    Sweep as Sweep,
+    has_borders as has_borders,
+    sweep as sweep,
+    swept as swept,
+)
 from .table import (
     PointRows as PointRows,
     Points as Points,

@@ -82,6 +82,7 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: tuple[str, str] | Non
         "\n".join(filter(None, (f"{title}: {holding} of {len(sweep.rows)} points hold",
                                 figure.get_suptitle()))),
         fontsize=11,
+        parse_math=False,
     )  # fmt: skip
     with whole_file(path) as part:
         figure.savefig(part, dpi=120, facecolor="white")

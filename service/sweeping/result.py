@@ -105,12 +105,18 @@ def swept(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Sw
     return Sweep(design, tuple(rows), tuple(_borders(design, rows, ask, tolerance)))
 
 
+def has_borders(design: Design) -> bool:
+    """Whether one number varies, and nothing else."""
+    place, *others = design.varying
+    return not others and design.variations[place].numbers
+
+
 def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Iterator[Border]:
     """Yield the borders over a number that alone varies."""
-    place, *others = design.varying
-    variation, target = design.variations[place], design.targets[place]
-    if others or not variation.numbers:
+    if not has_borders(design):
         return
+    (place,) = design.varying
+    variation, target = design.variations[place], design.targets[place]
     unique: Mapping[Any, Row] = {row.point[place]: row for row in rows}
     ordered = [unique[value] for value in sorted(unique)]
     range_ = float(max(unique)) - float(min(unique))

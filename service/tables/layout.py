@@ -16,7 +16,10 @@ def console(stderr: bool = False) -> Console:
     """Return the console on standard output, or on standard error."""
     from rich.console import Console
 
-    return Console(highlight=False, stderr=stderr)
+    screen = Console(highlight=False, stderr=stderr)
+    if not stderr and screen.width < NARROWEST:
+        screen.width = NARROWEST
+    return screen
 
 
 COLOURS: Final = {
@@ -32,6 +35,9 @@ def in_colour(status: str, word: str | None = None) -> str:
     """Return a status, or a word in its place, as markup in bold and in its colour."""
     return f"[bold {COLOURS.get(status, 'default')}]{word or status}[/]"
 
+
+NARROWEST: Final = 80
+"""Letters of a line for which tables are made; a narrower terminal breaks it itself."""
 
 LONG: Final = 1e4
 """From here on a number is written as a whole one, from a tenth of it on with one decimal."""

@@ -45,8 +45,8 @@ NEARLY: Final = 0.02
 JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
 
-WIDEST: Final = 5
-"""Letters of numbers in the hands' table that fit with two spaces between them, rather than one."""
+UNBOUNDED: Final = 1000
+"""Width in which any table fits [letters]."""
 
 CARRIES: Final[Mapping[str, str]] = {
     "off": "carries nothing",
@@ -101,7 +101,9 @@ def print_plan(
         out.print("of all changes that were tried none would help")
     if reply.hands is not None:
         show(
-            "wrench on the rock, in H [N, N·m], and the palm's part", _hand_table(reply.hands), out
+            "wrench on the rock, in H [N, N·m], and the palm's part",
+            _hand_table(reply.hands, out),
+            out,
         )
         floating = [hand for hand in reply.hands if hand.wrist.twist is not None]
         if floating:
@@ -316,7 +318,7 @@ def _ends_of(ways: Iterable[tuple[float | None, float | None]]) -> Iterator[str]
             yield "-" if end is None else f"{sign * end:z.2f}"
 
 
-def _hand_table(hands: Iterable[Hand]) -> Table:
+def _hand_table(hands: Iterable[Hand], out: Console) -> Table:
     parts = ("hand\nutil", "palm\nshear", "palm\npress")
     table = table_of("hand", numbers=(*AXES, *parts))
     for hand in hands:
@@ -324,9 +326,9 @@ def _hand_table(hands: Iterable[Hand]) -> Table:
         cells = [short(value, 0) for value in hand.wrench[:3]]
         cells += [short(value, 1) for value in hand.wrench[3:]]
         cells += [short(hand.utilisation, 2), short(-shear, 0), short(press, 0)]
-        if max(map(len, cells)) > WIDEST:
-            table.padding = (0, 1, 0, 0)
         table.add_row(hand.limb, *cells)
+    if out.measure(table, options=out.options.update(max_width=UNBOUNDED)).maximum > out.width:
+        table.padding = (0, 1, 0, 0)
     return table
 
 

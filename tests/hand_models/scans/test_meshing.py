@@ -147,7 +147,7 @@ def test_what_is_no_surface_is_refused(points, words, tmp_path):
 @pytest.mark.parametrize("field", ["spacing", "hole"])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan])
 def test_lengths_are_above_zero(field, value, tmp_path):
-    with pytest.raises(InvalidInputError, match=f"^{field}: must be above zero"):
+    with pytest.raises(InvalidInputError, match=f"^{field}: must be finite and above zero"):
         meshed(wall(0.02), tmp_path, {"view": (0, 1, 0)}, **{field: value})
 
 

@@ -217,7 +217,7 @@ def test_a_cell_of_no_size_and_three_columns_are_no_grid(tmp_path):
     np.save(tmp_path / "a.npy", heights())
     np.save(tmp_path / "b.npy", CLOUD)
     np.savez(tmp_path / "c.npz", one=heights(), two=heights())
-    with pytest.raises(InvalidInputError, match=r"^cell: must be above zero"):
+    with pytest.raises(InvalidInputError, match=r"^cell: must be finite and above zero"):
         read_scan(tmp_path / "a.npy", cell=0.0)
     with pytest.raises(InvalidInputError, match="three columns are points"):
         read_scan(tmp_path / "b.npy", cell=0.1)

@@ -334,6 +334,40 @@ def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is
     ]
 
 
+def test_of_many_stages_each_has_its_name_and_what_is_cut_off_is_told_whole():
+    question, plan = answered("plain")
+    stages = [RouteStage(i, i, "lift", "front_right", question) for i in range(60)]
+    plans = [replace(plan, utilisation=123.4, load_factor=None)] * 60
+    route = SimpleNamespace(name="a $1 climb, $2 down", limits=Limits())
+    figure = draw_route(SimpleNamespace(plans=plans, stages=stages, route=route, crux=1))
+    FigureCanvasAgg(figure).draw()
+    upper, lower = figure.axes
+    names = [Text.get_window_extent(each) for each in lower.get_xticklabels() if each.get_text()]
+    assert len(names) == 60
+    assert all(one.x1 <= other.x0 for one, other in pairwise(names))
+    told = [text for text in upper.texts if text.get_text() == "123"]
+    assert len(told) == 60
+    bars = [bar.get_window_extent() for bar in upper.patches[:60]]
+    for text, bar in zip(told, bars, strict=True):
+        box = Text.get_window_extent(text)
+        assert bar.x0 <= box.x0 < box.x1 <= bar.x1
+        assert bar.y0 <= box.y0 < box.y1 <= bar.y1
+
+
+def test_large_numbers_stay_in_their_cells():
+    question, plan = answered("plain")
+    hands = [
+        replace(hand, utilisation=used, tile_utilisations=used + hand.tile_utilisations)
+        for hand, used in zip(plan.hands, (9.9951, 99.951, 901.51, 5e6), strict=True)
+    ]
+    figure = draw_plan(replace(plan, hands=tuple(hands)), question)
+    figure.draw_without_rendering()
+    table = figure.axes[3]
+    assert {"902", "999+"} <= set(words(table))
+    width = table.get_window_extent().width / len(table.get_xticklabels())
+    assert all(text.get_window_extent().width < width for text in table.texts)
+
+
 @pytest.mark.parametrize("name", ["solved", "overloaded"])
 def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
     question, plan = answered(name)

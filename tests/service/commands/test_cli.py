@@ -385,6 +385,58 @@ def test_numbers_however_long_are_told_whole(capsys: pytest.CaptureFixture[str])
     assert told.split() in [row.split() for row in table]
 
 
+def test_names_however_long_leave_numbers_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    reply = dispatch.plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
+    for hand, side in zip(reply.hands, ("left", "right", "upper", "lower"), strict=True):
+        hand.limb = f"{side}_middle_foreleg"
+    first = reply.hands[0]
+    first.wrench = [-234.7, -564.0, 123.4, -12.34, 23.45, 0.04]
+    print_plan(reply, Console(width=80))
+    table = capsys.readouterr().out.partition("wrench on the rock")[2].splitlines()
+    (row,) = (line.split() for line in table if line.split()[:1] == [first.limb] and "-564" in line)
+    assert row[1:7] == ["-235", "-564", "123", "-12.3", "23.4", "0.0"]
+    assert max(len(line) for line in table) <= 80
+
+
+def test_on_a_narrow_terminal_nothing_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    run(["plan", "wall-300"])
+    wide = capfd.readouterr().out.splitlines()[1:]
+    monkeypatch.setenv("COLUMNS", "40")
+    run(["plan", "wall-300"])
+    assert capfd.readouterr().out.splitlines()[1:] == wide
+
+
+@pytest.mark.parametrize("picture", ["somewhere", "plan.docx"])
+def test_a_picture_of_a_plan_that_cannot_be_written_is_refused_before_any_work(
+    picture: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / picture
+    if not file.suffix:
+        file.mkdir()
+    assert run(["plan", "wall-300", "--plot", str(file)]) == BAD_INPUT
+    assert f"{file}: valid endings are .png, .pdf, .svg" in complaint(capfd)
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_stance_may_come_through_a_pipe(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    text = json.dumps(wall_request())
+    writer = subprocess.Popen(
+        [sys.executable, "-c", "import sys; open(sys.argv[1], 'w').write(sys.argv[2])", pipe, text]
+    )
+    try:
+        assert run(["plan", str(pipe), "--json"]) == DONE
+    finally:
+        writer.wait(PATIENCE)
+    assert result(capfd)["status"] == "optimal"
+
+
 def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFixture[str]) -> None:
     request = wall_request(LIGHT) | {"want": []}
     reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
@@ -728,7 +780,7 @@ def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
         == BAD_INPUT
     )
     error = capfd.readouterr().err
-    assert error.startswith("crux: --plot: cannot write ")
+    assert error.startswith("crux: Invalid value for '--plot': ")
     assert len(error.splitlines()) == 1
 
 

@@ -98,6 +98,35 @@ def test_a_plan_is_made_on_scanned_terrain(
 
 
 @pytest.mark.parametrize(
+    ("text", "more", "words"),
+    [
+        ("0 0 0\n1 0 0\n0 1 1\n", ["--cell", "2"], "cell: is of grids of heights, "),
+        ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: numbers up to 1e+200 are no lengths"),
+    ],
+)
+def test_points_have_no_cells_and_are_near(
+    text: str, more: list[str], words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "wall.xyz"
+    file.write_text(text)
+    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), *more]) == BAD_INPUT
+    assert words in complaint(capfd)
+
+
+def test_rock_is_not_written_over_its_scan(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scan, link = tmp_path / "scan.ply", tmp_path / "link.ply"
+    trimesh.creation.box().export(scan)
+    before = scan.read_bytes()
+    link.symlink_to(scan)
+    for output in (scan, link):
+        assert run(["rock", str(scan), "-o", str(output), "--view", "0,0,1"]) == BAD_INPUT
+        assert f"{output} is the scan itself" in complaint(capfd)
+    assert scan.read_bytes() == before
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["none.pcd", "-o", "rock.ply"], "file: no such file: none.pcd"),
@@ -113,7 +142,7 @@ def test_a_plan_is_made_on_scanned_terrain(
             ["none.pcd", "-o", "rock.ply", "--view", "0,1,0", "--viewpoint", "0,0,0"],
             "view: give a view or a viewpoint",
         ),
-        ([str(TERRAIN), "-o", "rock.ply", "--cell", "-1"], "cell: must be above zero"),
+        ([str(TERRAIN), "-o", "rock.ply", "--cell", "-1"], "cell: must be finite and above zero"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(

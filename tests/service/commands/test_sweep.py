@@ -90,6 +90,10 @@ def test_what_is_printed_fits_a_terminal(
         (["--vary", MASS, "--seed", "1"], "--seed: is of samples"),
         (["--vary", MASS, "--samples", "0"], "--samples"),
         (["--vary", MASS, "--tolerance", "nan"], "--tolerance"),
+        (
+            ["--vary", MASS, "--vary", "limits.tendon_tension=40,50", "--tolerance", "0.1"],
+            "--tolerance: is of one number that varies alone",
+        ),
         (["--vary", MASS, "--over", "load.mass,x"], "--over: two different ones of load.mass"),
         ([], "--vary"),
         (["--vary", "hands.*.grasp.closing_tension=1,2"], "no point can be answered: invalid: "),
