@@ -20,19 +20,23 @@ from planner.solving.solution import Solution, solve_at_vertex, solve_effort, so
 __all__ = ["beyond_all_loads", "given_wrench", "look_again", "overload", "unexplained"]
 
 
+SQUEEZED: Final = 1e3
+"""Loads over the body's force beyond which hands do little but squeeze each other."""
+
 BALANCED: Final = 1e-7
 """Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
 
 def beyond_all_loads(prepared: PreparedStance, found: Solution) -> bool:
-    """Whether a plan of fixed wrists balances the body with loads beyond `UNLIMITED`.
+    """Whether a plan of fixed wrists has loads beyond `UNLIMITED`, and far beyond what is needed.
 
     Rows that all but contradict the balance let it be had so, a hair before they do.
     """
     if prepared.floating or found.utilisation <= 1.0:
         return False
     most = max(np.abs(loads).max(initial=0.0) for loads in found.outcome.loads)
-    return bool(most > UNLIMITED * LOAD_UNIT)
+    needed = float(np.linalg.norm(prepared.wrench[:3]))
+    return bool(most > max(UNLIMITED * LOAD_UNIT, SQUEEZED * needed))
 
 
 def look_again(
