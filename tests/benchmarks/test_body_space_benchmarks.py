@@ -1,6 +1,6 @@
 """How long it takes to find what a stance can hold, and one direction of it by another solver.
 
-``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import numpy as np
@@ -10,6 +10,8 @@ from planner.capability import BodySpace
 from planner.question import Load
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import ask, on_wall
+
+pytestmark = pytest.mark.slow
 
 WAY = np.array([0.0, 0.6, 0.8, 0.0, 0.0, 0.0])
 

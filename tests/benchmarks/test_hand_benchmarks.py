@@ -1,6 +1,6 @@
 """How long a hand takes, from its hold to its wrench space and the views of that.
 
-``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import dataclasses
@@ -20,6 +20,8 @@ from planner.prepare import assemble
 from tests.suite.helpers.hands import HAND, ROCK, pinch
 from tests.suite.helpers.rocks import random_axes
 from tests.suite.helpers.stances import SANDPAPER, ask, on_wall
+
+pytestmark = pytest.mark.slow
 
 HOLDS = {
     "pinch on 300 mm": (Cylinder(0.3), math.pi),

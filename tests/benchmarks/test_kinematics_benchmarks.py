@@ -11,6 +11,8 @@ import pytest
 
 from planner.robots import robosimian, solve_limbs
 
+pytestmark = pytest.mark.slow
+
 EARTH = np.array([0.0, 0.0, -9.81])
 
 POSES = 50

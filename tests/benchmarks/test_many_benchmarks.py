@@ -10,6 +10,8 @@ from planner.processes import cores
 from service.processes import Planners
 from tests.benchmarks.measured_stances import request
 
+pytestmark = pytest.mark.slow
+
 MANY = 200
 """New stances of four hands."""
 

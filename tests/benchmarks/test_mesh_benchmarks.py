@@ -1,6 +1,6 @@
 """How long scanned rock takes: to be taken up, cut, and closed on.
 
-``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import math
@@ -20,6 +20,8 @@ from hand_models.hand import Placement, settle_hands
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import fractal_wall
+
+pytestmark = pytest.mark.slow
 
 
 def scan(triangles: int = 200_000, roughness: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:

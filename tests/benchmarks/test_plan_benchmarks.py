@@ -1,6 +1,6 @@
 """How long a plan takes, and its solver against its peers on the same data.
 
-``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 from dataclasses import replace
@@ -19,6 +19,8 @@ from planner.verification import Check
 from service.answering.answers import plan_reply
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import PLACES, ask, on_wall, program_data
+
+pytestmark = pytest.mark.slow
 
 LIMBS = tuple(PLACES)
 HOLDS = {"held": Cylinder(0.3), "overloaded": Cylinder(0.7)}

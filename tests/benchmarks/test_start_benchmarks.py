@@ -1,6 +1,6 @@
 """Processor time of whole commands, from their start: their ratios are what the table tells.
 
-``python -m pytest tests/benchmarks/test_start_benchmarks.py --benchmark-enable -n 0``
+``python -m pytest tests/benchmarks/test_start_benchmarks.py --benchmark-enable -n 0 -m slow``
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import sys
 import pytest
 
 from tests.suite.helpers.checkout import ROOT
+
+pytestmark = pytest.mark.slow
 
 COMMAND = "from service.commands import main; main()"
 

@@ -1,6 +1,6 @@
 """How long set-points for a changing wrench take, what they are made of, and their declaration.
 
-``pytest tests/benchmarks --benchmark-enable`` measures; otherwise each runs once, as a test.
+``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 from itertools import cycle
@@ -20,6 +20,8 @@ from service.requests import SetPointsRequest
 from service.wire import SET_POINTS, STREAM
 from tests.suite.helpers.requests import stream_request
 from tests.suite.helpers.stances import ask, on_wall
+
+pytestmark = pytest.mark.slow
 
 QUESTION = ask(on_wall(), load=Load(mass=80.0, com=(0.0, 0.0, 0.0)))
 """Held with room, so that no cap on the utilisation makes the radius less."""

@@ -18,6 +18,8 @@ from hand_models.compliance import (
 from hand_models.fixed_wrist import wrench_space
 from tests.suite.helpers.hands import HAND, ROCK
 
+pytestmark = pytest.mark.slow
+
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 

@@ -168,7 +168,7 @@ VARIATIONS = (
 
 
 @pytest.mark.parametrize(("variations", "options"), VARIATIONS, ids=str)
-@pytest.mark.parametrize("ending", ["png", "svg"])
+@pytest.mark.parametrize("ending", [pytest.param("png", marks=pytest.mark.slow), "svg"])
 def test_pictures_have_their_axes_with_units(
     variations: list[str], options: dict, ending: str, tmp_path: Path
 ) -> None:
