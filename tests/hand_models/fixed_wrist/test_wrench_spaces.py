@@ -262,7 +262,7 @@ def test_the_odd_hands_are_odd():
     assert any(hand.palm.engaged and hand.nail_rows for hand in hands)
 
 
-last_seeds = pytest.mark.parametrize("last", [8, pytest.param(60, marks=pytest.mark.slow)])
+last_seeds = pytest.mark.parametrize("last", [5, pytest.param(60, marks=pytest.mark.slow)])
 
 
 def drawn_hands(data: st.DataObject, fewest: int, last: int) -> list[SettledHand]:

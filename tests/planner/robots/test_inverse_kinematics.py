@@ -299,7 +299,7 @@ def test_a_hand_in_its_place_but_not_turned_as_asked_is_told_so():
 # --- robots of one's own
 
 
-@pytest.mark.parametrize("kind", ["revolute", "continuous"])
+@pytest.mark.parametrize("kind", ["revolute", pytest.param("continuous", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("joints", [3, 5, 6, 7, 8, (8, 6), (2, 7)])
 def test_limbs_of_other_numbers_of_joints(joints, kind):
     """Poses that the limb has are met, the limits kept; with fewer than six joints as well."""
