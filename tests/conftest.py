@@ -1,5 +1,6 @@
 """Settings of all tests, and what tests of different packages need."""
 
+import gc
 import json
 import os
 import signal
@@ -40,3 +41,9 @@ def stance_file(tmp_path: Path):
         return str(path)
 
     return write
+
+
+def pytest_collection_finish() -> None:
+    """Leave what is loaded by now alone when what is no longer used is looked for."""
+    gc.collect()
+    gc.freeze()
