@@ -21,7 +21,7 @@ from service.commands.options import (
     stance_argument,
     with_extras,
 )
-from service.commands.stances import named_files, read_request
+from service.commands.stances import read_with_files
 from service.requests import Draw, PlanRequest, Want
 from service.tables import (
     EXIT_STATUS,
@@ -93,7 +93,8 @@ def plan(
     extras += ["spread"] if spread or draws else []
     extras += ["clearance"] if clearance else []
     extras += ["advice"] if advice_folder is not None else []
-    request = asked(read_request(stance), hand, robot)
+    request, given = read_with_files(stance)
+    request = asked(request, hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)
     if unexplained:
@@ -119,7 +120,7 @@ def plan(
     written: list[Path] = []
     if advice_folder is not None:
         assert isinstance(answer.reply, PlanReply)  # of a whole request
-        written = _write_advice(request, answer.reply, advice_folder, named_files(stance))
+        written = _write_advice(request, answer.reply, advice_folder, given)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
     elif as_json:

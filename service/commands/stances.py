@@ -17,7 +17,7 @@ import msgspec
 from hand_models.base import InvalidInputError
 from service.requests import PlanRequest, Request, RouteRequest
 
-__all__ = ["bundled", "limbs_of", "named_files", "read_request", "read_route"]
+__all__ = ["bundled", "limbs_of", "read_request", "read_route", "read_with_files"]
 
 LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
 """Of the bundled robot."""
@@ -47,26 +47,20 @@ def read_request(source: str) -> PlanRequest:
     InvalidInputError
         If there is none, or it is not a plan request.
     """
-    return _read(source, PlanRequest, "STANCE", "stance")
+    return read_with_files(source)[0]
 
 
-def named_files(source: str) -> tuple[PlanRequest, MeshFiles] | None:
-    """Return a request as its file has it, with the names of its meshes; None of any other source.
+def read_with_files(source: str) -> tuple[PlanRequest, tuple[PlanRequest, MeshFiles] | None]:
+    """Return what `read_request` does, and it as its file has it, with the files that it names.
 
-    The file is one that `read_request` has read.
+    The latter is None where it is from no file of the caller's.
     """
-    from service.answering import MeshFiles
-    from service.wire import decode_request
-
-    path = Path(source)
-    if source == "-" or not path.is_file():
-        return None
-    return decode_request(_text(path), PlanRequest), MeshFiles(path.parent)
+    return _read(source, PlanRequest, "STANCE", "stance")
 
 
 def read_route(source: str) -> RouteRequest:
     """Return the route that a command was given; as `read_request`."""
-    return _read(source, RouteRequest, "ROUTE", "route")
+    return _read(source, RouteRequest, "ROUTE", "route")[0]
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:
@@ -89,22 +83,26 @@ def _folder(kind: type[Request]) -> Traversable:
     return folder / "routes" if kind is RouteRequest else folder
 
 
-def _read(source: str, kind: type[R], field: str, noun: str) -> R:
+def _read(
+    source: str, kind: type[R], field: str, noun: str
+) -> tuple[R, tuple[R, MeshFiles] | None]:
     from service.answering import MeshFiles
     from service.wire import decode_request
 
     if source == "-":
-        return MeshFiles(Path()).whole(decode_request(sys.stdin.buffer.read(), kind))
+        return MeshFiles(Path()).whole(decode_request(sys.stdin.buffer.read(), kind)), None
     path = Path(source)
     if path.is_file() or path.is_fifo():
+        files = MeshFiles(path.parent)
         try:
-            return MeshFiles(path.parent).whole(decode_request(_text(path), kind))
+            asked = decode_request(_text(path), kind)
+            return files.whole(asked), (asked, files) if path.is_file() else None
         except OSError as error:
             raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
     if source in bundled(kind):
         with resources.as_file(_folder(kind)) as folder:
             given = (folder / f"{source}.json").read_bytes()
-            return MeshFiles(Path(folder)).whole(decode_request(given, kind))
+            return MeshFiles(Path(folder)).whole(decode_request(given, kind)), None
     raise InvalidInputError(
         f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
         field=field,

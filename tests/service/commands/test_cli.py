@@ -225,6 +225,22 @@ def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureF
     assert run(["plan", str(files[0]), "--json"]) in (DONE, OVERLOADED)
 
 
+def test_a_stance_may_be_gone_while_advice_is_sought(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = stance_file(wall_request(HEAVY))
+    planned = answering.planned
+
+    def then_gone(*args: object) -> object:
+        Path(path).unlink()
+        return planned(*args)
+
+    monkeypatch.setattr(answering, "planned", then_gone)
+    assert run(["plan", path, "--advice", str(tmp_path / "advised"), "-q"]) == OVERLOADED
+    assert list((tmp_path / "advised").iterdir())
+    assert capfd.readouterr().err == ""
+
+
 def test_who_asks_for_less_waits_for_no_advice(
     stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
