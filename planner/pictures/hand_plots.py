@@ -125,7 +125,8 @@ def draw_wrench_space(
     if preload is not None:
         held = f"preload of {_listed(preload)} N, wrist floating, at rest"
     upper.suptitle(
-        f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}"
+        f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}",
+        parse_math=False,
     )
     if space is not None:
         vertices = None if outlined else space.vertices()

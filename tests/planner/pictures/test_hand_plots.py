@@ -108,7 +108,7 @@ def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypa
     np.testing.assert_allclose(drawn[:, 0], at_rest.shears[0], atol=1e-9)
     np.testing.assert_allclose(drawn[:, 1], at_rest.normals[0], atol=1e-9)
     titles = []
-    monkeypatch.setattr(SubFigure, "suptitle", lambda _, text: titles.append(text))
+    monkeypatch.setattr(SubFigure, "suptitle", lambda _, text, **how: titles.append(text))
     hand_plots.plot_wrench_space(
         settled, wrist.linearised(), tmp_path / "hand.png", "a hand", wrist.hand.preload
     )
