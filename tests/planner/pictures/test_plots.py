@@ -8,40 +8,30 @@ import re
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import trimesh
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.path import Path as MplPath
-from matplotlib.text import Text
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3D
 
-from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
+from hand_models import Grasp, Plane, Sphere
 from hand_models.base import Pose
-from hand_models.rock import Mesh, Profile
-from hand_models.rock.profile import STRIPS
 from planner import solving
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
 from planner.pictures.plan_scene import DrawnCapsules, scene_of, view_directions
 from planner.pictures.plan_views import BODY, COLOURS, LIMB, capsule_outlines
-from planner.pictures.report import draw_route
-from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
-from planner.route import RouteStage
 from planner.solving import solve
 from service.answering import questions
 from service.commands.cli import run
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
-from tests.suite.helpers.rocks import cylinder_mesh
 from tests.suite.helpers.stances import ask, attainable_wrench, on_wall, wall
 
 found = solve.plan
@@ -292,66 +282,6 @@ def test_where_loads_of_any_sign_give_nothing_the_picture_says_so():
     assert "no loads at all, of any sign" in words(panel)[-1]
     bare = draw_plan(replace(plan, certificate=None), answered("infeasible")[0])
     assert words(bare.axes[3]) == ["no plan, no loads"]
-
-
-@pytest.mark.parametrize(
-    ("used", "crux"), [((0.4, 0.9, 0.3), 1), ((0.4, 1.6), 1), ((5.0, 0.3), 0), ((0.5, None), 1)]
-)
-def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, crux):
-    question, plan = answered("plain")
-    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(len(used))]
-    plans = [replace(plan, utilisation=u, load_factor=None) for u in used]
-    route = SimpleNamespace(name="up", limits=Limits())
-    result = SimpleNamespace(plans=plans, stages=stages, route=route, crux=crux)
-    figure = draw_route(result)
-    FigureCanvasAgg(figure).draw()
-    upper = figure.axes[0]
-    note = next(text for text in upper.texts if text.get_text() == "crux")
-    box = Text.get_window_extent(note)
-    frame, legend = upper.get_window_extent(), upper.get_legend().get_window_extent()
-    assert frame.y0 < box.y0 < box.y1 < frame.y1
-    assert not box.overlaps(legend)
-    assert legend.y0 >= frame.y1
-
-
-def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is_told():
-    question, plan = answered("plain")
-    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(3)]
-    plans = [
-        replace(plan, utilisation=0.5, load_factor=2.0),
-        replace(plan, utilisation=7.5, load_factor=None),
-        replace(plan, utilisation=0.1, load_factor=None, load_factor_unbounded=True),
-    ]
-    route = SimpleNamespace(name="up", limits=Limits())
-    upper, lower = draw_route(SimpleNamespace(plans=plans, stages=stages, route=route, crux=1)).axes
-    assert "7.5" in words(upper)
-    (broken,) = (line for line in upper.lines if line.get_color() == "white")
-    assert (min(broken.get_xdata()), max(broken.get_xdata())) == (0.5, 1.5)
-    assert max(broken.get_ydata()) < upper.patches[1].get_height() < upper.get_ylim()[1]
-    assert [(text.get_text(), text.get_position()[0]) for text in lower.texts] == [
-        ("none", 1),
-        ("unbounded", 2),
-    ]
-
-
-def test_of_many_stages_each_has_its_name_and_what_is_cut_off_is_told_whole():
-    question, plan = answered("plain")
-    stages = [RouteStage(i, i, "lift", "front_right", question) for i in range(60)]
-    plans = [replace(plan, utilisation=123.4, load_factor=None)] * 60
-    route = SimpleNamespace(name="a $1 climb, $2 down", limits=Limits())
-    figure = draw_route(SimpleNamespace(plans=plans, stages=stages, route=route, crux=1))
-    FigureCanvasAgg(figure).draw()
-    upper, lower = figure.axes
-    names = [Text.get_window_extent(each) for each in lower.get_xticklabels() if each.get_text()]
-    assert len(names) == 60
-    assert all(one.x1 <= other.x0 for one, other in pairwise(names))
-    told = [text for text in upper.texts if text.get_text() == "123"]
-    assert len(told) == 60
-    bars = [bar.get_window_extent() for bar in upper.patches[:60]]
-    for text, bar in zip(told, bars, strict=True):
-        box = Text.get_window_extent(text)
-        assert bar.x0 <= box.x0 < box.x1 <= bar.x1
-        assert bar.y0 <= box.y0 < box.y1 <= bar.y1
 
 
 def test_large_numbers_stay_in_their_cells():
@@ -634,110 +564,6 @@ def test_between_two_walls_ahead_is_where_the_belly_looks():
     np.testing.assert_allclose(seen.ahead, -stance.body.rotation[:, 2], atol=1e-12)
     assert not seen.toward
     assert not seen.steep
-
-
-# Rock -------------------------------------------------------------------------------------------
-
-OUTLINES = dict(zip(STRIPS, (0.0, 0.002, 0.001, 0.003), strict=True))
-HOLDS = {
-    "plane": Plane(),
-    "log": Cylinder(0.3),
-    "large log": Cylinder(40.0),
-    "ball": Sphere(0.22),
-    "boulder": Ellipsoid((0.3, 0.2, 0.12)),
-    "edge": Edge(0.05, 1.5),
-    "rounded edge": Edge(3.0, 2.0),
-    "profile": Profile([[-0.3, 0.1], [0.0, 0.0], [0.3, 0.1]]),
-    "strips": Profile(
-        {name: [[-0.3, 0.02 + d], [0.0, d], [0.3, 0.02 + d]] for name, d in OUTLINES.items()}
-    ),
-    "mesh": Mesh(*cylinder_mesh(0.2, 64)),
-}
-
-
-@pytest.mark.parametrize("name", HOLDS)
-def test_rock_is_drawn_where_it_is(name):
-    settled = HAND.settle(HOLDS[name], ROCK, Grasp(math.pi if name == "log" else 0.5))
-    patch = rock_patch(settled)
-    assert 0 < len(patch) < 2 * MOST
-    assert np.abs(patch).max() <= AROUND + 1e-9
-    # in the hold's frame, every triangle has rock on one side, and begins there
-    corners = settled.seating.pose.inverse().apply(patch.reshape(-1, 3)).reshape(-1, 3, 3)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1) / 2.0
-    large = np.flatnonzero(areas > 1e-6)
-    for i in large[:: max(1, len(large) // 60)]:
-        n, centre = normals[i] / (2.0 * areas[i]), corners[i].mean(axis=0)
-        begins = [settled.hold.entry(centre - 0.02 * s * n, s * n) - 0.02 for s in (1.0, -1.0)]
-        assert min(map(abs, begins)) < 2e-3
-    # nothing of the rock under the hand is missing
-    flat = np.diff(patch, axis=1) * [1.0, 1.0, 0.0]
-    seen = np.linalg.norm(np.cross(flat[:, 0], flat[:, 1]), axis=1).sum() / 2.0
-    assert seen > 0.02
-
-
-def test_a_fine_mesh_is_drawn_coarsely():
-    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.15)
-    assert len(ball.faces) > MOST
-    hold = Mesh(ball.vertices + np.array([0.0, 0.0, 0.15]), ball.faces)
-    settled = HAND.settle(hold, ROCK, Grasp())
-    patch = rock_patch(settled)
-    assert 100 < len(patch) < 2 * MOST
-    centre = settled.seating.pose.apply((0.0, 0.0, 0.15))
-    away = np.linalg.norm(patch.reshape(-1, 3) - centre, axis=1)
-    # corners of a grid about points of the ball, and chords between them
-    assert away.max() <= 0.15 + COARSE * math.sqrt(0.75)
-    assert away.min() >= 0.15 - 2.0 * COARSE
-
-
-def test_so_much_rock_is_drawn_that_one_sees_what_it_is():
-    # a log all around and longer than it is thick, a whole boulder, a wall beyond the hand
-    log = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
-    width = np.ptp(rock_patch(log).reshape(-1, 3), axis=0)
-    np.testing.assert_allclose(width, [0.3, 2.0 * AROUND, 0.3], rtol=0.01)
-    assert width[1] > 2.0 * width[0]
-    boulder = HAND.settle(Ellipsoid((0.3, 0.2, 0.12)), ROCK, Grasp(0.5))
-    width = np.ptp(rock_patch(boulder).reshape(-1, 3), axis=0)
-    np.testing.assert_allclose(width, [0.6, 0.4, 0.24], rtol=0.02)
-    wall_patch = rock_patch(HAND.settle(Plane(), ROCK, Grasp()))
-    assert np.ptp(wall_patch.reshape(-1, 3), axis=0)[:2].min() > 4.0 * HAND.palm_length
-
-
-def test_a_flat_wall_is_drawn_to_the_edge_of_the_box():
-    patch = rock_patch(HAND.settle(Plane(), ROCK, Grasp()))
-    area = np.linalg.norm(np.cross(patch[:, 1] - patch[:, 0], patch[:, 2] - patch[:, 0]), axis=1)
-    assert area.sum() / 2.0 == pytest.approx((2.0 * AROUND) ** 2, rel=1e-9)
-
-
-def test_a_scan_that_hands_share_is_drawn_once_and_whole():
-    corners = np.array([(x, y, 0.0) for x in (-1.5, 1.5) for y in (-1.0, 1.0)])
-    scan = Mesh(corners, np.array([(0, 1, 2), (1, 3, 2)]), anywhere=True)
-    stance = on_wall(Plane(), outer_rotation=0.0)
-    places = np.array([hand.pose.position for hand in stance.hands])
-    there = Pose(places.mean(axis=0), stance.hands[0].pose.rotation)
-    hands = tuple(replace(hand, hold=scan, hold_pose=there) for hand in stance.hands)
-    shared = Question(replace(stance, hands=hands))
-    drawn_hands = scene_of(solve.plan(shared), shared).hands
-    first, *others = (hand.rock for hand in drawn_hands)
-    assert all(not len(rock) for rock in others)
-    (low, high), reach = np.sort([first.min(axis=(0, 1)), first.max(axis=(0, 1))], axis=0), 0.4
-    flat = np.ptp(places, axis=0) > 0.1
-    assert (low <= places.min(axis=0) - reach)[flat].all()
-    assert (high >= places.max(axis=0) + reach)[flat].all()
-    sides = np.diff(first, axis=1)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2.0
-    assert area == pytest.approx(np.prod((high - low)[flat]), rel=1e-6)
-    # of a copy each hand has its own
-    apart = [replace(hands[0], hold=Mesh(corners, scan.triangles.faces, anywhere=True)), *hands[1:]]
-    apart = Question(replace(stance, hands=tuple(apart)))
-    rocks = [len(hand.rock) for hand in scene_of(solve.plan(apart), apart).hands]
-    assert [count > 0 for count in rocks] == [True, True, False, False]
-
-
-def test_rock_that_is_far_away_is_not_drawn():
-    away = Pose(np.array([0.0, 0.0, 0.6]), np.eye(3))
-    settled = HAND.settle(Sphere(0.2), ROCK, Grasp(), away)
-    assert rock_patch(settled).shape == (0, 3, 3)
 
 
 # One hand ---------------------------------------------------------------------------------------
