@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,14 +21,12 @@ from service.commands.stances import bundled
 from service.requests import PlanRequest
 from service.tables import print_plan
 from service.wire import decode_request
-from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import (
     BAD_INPUT,
     DONE,
     FAILED,
     OVERLOADED,
     complaint,
-    process,
     result,
 )
 from tests.suite.helpers.patience import PATIENCE
@@ -42,7 +39,6 @@ from tests.suite.helpers.requests import (
     wall_request,
 )
 from tests.suite.helpers.rocks import cylinder_mesh
-from tests.suite.helpers.served import Served, free_endpoint
 
 # plan ---------------------------------------------------------------------------------------------
 
@@ -183,77 +179,6 @@ def test_a_file_of_draws_that_cannot_be_is_refused_in_one_line(
     assert told in said
 
 
-@pytest.mark.parametrize(
-    ("stance", "what"),
-    [
-        ("wall-300", "would be better"),
-        pytest.param("boulders", "would hold", marks=pytest.mark.slow),
-    ],
-)
-def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
-    stance: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    run(["plan", stance, "--advice", str(tmp_path / "advised")])
-    lines = capfd.readouterr().out.splitlines()
-    files = sorted((tmp_path / "advised").iterdir(), key=lambda file: (len(file.name), file.name))
-    assert len([line for line in lines if line.startswith("would ")]) == 3
-    # the last lines tell what is in which file
-    for line, file in zip(lines[-len(files) :], files, strict=True):
-        assert run(["plan", str(file), "--json"]) == DONE
-        used = f"{result(capfd)['utilisation']:.2f}"
-        assert line.startswith(f"{file}: {what}, utilisation {used}: ")
-
-
-def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
-    folder = tmp_path / "stances"
-    folder.mkdir()
-    vertices, faces = cylinder_mesh(0.3)
-    trimesh.Trimesh(vertices, faces, process=False).export(folder / "log.ply")
-    request = wall_request(HEAVY)
-    hand = request["stance"]["hands"][0]
-    hand["hold"] = {"shape": "mesh", "file": "log.ply"}
-    (folder / "stance.json").write_text(json.dumps(request))
-    run(["plan", str(folder / "stance.json"), "--advice", str(tmp_path / "advised"), "-q"])
-    capfd.readouterr()
-    files = list((tmp_path / "advised").iterdir())
-    assert files
-    for file in files:
-        holds = [each["hold"] for each in json.loads(file.read_text())["stance"]["hands"]]
-        meshes = [hold for hold in holds if hold["shape"] == "mesh"]
-        assert all("vertices" not in hold for hold in meshes)
-        assert all((file.parent / hold["file"]).samefile(folder / "log.ply") for hold in meshes)
-    assert run(["plan", str(files[0]), "--json"]) in (DONE, OVERLOADED)
-
-
-def test_a_stance_may_be_gone_while_advice_is_sought(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = stance_file(wall_request(HEAVY))
-    planned = answering.planned
-
-    def then_gone(*args: object) -> object:
-        Path(path).unlink()
-        return planned(*args)
-
-    monkeypatch.setattr(answering, "planned", then_gone)
-    assert run(["plan", path, "--advice", str(tmp_path / "advised"), "-q"]) == OVERLOADED
-    assert list((tmp_path / "advised").iterdir())
-    assert capfd.readouterr().err == ""
-
-
-def test_who_asks_for_less_waits_for_no_advice(
-    stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[object] = []
-    monkeypatch.setattr(answering, "with_advice", lambda answer: asked.append(answer) or answer)
-    path = stance_file(wall_request(HEAVY))
-    assert run(["plan", path, "-q"]) == OVERLOADED
-    assert not asked
-    assert run(["plan", path]) == OVERLOADED
-    assert len(asked) == 1
-    capfd.readouterr()
-
-
 def test_a_folder_that_is_named_as_a_table_is_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -270,38 +195,6 @@ def test_a_mark_that_editors_put_before_a_text_is_no_part_of_it(
     path.write_text(json.dumps(wall_request()), encoding="utf-8-sig")
     assert run(["plan", str(path), "--json"]) == DONE
     assert result(capfd)["status"] == "optimal"
-
-
-def test_nothing_is_said_of_changes_that_nobody_asked_for(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    assert run(["plan", "wall-300"]) == DONE
-    assert "changes" not in capfd.readouterr().out
-
-
-def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    folder, path = tmp_path / "advice", stance_file(wall_request(HEAVY))
-    folder.mkdir()
-    for name in ("advice-1.json", "advice-99.json", "advice-mine.json"):
-        (folder / name).write_text("{}")
-    assert run(["plan", path, "--advice", str(folder), "--json"]) == OVERLOADED
-    told = result(capfd)["advice"]
-    names = {f"advice-{i + 1}.json" for i in range(len(told))}
-    assert {file.name for file in folder.iterdir()} == names | {"advice-mine.json"}
-    assert told
-    run(["plan", str(folder / "advice-1.json"), "--json"])
-    assert result(capfd)["utilisation"] == pytest.approx(told[0]["utilisation"], abs=1e-6)
-
-
-def test_advice_that_a_brief_reply_does_not_tell_cannot_be_written(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    path, folder = stance_file(wall_request(HEAVY) | {"detail": "set_points"}), tmp_path / "advice"
-    assert run(["plan", path, "--advice", str(folder), "--json"]) == BAD_INPUT
-    assert "detail: --advice needs the full reply" in complaint(capfd)
-    assert not folder.exists()
 
 
 def test_what_is_asked_for_is_added_to_what_the_file_wants(
@@ -614,131 +507,7 @@ def test_a_picture_that_cannot_be(
     assert picture in complaint(capfd)
 
 
-# serve and query ----------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def served() -> Iterator[Served]:
-    server = Served(free_endpoint(), "--workers", "1")
-    yield server
-    server.process.terminate()
-    server.process.communicate()
-
-
-def flags_to(endpoint: str) -> list[str]:
-    flags = ["-m", "client", "-e", endpoint, "--no-multicast-scouting"]
-    return [*flags, "--timeout", str(PATIENCE)]
-
-
-def test_query_and_serve(served: Served, stance_file) -> None:
-    flags = flags_to(served.endpoint)
-    asked = process("query", stance_file(wall_request()), *flags, "--json")
-    assert (asked.returncode, asked.stderr) == (DONE, b"")
-    reply = json.loads(asked.stdout)
-    assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
-    assert reply["prices"]
-
-
-def test_a_query_from_standard_input(
-    served: Served, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    heavy = io.BytesIO(json.dumps(wall_request(HEAVY)).encode())
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=heavy))
-    assert run(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
-    out, err = capfd.readouterr()
-    assert err == ""
-    assert out.startswith("OVERLOADED")
-
-
-def test_what_the_service_refuses_is_bad_input(
-    served: Served, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
-    twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
-    flags = flags_to(served.endpoint)
-    assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
-    assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
-
-
-def no_session(capfd: pytest.CaptureFixture[str]) -> bool:
-    """Whether that is what was said at last, and only on standard error."""
-    out, err = capfd.readouterr()
-    return out == "" and err.splitlines()[-1].startswith("crux: no zenoh session: ")
-
-
-def test_an_endpoint_that_is_taken_is_not_served(
-    served: Served, capfd: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"]) == FAILED
-    assert no_session(capfd)
-
-
-def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
-    flags = flags_to(free_endpoint())
-    assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
-    assert no_session(capfd)
-
-
-def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
-    arguments = [
-        "query",
-        stance_file(wall_request()),
-        "--no-multicast-scouting",
-        "-l",
-        free_endpoint(),
-    ]
-    asked = subprocess.run(
-        [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
-        capture_output=True,
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert (asked.returncode, asked.stdout) == (FAILED, b"")
-    assert b"DEBUG" in asked.stderr
-    assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
-
-
-VALID = "valid is such as tcp/127.0.0.1:7447"
-
-
-@pytest.mark.parametrize(
-    ("flags", "line"),
-    [
-        (["--cfg", "colour:1"], "crux: --cfg: colour: unknown key; got '1'"),
-        (["--cfg", "mode:["], "crux: --cfg: mode: JSON5, line 1, column 2: expected array,"),
-        (["--cfg", "mode:5"], "crux: --cfg: mode: invalid type: integer `5`, expected either"),
-        (["--cfg", "mode"], "crux: --cfg: KEY:VALUE is needed, such as mode:'client', got 'mode'"),
-        (["-c", "/nowhere.json5"], "crux: --config: /nowhere.json5: No such file or directory"),
-        (["-c", "/"], "crux: --config: /: Is a directory"),
-        (["-l", "foo"], f"crux: --listen: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-e", "foo"], f"crux: --connect: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is no endpoint (no port); {VALID}"),
-        (["-e", "tcp/[::1]:y"], "crux: --connect: 'tcp/[::1]:y' is no endpoint ('y' is no port); "),
-        (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
-        *(
-            (["--timeout", value], f"crux: Invalid value for '--timeout': {value} is not in the")
-            for value in ("0.0", "-1.0", "nan", "inf")
-        ),
-    ],
-)
-def test_bad_flags(
-    flags: list[str], line: str, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
-    assert complaint(capfd).startswith(line)
-
-
 # The rest -----------------------------------------------------------------------------------------
-
-
-def test_demo(tmp_path: Path) -> None:
-    picture = tmp_path / "demo.png"
-    shown = process("demo", "-o", str(picture), "--json")
-    assert shown.stderr == b""
-    assert shown.returncode in (DONE, OVERLOADED)
-    assert json.loads(shown.stdout)["verified"] is True
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_schema(capfd: pytest.CaptureFixture[str]) -> None:

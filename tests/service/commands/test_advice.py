@@ -1,0 +1,127 @@
+"""``crux plan --advice``: what is told, what is written, and when it is looked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from service import answering
+from service.commands.cli import run
+from tests.suite.helpers.commands import (
+    BAD_INPUT,
+    DONE,
+    OVERLOADED,
+    complaint,
+    result,
+)
+from tests.suite.helpers.requests import (
+    HEAVY,
+    wall_request,
+)
+from tests.suite.helpers.rocks import cylinder_mesh
+
+
+@pytest.mark.parametrize(
+    ("stance", "what"),
+    [
+        ("wall-300", "would be better"),
+        pytest.param("boulders", "would hold", marks=pytest.mark.slow),
+    ],
+)
+def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
+    stance: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run(["plan", stance, "--advice", str(tmp_path / "advised")])
+    lines = capfd.readouterr().out.splitlines()
+    files = sorted((tmp_path / "advised").iterdir(), key=lambda file: (len(file.name), file.name))
+    assert len([line for line in lines if line.startswith("would ")]) == 3
+    # the last lines tell what is in which file
+    for line, file in zip(lines[-len(files) :], files, strict=True):
+        assert run(["plan", str(file), "--json"]) == DONE
+        used = f"{result(capfd)['utilisation']:.2f}"
+        assert line.startswith(f"{file}: {what}, utilisation {used}: ")
+
+
+def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    folder = tmp_path / "stances"
+    folder.mkdir()
+    vertices, faces = cylinder_mesh(0.3)
+    trimesh.Trimesh(vertices, faces, process=False).export(folder / "log.ply")
+    request = wall_request(HEAVY)
+    hand = request["stance"]["hands"][0]
+    hand["hold"] = {"shape": "mesh", "file": "log.ply"}
+    (folder / "stance.json").write_text(json.dumps(request))
+    run(["plan", str(folder / "stance.json"), "--advice", str(tmp_path / "advised"), "-q"])
+    capfd.readouterr()
+    files = list((tmp_path / "advised").iterdir())
+    assert files
+    for file in files:
+        holds = [each["hold"] for each in json.loads(file.read_text())["stance"]["hands"]]
+        meshes = [hold for hold in holds if hold["shape"] == "mesh"]
+        assert all("vertices" not in hold for hold in meshes)
+        assert all((file.parent / hold["file"]).samefile(folder / "log.ply") for hold in meshes)
+    assert run(["plan", str(files[0]), "--json"]) in (DONE, OVERLOADED)
+
+
+def test_a_stance_may_be_gone_while_advice_is_sought(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = stance_file(wall_request(HEAVY))
+    planned = answering.planned
+
+    def then_gone(*args: object) -> object:
+        Path(path).unlink()
+        return planned(*args)
+
+    monkeypatch.setattr(answering, "planned", then_gone)
+    assert run(["plan", path, "--advice", str(tmp_path / "advised"), "-q"]) == OVERLOADED
+    assert list((tmp_path / "advised").iterdir())
+    assert capfd.readouterr().err == ""
+
+
+def test_who_asks_for_less_waits_for_no_advice(
+    stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(answering, "with_advice", lambda answer: asked.append(answer) or answer)
+    path = stance_file(wall_request(HEAVY))
+    assert run(["plan", path, "-q"]) == OVERLOADED
+    assert not asked
+    assert run(["plan", path]) == OVERLOADED
+    assert len(asked) == 1
+    capfd.readouterr()
+
+
+def test_nothing_is_said_of_changes_that_nobody_asked_for(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["plan", "wall-300"]) == DONE
+    assert "changes" not in capfd.readouterr().out
+
+
+def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder, path = tmp_path / "advice", stance_file(wall_request(HEAVY))
+    folder.mkdir()
+    for name in ("advice-1.json", "advice-99.json", "advice-mine.json"):
+        (folder / name).write_text("{}")
+    assert run(["plan", path, "--advice", str(folder), "--json"]) == OVERLOADED
+    told = result(capfd)["advice"]
+    names = {f"advice-{i + 1}.json" for i in range(len(told))}
+    assert {file.name for file in folder.iterdir()} == names | {"advice-mine.json"}
+    assert told
+    run(["plan", str(folder / "advice-1.json"), "--json"])
+    assert result(capfd)["utilisation"] == pytest.approx(told[0]["utilisation"], abs=1e-6)
+
+
+def test_advice_that_a_brief_reply_does_not_tell_cannot_be_written(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, folder = stance_file(wall_request(HEAVY) | {"detail": "set_points"}), tmp_path / "advice"
+    assert run(["plan", path, "--advice", str(folder), "--json"]) == BAD_INPUT
+    assert "detail: --advice needs the full reply" in complaint(capfd)
+    assert not folder.exists()

@@ -1,0 +1,153 @@
+"""``crux serve``, ``query`` and ``demo``: real sessions, and what cannot be had is a line."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from service.commands.cli import run
+from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.commands import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    OVERLOADED,
+    complaint,
+    process,
+)
+from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.requests import (
+    HEAVY,
+    put,
+    wall_request,
+)
+from tests.suite.helpers.served import Served, free_endpoint
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    server = Served(free_endpoint(), "--workers", "1")
+    yield server
+    server.process.terminate()
+    server.process.communicate()
+
+
+def flags_to(endpoint: str) -> list[str]:
+    flags = ["-m", "client", "-e", endpoint, "--no-multicast-scouting"]
+    return [*flags, "--timeout", str(PATIENCE)]
+
+
+def test_query_and_serve(served: Served, stance_file) -> None:
+    flags = flags_to(served.endpoint)
+    asked = process("query", stance_file(wall_request()), *flags, "--json")
+    assert (asked.returncode, asked.stderr) == (DONE, b"")
+    reply = json.loads(asked.stdout)
+    assert (reply["status"], reply["load_factor"] > 1.0) == ("optimal", True)
+    assert reply["prices"]
+
+
+def test_a_query_from_standard_input(
+    served: Served, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heavy = io.BytesIO(json.dumps(wall_request(HEAVY)).encode())
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=heavy))
+    assert run(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert out.startswith("OVERLOADED")
+
+
+def test_what_the_service_refuses_is_bad_input(
+    served: Served, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
+    flags = flags_to(served.endpoint)
+    assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
+
+
+def no_session(capfd: pytest.CaptureFixture[str]) -> bool:
+    """Whether that is what was said at last, and only on standard error."""
+    out, err = capfd.readouterr()
+    return out == "" and err.splitlines()[-1].startswith("crux: no zenoh session: ")
+
+
+def test_an_endpoint_that_is_taken_is_not_served(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"]) == FAILED
+    assert no_session(capfd)
+
+
+def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+    flags = flags_to(free_endpoint())
+    assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
+    assert no_session(capfd)
+
+
+def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
+    arguments = [
+        "query",
+        stance_file(wall_request()),
+        "--no-multicast-scouting",
+        "-l",
+        free_endpoint(),
+    ]
+    asked = subprocess.run(
+        [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
+        capture_output=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (asked.returncode, asked.stdout) == (FAILED, b"")
+    assert b"DEBUG" in asked.stderr
+    assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
+
+
+VALID = "valid is such as tcp/127.0.0.1:7447"
+
+
+@pytest.mark.parametrize(
+    ("flags", "line"),
+    [
+        (["--cfg", "colour:1"], "crux: --cfg: colour: unknown key; got '1'"),
+        (["--cfg", "mode:["], "crux: --cfg: mode: JSON5, line 1, column 2: expected array,"),
+        (["--cfg", "mode:5"], "crux: --cfg: mode: invalid type: integer `5`, expected either"),
+        (["--cfg", "mode"], "crux: --cfg: KEY:VALUE is needed, such as mode:'client', got 'mode'"),
+        (["-c", "/nowhere.json5"], "crux: --config: /nowhere.json5: No such file or directory"),
+        (["-c", "/"], "crux: --config: /: Is a directory"),
+        (["-l", "foo"], f"crux: --listen: 'foo' is no endpoint (no protocol/address); {VALID}"),
+        (["-e", "foo"], f"crux: --connect: 'foo' is no endpoint (no protocol/address); {VALID}"),
+        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is no endpoint (no port); {VALID}"),
+        (["-e", "tcp/[::1]:y"], "crux: --connect: 'tcp/[::1]:y' is no endpoint ('y' is no port); "),
+        (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
+        *(
+            (["--timeout", value], f"crux: Invalid value for '--timeout': {value} is not in the")
+            for value in ("0.0", "-1.0", "nan", "inf")
+        ),
+    ],
+)
+def test_bad_flags(
+    flags: list[str], line: str, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
+    assert complaint(capfd).startswith(line)
+
+
+def test_demo(tmp_path: Path) -> None:
+    picture = tmp_path / "demo.png"
+    shown = process("demo", "-o", str(picture), "--json")
+    assert shown.stderr == b""
+    assert shown.returncode in (DONE, OVERLOADED)
+    assert json.loads(shown.stdout)["verified"] is True
+    assert picture.read_bytes().startswith(b"\x89PNG")
