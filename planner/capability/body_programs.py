@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -96,8 +96,9 @@ class BodyPrograms:
             for limb, space in zip(limbs, self._spaces, strict=True)
         ]
         for limb, joints in ({} if where is None else where.idle(question.stance)).items():
-            own = joints.names
-            self._names[0] += [joint_name(limb, name) for name in (*own, *own)]
+            driven = joints.driven
+            names = map(partial(joint_name, limb), driven.names, driven.sliding.tolist())
+            self._names[0] += [*names] * 2
 
     @property
     def cap(self) -> float:
@@ -232,7 +233,8 @@ def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
 def _with_idle(data: StanceData, question: Question, where: Posture | None) -> StanceData:
     """Return the hands; with the first, rows of limbs without one."""
     first, idle = data.hands[0], []
-    for joints in () if where is None else where.idle(question.stance).values():
+    for loads in () if where is None else where.idle(question.stance).values():
+        joints = loads.driven
         idle += [joints.gravity / joints.limits, -joints.gravity / joints.limits]
     l0 = np.concatenate([first.l0, *idle])
     L = np.pad(first.L, ((0, len(l0) - len(first.l0)), (0, 0)))

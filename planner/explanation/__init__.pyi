@@ -26,6 +26,7 @@ from .sentences import (
     NO_FACTOR as NO_FACTOR,
     UNPROVEN as UNPROVEN,
     constraint_words as constraint_words,
+    joint_sentences as joint_sentences,
     limit_sentence as limit_sentence,
     off_sentences as off_sentences,
     overload_sentence as overload_sentence,

@@ -13,7 +13,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import KEPT_NAMES
-from planner.programs import JOINT_TORQUE, SLACK
+from planner.programs import JOINT_FORCE, JOINT_TORQUE, SLACK
 from planner.result import LimitName, Price
 
 __all__ = [
@@ -48,9 +48,9 @@ def limit_name(limb: str, row: Row) -> LimitName:
     return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
 
 
-def joint_name(limb: str, joint: str) -> LimitName:
-    """Return the name of what a limb's joint bears."""
-    return LimitName(limb, None, None, JOINT_TORQUE, joint)
+def joint_name(limb: str, joint: str, slides: bool) -> LimitName:
+    """Return the name of what a limb's joint bears; ``slides``: whether it is no turning one."""
+    return LimitName(limb, None, None, JOINT_FORCE if slides else JOINT_TORQUE, joint)
 
 
 class LimitUse(NamedTuple):

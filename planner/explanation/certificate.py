@@ -28,8 +28,8 @@ from planner.explanation.irreducible_infeasible_set import (
     irreducible_set,
     sufficient_alone,
 )
-from planner.prepare import FORCE_CAP, TENSION_CHANGE
-from planner.programs import JOINT_TORQUE, WRENCH_UNIT, Outcome, StanceData
+from planner.prepare import FORCE_CAP, PASSIVE_JOINT, TENSION_CHANGE
+from planner.programs import JOINT_FORCE, JOINT_TORQUE, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Limits
 from planner.result import Certificate, LimitName
 
@@ -220,7 +220,7 @@ def _is_own(name: LimitName, limits: Limits) -> bool:
     """Whether the caller has set a limit."""
     if name.limit == TENDON_TENSION:
         return limits.tendon_tension is not None
-    if name.limit == JOINT_TORQUE:
+    if name.limit in (JOINT_TORQUE, JOINT_FORCE, PASSIVE_JOINT):
         own = limits.joint_torque
         return name.limb in own if isinstance(own, Mapping) else own is not None
     return name.limit in (FORCE_CAP, HELD_WRENCH, TENSION_CHANGE)

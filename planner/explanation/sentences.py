@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,9 +13,9 @@ from hand_models.fixed_wrist import HAND_LOAD
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from planner.explanation.active_limits import LimitUse
 from planner.explanation.infeasibility import HELD_WRENCH
-from planner.prepare import FORCE_CAP, TENSION_CHANGE, HandBatch, Posture
-from planner.programs import JOINT_TORQUE, WRENCH_UNIT
-from planner.question import Stance
+from planner.prepare import FORCE_CAP, PASSIVE_JOINT, TENSION_CHANGE, HandBatch, Posture
+from planner.programs import JOINT_FORCE, JOINT_TORQUE, WRENCH_UNIT
+from planner.question import Question, Stance
 from planner.result import Certificate, HandPlan, LimitName
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "UNPROVEN",
     "blocking_sentence",
     "constraint_words",
+    "joint_sentences",
     "limit_sentence",
     "off_sentences",
     "overload_sentence",
@@ -33,6 +34,10 @@ __all__ = [
 
 NOTABLE: Final = 0.3
 """Components of what is missing are told from this part of the largest on."""
+
+SWINGS: Final = 1e-3
+"""Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
+the rounding of angles."""
 
 FOREMOST: Final = 2
 """So many of the constraints that leave no loads are told; the rest are counted."""
@@ -63,6 +68,7 @@ WHOLES: Final = {
     FORCE_CAP: "the hand",
     HELD_WRENCH: "the hand",
     JOINT_TORQUE: "its joints",
+    JOINT_FORCE: "its joints",
     "wrist_range": "the wrist",
 }
 """What of a hand or its limb a limit is about; its palm by default."""
@@ -78,6 +84,7 @@ VERBS: Final = {
     HAND_LOAD: ("holds", "hold"),
     FORCE_CAP: ("exerts", "exert"),
     JOINT_TORQUE: ("bears", "bear"),
+    JOINT_FORCE: ("bears", "bear"),
 }
 """What is done to a limit: it does, it would do; `CARRIES` by default."""
 
@@ -96,6 +103,7 @@ BARRIERS: Final = {
     "wrist_range": "goes no farther",
     FORCE_CAP: "may exert no more that way",
     TENSION_CHANGE: "may not change that much",
+    PASSIVE_JOINT: "has no motor and bears no torque",
     HELD_WRENCH: "must exert the wrench that it is given",
 }
 """What a hard row or a cap forbids, or a given wrench demands."""
@@ -329,6 +337,32 @@ def off_sentences(where: Posture | None) -> tuple[str, ...]:
         f"{way:.2g} m away and turn it by {turned:.2g} rad"
         for limb, (way, turned) in off.items()
     )
+
+
+def joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
+    """Return what is taken from the URDF for want of a rating, and which limbs would swing."""
+    if where is None:
+        return ()
+    found, robot, own = [], question.stance.robot, question.limits.joint_torque
+    given = robot.limbs if own is not None and not isinstance(own, Mapping) else own or ()
+    taken = [limb for limb in robot.limbs if not robot.chains[limb].rated and limb not in given]
+    if taken:
+        efforts = np.concatenate([robot.chains[limb].torque_limits for limb in taken])
+        least, most = float(efforts.min()), float(efforts.max())
+        range_ = f"{least:g}" if least == most else f"{least:g} to {most:g}"
+        found.append(
+            f"{', '.join(taken)}: what the joints bear is the effort of the robot's URDF, {range_} "
+            "N·m; torque_limit in the robot's file, or limits.joint_torque, takes its place"
+        )
+    for limb, loads in where.idle(question.stance).items():
+        passive = loads.passive
+        for name, torque in zip(passive.names, passive.gravity.tolist(), strict=True):
+            if abs(torque) > SWINGS:
+                found.append(
+                    f"{limb}: joint {name} has no motor and does not stay where it is, its limb's "
+                    f"weight turns it with {abs(torque):.2g} N·m"
+                )
+    return tuple(found)
 
 
 def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:

@@ -268,13 +268,13 @@ def _hand(hand: HandOnHold, settled: SettledHand, rock: Array, plan: HandPlan | 
 def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
     if plan.joints is None:
         return ()
-    stance, torque, limits = question.stance, plan.joint_torque, plan.joint_torque_limit
+    stance, shares = question.stance, plan.joint_shares
     robot = stance.robot
     return tuple(
         DrawnLimb(
             limb,
             stance.body.apply(robot.link_chain(plan.joints, limb)),
-            None if torque is None or limits is None else np.abs(torque[limb]) / limits[limb],
+            None if shares is None else robot.chains[limb].coupling @ shares[limb],
         )
         for limb in stance.robot.limbs
     )

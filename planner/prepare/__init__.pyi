@@ -40,5 +40,6 @@ from .settled_stance import (
 from .stance_constraints import (
     BALL as BALL,
     FORCE_CAP as FORCE_CAP,
+    PASSIVE_JOINT as PASSIVE_JOINT,
     TENSION_CHANGE as TENSION_CHANGE,
 )

@@ -1,8 +1,9 @@
 """Where the joints of a stance are, what they bear without hands, and what the robot weighs there.
 
 Angles are given, or found by inverse kinematics from the hands' poses; hands may be a little off
-these. Limbs without a hand or an angle are at their zero. Torques and the weight are those of one
-Newton–Euler pass over the whole robot, its body accelerated and its joints at rest.
+these. Limbs without a hand or an angle are at zero, or the limit nearest to it. Torques and the
+weight are those of one Newton–Euler pass over the whole robot, its body accelerated and its joints
+at rest.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Final
 import numpy as np
 import scipy
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, Pose, within
 from planner.prepare.stance_constraints import JointLoads
 from planner.question import Question, Stance
 from planner.robots import UnreachableError, solve_limbs
@@ -29,9 +30,6 @@ TURNED: Final = 0.05
 
 EXACT: Final = 5e-6
 """Up to so far [m], and so much turned [rad], joints that were found put a hand at its pose."""
-
-BEYOND: Final = 1e-6
-"""How far a given angle may be beyond its joint's limit [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +87,11 @@ def posture(question: Question) -> Posture | None:
 
 
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
-    """Return what the joints bear at these angles; limbs left out are at zero."""
+    """Return what the joints bear at these angles; limbs left out are at rest."""
     robot = question.stance.robot
     gravity, acceleration = gravity_and_acceleration(question)
     whole = {
-        limb: np.asarray(angles.get(limb, np.zeros(len(chain.joints))), dtype=float)
+        limb: np.asarray(angles.get(limb, chain.rest), dtype=float)
         for limb, chain in robot.chains.items()
     }
     statics = robot.statics(whole, gravity, acceleration)
@@ -104,6 +102,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
         joints={
             limb: JointLoads(
                 robot.chains[limb].joints,
+                robot.chains[limb].sliding,
                 statics.joint_torque[limb],
                 jacobians[limb],
                 limits[limb],
@@ -145,15 +144,8 @@ def _given(
     stance: Stance, joints: Mapping[str, Array], poses: Mapping[str, Pose]
 ) -> Mapping[str, Array]:
     """Return given angles, which must be possible and where the hands' poses are."""
-    for limb, angles in joints.items():
-        chain = stance.robot.chains[limb]
-        ends = zip(angles, chain.lower, chain.upper, strict=True)
-        for i, (angle, least, most) in enumerate(ends):
-            if not least - BEYOND <= angle <= most + BEYOND:
-                raise InvalidInputError(
-                    f"{chain.joints[i]} goes from {least:.6g} to {most:.6g} rad, got {angle:.6g}",
-                    field=f"stance.joints.{limb}[{i}]",
-                )
+    with within("stance.joints"):
+        stance.robot.checked_angles(joints)
     for limb in poses:
         if limb not in joints:
             raise InvalidInputError(

@@ -3,7 +3,8 @@
 All are rows of the hand's `WrenchSpace { o + V y }`, so programs, prices and proofs treat them like
 any other:
 
-- a joint bears ``|τ_g + Jᵀ (o + V y)| ≤ u τ_max``, τ_g from gravity and acceleration, J of H;
+- a joint bears ``|τ_g + Jᵀ (o + V y)| ≤ u τ_max``, τ_g from gravity and acceleration, J of H; of
+  one without a motor it is zero (hard);
 - a hand's force on the rock, in a named frame, is at most u times a cap;
 - a tendon's tension changes by no more than so much from what it is now (hard).
 """
@@ -17,19 +18,30 @@ from itertools import compress
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS, HELD
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.programs import JOINT_TORQUE
+from planner.programs import JOINT_FORCE, JOINT_TORQUE
 
-__all__ = ["FORCE_CAP", "NOTHING", "TENSION_CHANGE", "JointLoads", "StanceConstraints"]
+__all__ = [
+    "FORCE_CAP",
+    "NOTHING",
+    "PASSIVE_JOINT",
+    "TENSION_CHANGE",
+    "JointLoads",
+    "StanceConstraints",
+]
 
 FORCE_CAP: Final = "force_cap"
 """Name of the limit rows of a cap on a hand's force."""
 
 TENSION_CHANGE: Final = "tension_change"
 """Name of the hard rows that keep tensions near the present ones."""
+
+PASSIVE_JOINT: Final = "passive_joint"
+"""Name of the hard rows of a joint without a motor."""
 
 KEPT: Final = 256
 """Lists of names that are kept."""
@@ -54,21 +66,46 @@ CHANGE_ROWS: Final = tuple(
 class JointLoads(NamedTuple):
     """What a limb's joints bear: ``gravity + Jᵀ w`` for the hand's wrench w on the rock, in H.
 
+    Torques [N·m] are forces [N] of joints that slide.
+
     Attributes
     ----------
     names : tuple of str, length n
+    sliding : ndarray of bool, shape (n,)
     gravity : ndarray, shape (n,)
         Torque at no wrench, from gravity and the body's acceleration [N·m].
     jacobian : ndarray, shape (6, n)
         Of H, in H.
     limits : ndarray, shape (n,)
-        [N·m]
+        [N·m]; zero of a joint without a motor.
     """
 
     names: tuple[str, ...]
+    sliding: NDArray[np.bool_]
     gravity: Array
     jacobian: Array
     limits: Array
+
+    def of(self, which: NDArray[np.bool_]) -> JointLoads:
+        """Return some of the joints."""
+        names = tuple(compress(self.names, which.tolist()))
+        return JointLoads(
+            names,
+            self.sliding[which],
+            self.gravity[which],
+            self.jacobian[:, which],
+            self.limits[which],
+        )
+
+    @property
+    def driven(self) -> JointLoads:
+        """Those with a motor."""
+        return self.of(self.limits > 0.0)
+
+    @property
+    def passive(self) -> JointLoads:
+        """Those without one."""
+        return self.of(self.limits == 0.0)
 
     def torques(self, wrench: Array) -> Array:
         """Return the joints' torques for a hand's wrench on the rock, shape (n,) [N·m]."""
@@ -110,11 +147,15 @@ class StanceConstraints:
         D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
         H, h = [space.H], [space.h]
         if self.joints is not None:
-            names, gravity, jacobian, most = self.joints
-            limits += _joint_names(names)
-            D += [jacobian.T, -jacobian.T]
-            d0 += [gravity, -gravity]
-            s += [most, most]
+            joints, passive = self.joints.driven, self.joints.passive
+            limits += _joint_names(joints.names, tuple(joints.sliding.tolist()))
+            D += [joints.jacobian.T, -joints.jacobian.T]
+            d0 += [joints.gravity, -joints.gravity]
+            s += [joints.limits, joints.limits]
+            hard += _passive_names(passive.names)
+            C, c0 = passive.jacobian.T @ space.generators, passive.torques(space.origin)
+            H += [C, -C]
+            h += [-c0, c0]
         if self.cap is not None:
             names, directions, most = self._cap()
             bounded, closed = np.isfinite(most) & (most > 0.0), most == 0.0
@@ -173,9 +214,19 @@ def _joined(
 
 
 @lru_cache(maxsize=KEPT)
-def _joint_names(joints: tuple[str, ...]) -> tuple[Row, ...]:
+def _joint_names(joints: tuple[str, ...], sliding: tuple[bool, ...]) -> tuple[Row, ...]:
+    kinds = [JOINT_FORCE if slides else JOINT_TORQUE for slides in sliding]
     return tuple(
-        Row(None, None, JOINT_TORQUE, "limit", f"{JOINT_TORQUE}/{name}{sign}", name)
+        Row(None, None, kind, "limit", f"{kind}/{name}{sign}", name)
+        for sign in "+-"
+        for name, kind in zip(joints, kinds, strict=True)
+    )
+
+
+@lru_cache(maxsize=KEPT)
+def _passive_names(joints: tuple[str, ...]) -> tuple[Row, ...]:
+    return tuple(
+        Row(None, None, PASSIVE_JOINT, "hard", f"{PASSIVE_JOINT}/{name}{sign}", name)
         for sign in "+-"
         for name in joints
     )

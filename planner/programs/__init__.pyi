@@ -20,6 +20,7 @@ from .solvers import (
     vertex as vertex,
 )
 from .stance_data import (
+    JOINT_FORCE as JOINT_FORCE,
     JOINT_TORQUE as JOINT_TORQUE,
     LOAD_UNIT as LOAD_UNIT,
     TWIST_UNIT as TWIST_UNIT,

@@ -25,6 +25,7 @@ from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.programs.conic import Columns
 
 __all__ = [
+    "JOINT_FORCE",
     "JOINT_TORQUE",
     "LOAD_UNIT",
     "TWIST_UNIT",
@@ -50,7 +51,10 @@ WRIST_RANGE: Final = "wrist_range"
 """Name of the hard rows within which a floating hand's set is linearised."""
 
 JOINT_TORQUE: Final = "joint_torque"
-"""Name of the limit rows of a limb's joints."""
+"""Name of the limit rows of a limb's joints that turn."""
+
+JOINT_FORCE: Final = "joint_force"
+"""Name of the limit rows of a limb's joints that slide."""
 
 SECONDARY: Final = 1e-4
 """Weight in the tie-break of loads that are not tensions: enough to make them unique."""
@@ -193,7 +197,8 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
 
 def is_effort(row: Row) -> bool:
     """Whether a limit row's utilisation counts as effort: a torque's with one of its two signs."""
-    return row.limit == TENDON_TENSION or (row.limit == JOINT_TORQUE and row.label.endswith("+"))
+    of_joint = row.limit in (JOINT_TORQUE, JOINT_FORCE)
+    return row.limit == TENDON_TENSION or (of_joint and row.label.endswith("+"))
 
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])

@@ -126,7 +126,8 @@ class Limits:
     tendon_tension : float, optional
         Of every tendon [N]; the hand's own maximum if that is less.
     joint_torque : float or mapping of str to (float or sequence of float), optional
-        Of every joint, or by limb, in place of the robot's own figures [N·m].
+        Of every joint, or by limb, in place of the robot's own figures [N·m]; zero of a joint
+        without a motor, which bears nothing. Of a joint that slides it is a force [N].
     per_hand : mapping of str to ForceCap
         By limb.
     tension_change : float, optional
@@ -159,12 +160,14 @@ class Limits:
             object.__setattr__(self, "joint_torque", torque)
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
-            for most in given if isinstance(given, tuple) else (given,):
-                if most is not None and not (math.isfinite(most) and most >= LEAST):
-                    raise InvalidInputError(
-                        f"must be at least {LEAST:g} N·m, got {most:g}",
-                        field="joint_torque" + (f".{limb}" if limb else ""),
-                    )
+            each = given if isinstance(given, tuple) else (given,)
+            wrong = [most for most in each if not (most == 0.0 or LEAST <= most < math.inf)]
+            if wrong or not any(each):
+                raise InvalidInputError(
+                    f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
+                    f"(not all of a limb), got {', '.join(f'{most:g}' for most in wrong or each)}",
+                    field="joint_torque" + (f".{limb}" if limb else ""),
+                )
 
 
 Objective = Literal["max_margin", "min_effort"]

@@ -37,8 +37,8 @@ class LimitName(Struct, frozen=True):
         What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
         ``motor_torque``, ``motor_current``, ``finger_shear``, ``finger_lateral`` and, with its
         distal phalanx, ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``,
-        ``hand_load`` and, where it is capped, ``force_cap``; of a limb ``joint_torque``; or a hard
-        row's name.
+        ``hand_load`` and, where it is capped, ``force_cap``; of a limb ``joint_torque``, or
+        ``joint_force`` of a joint that slides; or a hard row's name.
     joint : str or None
         The joint whose torque it is.
     """

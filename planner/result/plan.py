@@ -127,7 +127,9 @@ class Plan:
         Of every limb [rad], [N·m]; None where the stance says nothing of joints, and of torques
         where there is no balance.
     joint_torque_limit : mapping of str to ndarray, shape (n,), or None
-        What the joints bear: the caller's figures, or else the robot's [N·m].
+        What the joints bear: the caller's figures, or else the robot's [N·m]; zero for a joint
+        without a motor. Of joints that slide this is a force, the torque too [N], and where they
+        are a length [m].
     path : TensionPath or None
         The way from the present tensions; None where none were given, or there is no plan.
     verified : bool
@@ -185,14 +187,24 @@ class Plan:
     advice: tuple[Advice, ...] | None = None
 
     @property
+    def joint_shares(self) -> Mapping[str, Array] | None:
+        """Each joint's torque over what it bears, shape (n,) by limb; None where it is not known.
+
+        A joint without a motor, whose limit is zero, has none: 0.
+        """
+        torques, limits = self.joint_torque, self.joint_torque_limit
+        if torques is None or limits is None:
+            return None
+        return {
+            limb: np.divide(np.abs(torque), most, out=np.zeros(len(most)), where=most > 0.0)
+            for limb, torque, most in ((limb, each, limits[limb]) for limb, each in torques.items())
+        }
+
+    @property
     def joint_utilisation(self) -> float | None:
         """Largest torque of a joint over what it bears; None where torques are not known."""
-        if self.joint_torque is None or self.joint_torque_limit is None:
-            return None
-        return max(
-            float(np.max(np.abs(torque) / self.joint_torque_limit[limb]))
-            for limb, torque in self.joint_torque.items()
-        )
+        shares = self.joint_shares
+        return None if shares is None else max(float(np.max(each)) for each in shares.values())
 
 
 @dataclass(frozen=True, eq=False, slots=True)

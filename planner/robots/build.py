@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from textwrap import shorten
 from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, within
+from planner.robots.joint_coupling import JointCoupling, coupling_of
 from planner.robots.limb_joints import limb_joints, locked_joints
-from planner.robots.robot_file import Mount, RobotDescription
+from planner.robots.robot_file import STRONGEST, Mount, RobotDescription
 from planner.robots.urdf import JointElement, parse_urdf
 
 __all__ = ["Chain", "build_model", "pose_of"]
@@ -23,22 +26,40 @@ ROOT_JOINT: Final = 1
 ROOT_NAME: Final = "free body\x01"
 """Its name, which no joint of a URDF can have: XML does not allow its last character."""
 
+PLACEHOLDER: Final = 1e3
+"""An effort from which on, where all joints of a limb have the same, it is taken for none
+[N·m, N]."""
+
 ON_AXIS: Final = 1e-9
 """How far from a joint's axis the next joint may be and still count as on it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A limb: turning joints from the body outward, with a hand on the last link.
+    """A limb: joints from the body outward, with a hand on the last link.
+
+    Of its k joints n have a place of their own, most often all; the others follow these. Angles,
+    torques and limits are of those n: what is said of an angle [rad] and a torque [N·m] is of a
+    joint that slides a length [m] and a force [N].
 
     Attributes
     ----------
-    joints : tuple of str
-        Names, from the body outward.
+    joints : tuple of str, length n
+        Names of those that move by themselves, from the body outward.
+    moving : tuple of str, length k
+        Names of all.
+    sliding : ndarray of bool, shape (n,)
+        Which of the n slide along their axis.
+    coupling : ndarray, shape (k, n)
+        How far each joint moves for each unit of the n.
+    offset : ndarray, shape (k,)
+        Where each joint is while the n are at zero.
     lower, upper : ndarray, shape (n,)
         Limits of the joints' angles [rad], infinite for continuous joints.
     torque_limits : ndarray, shape (n,)
-        What the joints bear [N·m].
+        What the joints bear [N·m]; zero for one without a motor.
+    rated : bool
+        Whether the robot's file says so; otherwise these are the efforts of its URDF.
     shoulder : ndarray, shape (3,)
         Where the limb begins, in B [m]: its second joint if that lies on the axis of the first, so
         that no joint moves it, otherwise its first.
@@ -46,22 +67,27 @@ class Chain:
         Upper bound of the distance from the shoulder to the link that carries the hand [m]: the
         sum of the distances from joint to joint, or where that link only turns in its place, the
         distance of H from there.
-    spacing : ndarray, shape (n,)
+    spacing : ndarray, shape (k,)
         How far each joint is from the one before it, the first from B [m].
     ids, frame : tuple of int, int
-        Of the joints and of H in Pinocchio's model.
-    places : ndarray, shape (n,)
+        Of all joints and of H in Pinocchio's model.
+    places : ndarray, shape (k,)
         Where the joints are in a configuration.
-    turning : ndarray, shape (at most n,)
+    turning : ndarray, shape (at most k,)
         Which of them are there as cosine and sine: those that turn without end.
     columns : slice
         Where they are among the rates.
     """
 
     joints: tuple[str, ...]
+    moving: tuple[str, ...]
+    sliding: NDArray[np.bool_]
+    coupling: Array
+    offset: Array
     lower: Array
     upper: Array
     torque_limits: Array
+    rated: bool
     shoulder: Array
     reach: float
     spacing: Array
@@ -71,8 +97,14 @@ class Chain:
     turning: Indices
     columns: slice
 
-    def turn(self, q: Array, angles: Array) -> None:
+    @property
+    def rest(self) -> Array:
+        """Angles (n,) of which nothing is said: zero, or the limit that is nearest to it."""
+        return np.asarray(np.clip(0.0, self.lower, self.upper))
+
+    def turn(self, q: Array, given: Array) -> None:
         """Write the limb's angles (n,) into a configuration of Pinocchio's, shape (nq,)."""
+        angles = self.coupling @ given + self.offset
         q[self.places] = angles
         if self.turning.size:
             at, endless = self.places[self.turning], angles[self.turning]
@@ -104,8 +136,7 @@ def build_model(
     Raises
     ------
     InvalidInputError
-        If the URDF is none, a link is not in it, or a limb is no chain of turning joints of its
-        own.
+        If the URDF is none, a link is not in it, or a limb is no chain of joints of its own.
     """
     with within("urdf"):
         tree = parse_urdf(urdf)
@@ -174,7 +205,9 @@ def _mounted(
     # limbs share no joints and the others are locked, so a limb's joints follow each other
     columns = slice(joints[0].idx_v, joints[-1].idx_v + 1)
     link = model.frames[model.getFrameId(mount.link, pin.FrameType.BODY)]
-    shoulder, reach = _bound(model, ids, columns.start, pose_of(link.placement))
+    with within(f"limbs.{limb}.link"):
+        coupled = coupling_of(elements)
+    shoulder, reach = _bound(model, elements, ids, columns.start, pose_of(link.placement))
     if reach <= ON_AXIS:
         reach = float(np.linalg.norm(mount.pose.position))
     if reach <= ON_AXIS:
@@ -182,12 +215,8 @@ def _mounted(
             "the limb's joints only turn the hand in its place; it must be away from them",
             field=f"limbs.{limb}.position",
         )
-    if len(mount.torque_limits) not in (1, len(joints)):
-        raise InvalidInputError(
-            f"one number is needed, or {len(joints)}, one for each joint from the body outward, "
-            f"got {len(mount.torque_limits)}",
-            field=f"limbs.{limb}.torque_limit",
-        )
+    with within(f"limbs.{limb}.torque_limit"):
+        limits = _torque_limits(mount, coupled)
     place = link.placement * pin.SE3(mount.pose.rotation, mount.pose.position)
     hand = pin.Inertia(hand_mass, np.array(mount.hand_com), np.zeros((3, 3)))
     model.appendBodyToJoint(ids[-1], hand, place)
@@ -195,10 +224,15 @@ def _mounted(
         pin.Frame(f"hand of {limb}", ids[-1], link.parentFrame, place, pin.FrameType.OP_FRAME)
     )
     return Chain(
-        joints=tuple(joint.name for joint in elements),
-        lower=np.array([joint.lower for joint in elements]),
-        upper=np.array([joint.upper for joint in elements]),
-        torque_limits=np.broadcast_to(np.array(mount.torque_limits), len(joints)).copy(),
+        joints=tuple(joint.name for joint in coupled.driving),
+        moving=tuple(joint.name for joint in elements),
+        sliding=np.array([joint.slides for joint in coupled.driving]),
+        coupling=coupled.matrix,
+        offset=coupled.offset,
+        lower=coupled.lower,
+        upper=coupled.upper,
+        torque_limits=limits,
+        rated=mount.torque_limits is not None,
         shoulder=root.inverse().apply(shoulder),
         reach=reach,
         spacing=np.array([np.linalg.norm(model.jointPlacements[i].translation) for i in ids]),
@@ -210,7 +244,40 @@ def _mounted(
     )
 
 
-def _bound(model: Any, ids: tuple[int, ...], first: int, link: Pose) -> tuple[Array, float]:
+def _torque_limits(mount: Mount, coupled: JointCoupling) -> Array:
+    """Return what the joints that move by themselves bear: as the robot's file says, or its URDF.
+
+    An effort of zero is what URDF demands where nothing is known, and a large one of all joints
+    alike what exporters write then.
+    """
+    joints = coupled.driving
+    given = mount.torque_limits
+    if given is not None:
+        if len(given) not in (1, len(joints)):
+            raise InvalidInputError(
+                f"one number is needed, or {len(joints)}, one for each joint from the body "
+                f"outward, got {len(given)}"
+            )
+        return np.broadcast_to(np.array(given), len(joints)).copy()
+    efforts = np.array([joint.effort for joint in joints])
+    advice = "give torque_limit; 0 in its list is a joint without a motor"
+    unknown = [joint.name for joint in joints if not 0.0 < joint.effort <= STRONGEST]
+    if unknown:
+        raise InvalidInputError(
+            f"missing, and the URDF has no effort up to {STRONGEST:g} of "
+            f"{shorten(', '.join(unknown), 100, placeholder=' …')} (0 is none); {advice}"
+        )
+    if efforts.min() == efforts.max() >= PLACEHOLDER:
+        raise InvalidInputError(
+            f"missing, and the URDF has an effort of {efforts[0]:g} of every joint, which "
+            f"exporters write where nothing is known; {advice}"
+        )
+    return efforts
+
+
+def _bound(
+    model: Any, elements: Sequence[JointElement], ids: Sequence[int], first: int, link: Pose
+) -> tuple[Array, float]:
     """Return a limb's shoulder in the root link, and how far its last link can be from it [m].
 
     The link is given in its joint, which its reach goes up to; ``first`` is the first joint's rate.
@@ -220,8 +287,9 @@ def _bound(model: Any, ids: tuple[int, ...], first: int, link: Pose) -> tuple[Ar
     joints = [pose_of(data.oMi[i]) for i in ids]
     places = [joint.position for joint in joints]
     places.append(joints[-1].apply(link.position))
-    if len(joints) > 1:
+    if len(joints) > 1 and not elements[0].slides:
         axis = np.array(data.J[3:, first])
         if np.linalg.norm(np.cross(axis, places[1] - places[0])) <= ON_AXIS:
             places = places[1:]
-    return places[0], sum(float(np.linalg.norm(b - a)) for a, b in pairwise(places))
+    slides = sum(max(abs(each.lower), abs(each.upper)) for each in elements if each.slides)
+    return places[0], sum(float(np.linalg.norm(b - a)) for a, b in pairwise(places)) + slides

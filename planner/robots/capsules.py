@@ -81,7 +81,7 @@ def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Ch
         tips = zip(chain.ids, [*steps, link.placement.translation], strict=True)
         for step, (joint, tip) in enumerate(tips, start=1):
             if joint not in known:
-                name, segment = chain.joints[step - 1], np.array([np.zeros(3), tip])
+                name, segment = chain.moving[step - 1], np.array([np.zeros(3), tip])
                 found.append(_Capsule(name, limb, step, joint, segment, radius))
     order = [None, *chains]
     found.sort(key=lambda each: (order.index(each.limb), each.step))

@@ -63,7 +63,8 @@ class LimbBatch:
         for i, (chain, n) in enumerate(zip(self._chains, self.joints, strict=True)):
             self.lower[i, :n] = chain.lower
             self.upper[i, :n] = chain.upper
-            self._limits[i, :n] = chain.torque_limits
+            # a joint without a motor has no effort
+            self._limits[i, :n] = np.where(chain.torque_limits > 0.0, chain.torque_limits, np.inf)
         self.reach = np.array([chain.reach for chain in self._chains])
         mounts = robot.description.mounts
         self.levers = np.array([np.linalg.norm(mounts[limb].pose.position) for limb in poses])
@@ -122,7 +123,7 @@ class LimbBatch:
                 missing[i, :3] = off.translation
                 missing[i, 3:] = pin.log3(off.rotation)
                 jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
-                motions[i, :, :n] = jacobian[:, chain.columns]
+                motions[i, :, :n] = jacobian[:, chain.columns] @ chain.coupling
         errors[..., :3] /= self.reach[:, None]
         jacobians[..., :3, :] /= self.reach[:, None, None]
         return errors, jacobians
@@ -142,8 +143,9 @@ class LimbBatch:
             )
             torques, changes = data.tau, data.dtau_dq
             for i, (chain, n) in enumerate(zip(self._chains, self.joints, strict=True)):
-                effort[i, :n] = torques[chain.columns]
-                slope[i, :n, :n] = changes[chain.columns, chain.columns]
+                own, turned = chain.columns, chain.coupling
+                effort[i, :n] = turned.T @ torques[own]
+                slope[i, :n, :n] = turned.T @ changes[own, own] @ turned
         return efforts / self._limits, slopes / self._limits[:, :, None]
 
     def cost(self, angles: Array) -> Array:

@@ -8,12 +8,13 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
 from hand_models.base import InvalidInputError, within
+from planner.robots.joint_coupling import uncoupled
 from planner.robots.robot_file import RobotDescription, section_table
 from planner.robots.urdf import JointElement, Urdf
 
 __all__ = ["limb_joints", "locked_joints"]
 
-TURNING: Final = ("revolute", "continuous")
+MOVING: Final = ("revolute", "continuous", "prismatic")
 """Types of joint that a limb may have."""
 
 LOCKED_UNITS: Final = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
@@ -67,8 +68,8 @@ def limb_joints(
     Raises
     ------
     InvalidInputError
-        If a limb has no joints, too many, some that others have too, or some that do not turn by
-        themselves; the message says how to lock these.
+        If a limb has no joints, too many, some that others have too, or some that neither turn nor
+        slide, or follow a joint that is none of the limb's; the message says how to lock these.
     """
     body, chains = described.body, {}
     for limb, mount in described.mounts.items():
@@ -90,7 +91,7 @@ def limb_joints(
     for limb, chain in chains.items():
         with within(f"limbs.{limb}.link"):
             between = f"between {body!r} and {described.mounts[limb].link!r}"
-            _require_turning(chain, between, described.locked)
+            _require_moved(chain, between, described.locked)
     return chains
 
 
@@ -114,22 +115,22 @@ def _require_own(chains: Mapping[str, tuple[JointElement, ...]], already: Collec
     )
 
 
-def _require_turning(
-    chain: tuple[JointElement, ...], between: str, already: Collection[str]
-) -> None:
-    """Refuse joints of a limb that do not turn, or not by themselves; say how to lock them."""
-    wrong = [joint for joint in chain if joint.type not in TURNING or joint.mimic]
+def _require_moved(chain: tuple[JointElement, ...], between: str, already: Collection[str]) -> None:
+    """Refuse joints of a limb that no motor of it moves; say how to lock them."""
+    free = [joint for joint in chain if joint.type not in MOVING]
+    wrong = free or uncoupled(chain)
     if not wrong:
         return
     last, advice = wrong[-1], _advice(wrong, already)
-    if last.type not in TURNING:
+    if free:
         raise InvalidInputError(
             f"joint {last.name!r} {between} is {last.type}; a limb's joints must be "
-            f"{' or '.join(TURNING)}, or fixed{advice}"
+            f"{', '.join(MOVING)}, or fixed{advice}"
         )
+    follows = "" if last.mimic is None else last.mimic.joint
     raise InvalidInputError(
-        f"joint {last.name!r} {between} follows another (mimic); each joint of a limb must move "
-        f"by itself{advice}"
+        f"joint {last.name!r} {between} follows another (mimic), {follows!r}, that no motor of "
+        f"this limb moves; a limb's joint moves by itself, or follows one of the same limb{advice}"
     )
 
 

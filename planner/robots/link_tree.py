@@ -53,21 +53,37 @@ class LinkTree:
         self.links = [tree.links[trail[0]] for trail in trails]
         # all but the root hang on a joint
         self._joints = [tree.joints[link.name] for link in self.links[1:]]
+        self._mimics = {j.name: j.mimic for j in self._joints if j.mimic is not None}
+        self._coupled = self._followers()
         index = {link.name: i for i, link in enumerate(self.links)}
         # which link is beyond which, itself included
         self._beyond = np.zeros((len(index), len(index)))
         for trail in trails:
             self._beyond[[index[name] for name in trail], index[trail[0]]] = 1.0
 
+    def _followers(self) -> list[str]:
+        """Return the limbs' joints that follow others, each after the one that it follows."""
+        chains = self.robot.chains.values()
+        left = [name for chain in chains for name in chain.moving if name in self._mimics]
+        found: list[str] = []
+        while left:
+            ready = [name for name in left if self._mimics[name].joint not in left]
+            found += ready
+            left = [name for name in left if name not in ready]
+        return found
+
     def places(self, angles: Mapping[str, float]) -> dict[str, Pose]:
         """Return every link in B, for angles by the joints' names.
 
-        Joints left out are where they are locked, or at zero.
+        Joints left out are where they are locked, or those are that they follow; else at zero.
         """
         found = {self.links[0].name: Pose.identity()}
         where = {**self.robot.locked, **angles}
+        for name in self._coupled:
+            other, multiplier, offset = self._mimics[name]
+            where[name] = multiplier * where.get(other, 0.0) + offset
         moved = np.array([where.get(joint.name, 0.0) * joint.axis for joint in self._joints])
-        slides = np.array([[joint.type == "prismatic"] for joint in self._joints])
+        slides = np.array([[joint.slides] for joint in self._joints])
         turns = turns_about(np.where(slides, 0.0, moved))
         for joint, turn, shift in zip(self._joints, turns, moved * slides, strict=True):
             at = joint.place @ Pose(shift, turn)
@@ -124,8 +140,14 @@ class LinkTree:
         total = self._beyond @ (needed + pushed)
         moments = total[:, 3:] - np.cross(origins, total[:, :3])
         axes = _turned(turns[1:], np.array([joint.axis for joint in self._joints]))
-        about = np.einsum("nx,nx->n", axes, moments[1:]).tolist()
+        # along the axis of a joint that slides, about that of one that turns
+        slides = np.array([[joint.slides] for joint in self._joints])
+        about = np.einsum("nx,nx->n", axes, np.where(slides, total[1:, :3], moments[1:])).tolist()
         torque = {joint.name: value for joint, value in zip(self._joints, about, strict=True)}
+        # the outermost follower first: what it bears goes on to whom it follows
+        for name in reversed(self._coupled):
+            mimic = self._mimics[name]
+            torque[mimic.joint] += mimic.multiplier * torque[name]
         return LimbTorques(
             {limb: np.array([torque[name] for name in chains[limb].joints]) for limb in chains},
             needed.sum(axis=0),

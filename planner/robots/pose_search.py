@@ -153,8 +153,8 @@ def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
     }
     places = {limb: np.empty((SAMPLES, 9)) for limb in robot.limbs}
     for k in range(SAMPLES):
-        poses = robot.hand_poses({limb: angles[k] for limb, angles in samples.items()})
-        for limb, pose in poses.items():
+        found = robot.kinematics({limb: angles[k] for limb, angles in samples.items()})
+        for limb, (pose, _) in found.items():
             places[limb][k] = _place(pose, robot.chains[limb].reach)
     return {limb: (samples[limb], scipy.spatial.cKDTree(places[limb])) for limb in robot.limbs}
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from hand_models.base import (
     Array,
+    InvalidInputError,
     Pose,
     finite_vector,
     in_file,
@@ -30,6 +31,11 @@ from planner.robots.capsules import Capsules, capsules_of
 from planner.robots.robot_file import RobotDescription, RobotFile
 
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
+
+
+BEYOND: Final = 1e-6
+"""How far an angle may be beyond its joint's limit [rad, or m]: what is left of it in seven
+digits."""
 
 
 class Statics(NamedTuple):
@@ -48,12 +54,12 @@ class Statics(NamedTuple):
 
 
 class Robot:
-    """A climbing robot: a body and its limbs, each a chain of turning joints that ends in a hand.
+    """A climbing robot: a body and its limbs, each a chain of joints that ends in a hand.
 
-    Angles are always a mapping of limb to an array (n,) [rad], from the body outward; limbs that
-    are left out are at zero. Joints of the URDF that no limb has are where the robot's file locks
-    them, or their limits; otherwise at zero. A hand counts as a point mass. Threads may share a
-    robot.
+    Angles are always a mapping of limb to an array (n,) [rad], [m] of joints that slide, from the
+    body outward; limbs that are left out are at zero, or the limit nearest to it. Joints of the
+    URDF that no limb has are where the robot's file locks them, or their limits; otherwise at zero.
+    A hand counts as a point mass. Threads may share a robot.
 
     Parameters
     ----------
@@ -91,8 +97,7 @@ class Robot:
     Raises
     ------
     InvalidInputError
-        If the URDF is none, a link is not in it, or a limb is no chain of turning joints of its
-        own.
+        If the URDF is none, a link is not in it, or a limb is no chain of joints of its own.
     """
 
     def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
@@ -164,12 +169,45 @@ class Robot:
     def configuration(self, angles: Mapping[str, Array]) -> Array:
         """Return Pinocchio's configuration, shape (nq,), with the root link at the origin."""
         q = np.array(pin.neutral(self.model))
-        for limb, given in angles.items():
-            self.chains[limb].turn(q, given)
+        for limb, chain in self.chains.items():
+            chain.turn(q, angles.get(limb, chain.rest))
         return q
 
-    def hand_poses(self, angles: Mapping[str, Array]) -> dict[str, Pose]:
-        """Return every limb's H in B."""
+    def checked_angles(self, angles: Mapping[str, Sequence[float] | Array]) -> dict[str, Array]:
+        """Return angles of limbs, if the joints can be there.
+
+        Raises
+        ------
+        InvalidInputError
+            If a limb is unknown, an angle missing, or one beyond its joint's limit; the field is
+            the limb, with the joint's index.
+        """
+        found = {}
+        for limb, given in angles.items():
+            if limb not in self.chains:
+                known = ", ".join(self.limbs)
+                raise InvalidInputError(f"unknown limb; known are {known}", field=limb)
+            chain = self.chains[limb]
+            found[limb] = finite_vector(given, len(chain.joints), limb)
+            beyond = np.maximum(chain.lower - found[limb], found[limb] - chain.upper)
+            for i in np.flatnonzero(beyond > BEYOND).tolist():
+                unit = "m" if chain.sliding[i] else "rad"
+                raise InvalidInputError(
+                    f"{chain.joints[i]} goes from {chain.lower[i]:.6g} to {chain.upper[i]:.6g} "
+                    f"{unit}, got {found[limb][i]:.6g}",
+                    field=f"{limb}[{i}]",
+                )
+        return found
+
+    def hand_poses(self, angles: Mapping[str, Sequence[float] | Array]) -> dict[str, Pose]:
+        """Return every limb's H in B.
+
+        Raises
+        ------
+        InvalidInputError
+            If the joints cannot be there; see `checked_angles`.
+        """
+        angles = self.checked_angles(angles)
         return {limb: pose for limb, (pose, _) in self.kinematics(angles).items()}
 
     def jacobians(self, angles: Mapping[str, Array]) -> dict[str, Array]:
@@ -187,7 +225,7 @@ class Robot:
         for limb, chain in self.chains.items():
             pose = self._from_root @ pose_of(pin.updateFramePlacement(model, data, chain.frame))
             jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
-            found[limb] = pose, np.ascontiguousarray(jacobian[:, chain.columns])
+            found[limb] = pose, jacobian[:, chain.columns] @ chain.coupling
         return found
 
     def statics(
@@ -211,7 +249,7 @@ class Robot:
         torque = pin.rnea(model, data, self.configuration(angles), np.zeros(model.nv), rates)
         return Statics(
             self._to_body @ torque[:6],
-            {limb: np.array(torque[chain.columns]) for limb, chain in self.chains.items()},
+            {limb: chain.coupling.T @ torque[chain.columns] for limb, chain in self.chains.items()},
         )
 
     def root_acceleration(self, gravity: Array, acceleration: Array | None = None) -> Array:

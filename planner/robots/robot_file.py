@@ -23,7 +23,7 @@ from typing import Any, Final
 from hand_models.base import InvalidInputError, Pose, in_file, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 
-__all__ = ["Mount", "RobotDescription", "RobotFile", "section_table"]
+__all__ = ["STRONGEST", "Mount", "RobotDescription", "RobotFile", "section_table"]
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 """What a robot and a limb may be called: their names are part of keys."""
@@ -125,8 +125,9 @@ class Mount:
         H in the link.
     hand_com : tuple of float
         The hand's centre of mass in H [m].
-    torque_limits : tuple of float
-        One number for all joints of the limb, or one each [N·m].
+    torque_limits : tuple of float or None
+        One number for all joints of the limb, or one each [N·m], [N] of one that slides; zero for
+        one without a motor. None: the efforts of the URDF.
     radius : float, optional
         Of its links that have no capsules [m].
     """
@@ -134,7 +135,7 @@ class Mount:
     link: str
     pose: Pose
     hand_com: tuple[float, ...]
-    torque_limits: tuple[float, ...]
+    torque_limits: tuple[float, ...] | None
     radius: float | None = None
 
 
@@ -335,19 +336,29 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
         pose = Pose.from_quaternion(position, orientation)
     given = "hand_com" in table.sections[section]
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
-    value = table.quantity(section, "torque_limit").value
-    limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
-    if not limits or not all(WEAKEST <= limit <= STRONGEST for limit in limits):
-        raise InvalidInputError(
-            f"must be {WEAKEST:g} to {STRONGEST:g} N·m, got {_quoted(limits)}",
-            field=f"{section}.torque_limit",
-        )
+    limits = _torque_limits(table, section)
     radius = table.positive(section, "radius") if "radius" in table.sections[section] else None
     if radius is not None and radius > THICKEST:
         raise InvalidInputError(
             f"must be at most {THICKEST:g} m, got {radius:g}", field=f"{section}.radius"
         )
     return Mount(link, pose, hand_com, limits, radius)
+
+
+def _torque_limits(table: ParameterTable, section: str) -> tuple[float, ...] | None:
+    """Return what the joints of a limb bear; None where that is left to the URDF."""
+    if "torque_limit" not in table.sections[section]:
+        return None
+    value = table.quantity(section, "torque_limit").value
+    limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
+    sound = [limit == 0.0 or WEAKEST <= limit <= STRONGEST for limit in limits]
+    if not any(limits) or not all(sound):
+        raise InvalidInputError(
+            f"must be {WEAKEST:g} to {STRONGEST:g} N·m, or in a list 0 for a joint without a motor "
+            f"(not all of a limb), got {_quoted(limits)}",
+            field=f"{section}.torque_limit",
+        )
+    return limits
 
 
 def _quoted(values: tuple[float, ...]) -> str:

@@ -8,17 +8,20 @@ import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from textwrap import shorten
-from typing import Final
+from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, stored
 
-__all__ = ["JointElement", "Link", "Urdf", "parse_urdf"]
+__all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
 
 TYPES: Final = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
 """Types of joint that URDF knows."""
+
+DRIVEN: Final = ("revolute", "continuous", "prismatic")
+"""Types that one motor can move."""
 
 LONGEST: Final = 100.0
 """Farthest that a frame may be from its parent's [m]; farther, the units are wrong."""
@@ -37,6 +40,18 @@ NEGATIVE: Final = 1e-9
 
 NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 """A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
+
+STEEPEST: Final = 1e3
+"""Largest multiplier of a coupled joint that is taken for one."""
+
+XACRO: Final = "/xacro"
+"""What the namespace of xacro ends with."""
+
+EXPAND: Final = (
+    "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
+    "(from ROS, or from pip install xacro)"
+)
+"""What a file is told that still has instructions for xacro in it."""
 
 THIN: Final = 1e-6
 """Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
@@ -63,6 +78,24 @@ class Link:
     inertia: Array
 
 
+class Mimic(NamedTuple):
+    """A coupling to another joint: where a joint is, ``multiplier · other + offset``.
+
+    Attributes
+    ----------
+    joint : str
+        The other.
+    multiplier : float
+        [1], or [m/rad] or [rad/m] where one of them slides.
+    offset : float
+        [rad, or m]
+    """
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
 @dataclass(frozen=True, eq=False)
 class JointElement:
     """A joint of a URDF.
@@ -76,9 +109,12 @@ class JointElement:
     axis : ndarray, shape (3,)
         In its own frame, of unit length.
     lower, upper : float
-        Limits [rad]; infinite for any but revolute joints. Where they are equal nothing moves.
-    mimic : bool
-        Whether it follows another joint.
+        Limits [rad], of a prismatic joint [m]; infinite for all but these two types. Where they are
+        equal nothing moves.
+    effort : float
+        What the joint bears [N·m], a prismatic one [N]; zero where the file does not say.
+    mimic : Mimic or None
+        How it follows another joint.
     """
 
     name: str
@@ -89,7 +125,13 @@ class JointElement:
     axis: Array
     lower: float
     upper: float
-    mimic: bool
+    effort: float
+    mimic: Mimic | None
+
+    @property
+    def slides(self) -> bool:
+        """Whether it moves along its axis instead of about it."""
+        return self.type == "prismatic"
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,15 +198,18 @@ def parse_urdf(text: str) -> Urdf:
     Raises
     ------
     InvalidInputError
-        If it is no XML, no tree, or a number is missing, not finite or absurd; the message names
-        the link or joint.
+        If it is no XML, an unexpanded xacro, no tree, or a number is missing, not finite or absurd;
+        the message names the link or joint.
     """
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
+        if "xacro:" in text:
+            raise InvalidInputError(f"must be a URDF; {EXPAND}") from None
         raise InvalidInputError(f"must be a URDF, which is XML: {error}") from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")
+    _require_expanded(root)
     links = [_name(element) for element in root.findall("link")]
     _distinct("link", links)
     joints = [_joint(element, set(links)) for element in root.findall("joint")]
@@ -187,6 +232,15 @@ def parse_urdf(text: str) -> Urdf:
     for child in by_child:
         tree.trail(child)
     return replace(tree, links={link.name: link for link in map(_link, root.findall("link"))})
+
+
+def _require_expanded(root: ElementTree.Element) -> None:
+    """Refuse a file with elements of xacro, or with values that xacro is to put in."""
+    for element in root.iter():
+        space = element.tag.rpartition("}")[0] if isinstance(element.tag, str) else ""
+        values = [value for name, value in element.items() if name != "filename"]
+        if space.endswith(XACRO) or any("${" in value or "$(" in value for value in values):
+            raise InvalidInputError(f"must be a URDF; {EXPAND}")
 
 
 def _name(element: ElementTree.Element) -> str:
@@ -266,24 +320,27 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         if not length > 0.0:
             raise InvalidInputError(f"{owner}: its axis must not be zero")
         axis = axis / length
-    lower, upper = -math.inf, math.inf
+    lower, upper, effort = -math.inf, math.inf, 0.0
+    limit = element.find("limit")
+    if limit is not None and kind in DRIVEN and "effort" in limit.attrib:
+        (effort,) = _numbers(owner, limit, "effort", 1, sys.float_info.max)
+        if effort < 0.0:
+            raise InvalidInputError(f"{owner}: effort must not be negative, got {effort:g}")
     if kind in ("revolute", "prismatic"):
-        limit = element.find("limit")
         if limit is None:
             raise InvalidInputError(f"{owner} is {kind} and has no <limit>; continuous needs none")
         for rating in ("effort", "velocity"):
             _numbers(owner, limit, rating, 1, sys.float_info.max)
         # URDF takes a limit that is left out for zero
-        low, high = (
+        lower, upper = (
             _numbers(owner, limit, end, 1, WIDEST)[0] if end in limit.attrib else 0.0
             for end in ("lower", "upper")
         )
-        if kind == "revolute":
-            lower, upper = low, high
-            if lower > upper:
-                raise InvalidInputError(
-                    f"{owner}: lower must not be above upper, got {lower:g} and {upper:g} rad"
-                )
+        if lower > upper:
+            unit = "m" if kind == "prismatic" else "rad"
+            raise InvalidInputError(
+                f"{owner}: lower must not be above upper, got {lower:g} and {upper:g} {unit}"
+            )
     return JointElement(
         name=name,
         type=kind,
@@ -293,8 +350,21 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         axis=axis,
         lower=lower,
         upper=upper,
-        mimic=element.find("mimic") is not None,
+        effort=effort,
+        mimic=_mimic(owner, element),
     )
+
+
+def _mimic(owner: str, element: ElementTree.Element) -> Mimic | None:
+    """Return how a joint follows another; None where it moves by itself."""
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    multiplier, offset = (
+        _numbers(owner, mimic, name, 1, most)[0] if name in mimic.attrib else default
+        for name, most, default in (("multiplier", STEEPEST, 1.0), ("offset", WIDEST, 0.0))
+    )
+    return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
 def _link(element: ElementTree.Element) -> Link:

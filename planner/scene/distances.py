@@ -182,7 +182,7 @@ def _among_links(scene: Scene, links: Sequence[Solid], hands: Sequence[Solid]) -
     robot, solids = scene.stance.robot, (*links, *hands)
     order = [None, *robot.limbs]
     limb = np.array([order.index(each) for each in (*robot.capsules.limbs, *scene.limbs)])
-    ends = [len(robot.chains[each].joints) for each in scene.limbs]
+    ends = [len(robot.chains[each].moving) for each in scene.limbs]
     step = np.append(robot.capsules.steps, ends)
     radii = np.array([solid.shape.radius for solid in solids])
     i, j = np.triu_indices(len(solids), 1)
@@ -197,7 +197,7 @@ def _among_links(scene: Scene, links: Sequence[Solid], hands: Sequence[Solid]) -
 
 def _along(robot: Robot) -> Array:
     """Return how far along its limb each joint is [m]: rows by limb, the body's first; by step."""
-    most = max(len(chain.joints) for chain in robot.chains.values())
+    most = max(len(chain.moving) for chain in robot.chains.values())
     table = np.zeros((1 + len(robot.chains), most + 2))
     for row, chain in zip(table[1:], robot.chains.values(), strict=True):
         row[1:] = chain.spacing.sum()

@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array, BoundedStore
 from planner import programs
-from planner.explanation import LimitUse, joint_name, off_sentences, warnings
+from planner.explanation import LimitUse, joint_name, joint_sentences, off_sentences, warnings
 from planner.floating import WristSolution
 from planner.prepare import HandBatch, PreparedStance, Sets
 from planner.result import (
@@ -83,6 +83,7 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
             *(each.message for each in odd),
             *warnings(stance, batch),
             *off_sentences(where),
+            *joint_sentences(prepared.question, where),
         ),
     )
 
@@ -112,9 +113,12 @@ def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
     where = prepared.where
     idle = {} if where is None else where.idle(prepared.question.stance)
     return tuple(
-        LimitUse(joint_name(limb, name), abs(float(torque)), float(most))
-        for limb, joints in idle.items()
-        for name, torque, most in zip(joints.names, joints.gravity, joints.limits, strict=True)
+        LimitUse(joint_name(limb, *joint), abs(float(torque)), float(most))
+        for limb, loads in idle.items()
+        for joints in (loads.driven,)
+        for *joint, torque, most in zip(
+            joints.names, joints.sliding, joints.gravity, joints.limits, strict=True
+        )
     )
 
 

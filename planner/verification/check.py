@@ -24,7 +24,13 @@ from hand_models.base import SKEW, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, Question
 from planner.result import PlanArrays
-from planner.verification.limbs import check_asked, check_limbs, force_use
+from planner.verification.limbs import (
+    JointUse,
+    check_asked,
+    check_limbs,
+    check_passive,
+    force_use,
+)
 from planner.verification.recomputation import Recomputing
 from planner.verification.sentences import COUNT, UTILISATION
 
@@ -105,7 +111,7 @@ class Check:
             again = self.again.of(found, arrays, self.asked_for(found, arrays, joints))
             if not again.near():
                 found.extend(self.again.solved(again).off(self.again.allowed(arrays)))
-            used = [float(np.abs(shares).max()) for shares in joints.values()]
+            used = [float(np.abs(each.shares).max()) for each in joints.values()]
             worst = max([float(np.maximum.reduce(again.hands)), *used])
             if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
@@ -115,21 +121,21 @@ class Check:
                 found.append(f"balance is off by {error:.3g} of {size:.3g}")
             if effort is not None:
                 relative = float(arrays.tensions.dot(arrays.tensions)) / self.strength**2
-                own = [joints[limb] for limb in self.limbs if limb in joints]
+                own = [joints[limb].shares for limb in self.limbs if limb in joints]
                 relative += sum(float(shares @ shares) for shares in own)
                 if not abs(relative - effort) <= EFFORT * max(1.0, relative):
                     found.append(f"plan: effort is {relative:.8g}, not {effort:.8g}")
         return list(dict.fromkeys(found))
 
-    def joints(self, found: list[str], wrenches: Array, body_wrench: Array) -> dict[str, Array]:
-        """Check the limbs' joints; return their torques over their limits, by limb."""
+    def joints(self, found: list[str], wrenches: Array, body_wrench: Array) -> dict[str, JointUse]:
+        """Check the limbs' joints; return what they bear, by limb."""
         if self.where is None and self.question.stance.joints is None:
             return {}
         told = dict(zip(self.limbs, wrenches, strict=True))
         return check_limbs(found, self.question, told, body_wrench, self.where)
 
     def asked_for(
-        self, found: list[str], arrays: PlanArrays, joints: Mapping[str, Array]
+        self, found: list[str], arrays: PlanArrays, joints: Mapping[str, JointUse]
     ) -> Array | None:
         """Check what a question asks of its hands; return how much of joints and caps they use."""
         places = self.question.stance.hands
@@ -142,8 +148,12 @@ class Check:
             )
         if not (self.asked or joints):
             return None
-        used = np.array([np.abs(joints.get(limb, 0.0)).max() for limb in self.limbs])
+        used = np.zeros(len(self.limbs))
         allowed = self.again.allowed(arrays)
+        for h, limb in enumerate(self.limbs):
+            if limb in joints:
+                used[h] = np.abs(joints[limb].shares).max()
+                check_passive(found, limb, joints[limb], float(allowed[h]))
         for h in self.asked:
             wrench, error = arrays.wrenches[h], float(allowed[h])
             tensions = arrays.tensions[COUNT * h : COUNT * (h + 1)]

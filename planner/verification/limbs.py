@@ -7,7 +7,7 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
@@ -18,7 +18,7 @@ from planner.prepare import BALL, Posture
 from planner.question import HandOnHold, Question
 from planner.robots import LimbTorques, LinkTree
 
-__all__ = ["check_asked", "check_limbs", "force_use"]
+__all__ = ["ARM", "JointUse", "check_asked", "check_limbs", "check_passive", "force_use"]
 
 NOTHING: Final = np.zeros(0)
 """Of a hand without a cap."""
@@ -36,7 +36,25 @@ TOLD: Final = 1e-5
 """How far what is told of that may be from it, of joints that were found [m, rad]."""
 
 BEYOND: Final = 1e-6
-"""How far an angle may be beyond its joint's limit [rad]."""
+"""How far an angle may be beyond its joint's limit [rad, or m]."""
+
+ARM: Final = 1.0
+"""Lever at which an error of a hand's loads turns a joint [m]: about a limb's length."""
+
+
+class JointUse(NamedTuple):
+    """What a limb's joints bear.
+
+    Attributes
+    ----------
+    shares : ndarray, shape (n,)
+        Torques over limits; zero of joints without a motor.
+    passive : dict of str to float
+        Torques of those of limbs with a hand, by name, which must be zero [N·m, N].
+    """
+
+    shares: Array
+    passive: dict[str, float]
 
 
 def check_limbs(
@@ -45,8 +63,8 @@ def check_limbs(
     wrenches: Mapping[str, Array],
     body_wrench: Array,
     where: Posture | None,
-) -> dict[str, Array]:
-    """Check joints and the robot's own weight; return the torques of all limbs over their limits.
+) -> dict[str, JointUse]:
+    """Check joints and the robot's own weight; return what the joints of all limbs bear.
 
     Parameters
     ----------
@@ -59,11 +77,11 @@ def check_limbs(
         The one planned for, in B.
     where : Posture or None
     """
-    shares: dict[str, Array] = {}
+    uses: dict[str, JointUse] = {}
     if (where is None) != (question.stance.joints is None):
         found.append("the joints are not what the question says of them")
     if where is None:
-        return shares
+        return uses
     robot = question.stance.robot
     own = _hold_up(question, wrenches, where)
     _check_places(found, question, where, own)
@@ -79,8 +97,25 @@ def check_limbs(
         for name, torque, claim in zip(said.names, torques, claimed, strict=True):
             if not abs(torque - claim) <= allowed:
                 found.append(f"{limb}: joint {name} bears {torque:.6g} N·m, not {claim:.6g}")
-        shares[limb] = torques / _limits(question, limb)
-    return shares
+        limits = _limits(question, limb)
+        moved = limits > 0.0
+        uses[limb] = JointUse(
+            np.divide(torques, limits, out=np.zeros(len(limits)), where=moved),
+            {said.names[i]: float(torques[i]) for i in np.flatnonzero(~moved).tolist()}
+            if limb in wrenches
+            else {},
+        )
+    return uses
+
+
+def check_passive(found: list[str], limb: str, use: JointUse, allowed: float) -> None:
+    """Check that joints without a motor bear nothing.
+
+    ``allowed``: the error that the hand's loads may have [N].
+    """
+    for name, torque in use.passive.items():
+        if not abs(torque) <= allowed * ARM:
+            found.append(f"{limb}: joint {name} has no motor, and bears {torque:.6g} N·m")
 
 
 def _limits(question: Question, limb: str) -> Array:
@@ -133,7 +168,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
         if not float(beyond.max()) <= BEYOND:
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
         if not isinstance(stance.joints, str | None):
-            given = stance.joints.get(limb, np.zeros(len(angles)))
+            given = stance.joints.get(limb, np.clip(0.0, chain.lower, chain.upper))
             if not np.array_equal(given, angles):
                 found.append(f"{limb}: its joints are not at the angles that were given")
 

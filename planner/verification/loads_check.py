@@ -23,7 +23,7 @@ from planner.prepare import BALL
 from planner.result import LoadRecovery, PlanArrays
 from planner.verification.check import BALANCE, Check
 from planner.verification.joint_balance import LEVER
-from planner.verification.limbs import force_use
+from planner.verification.limbs import ARM, JointUse, force_use
 from planner.verification.recomputation import LimitCurves, held_by
 from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
 
@@ -120,10 +120,11 @@ class LoadsCheck:
         ]
         for h, place in enumerate(question.stance.hands):
             capped, none = force_use([], question, place, again.wrenches[h], math.inf)
-            torques = joints.pop(place.limb, capped[:0])
-            used.append((np.concatenate((capped, torques, -torques))[None], each[[h]]))
-            signs.append((-none[None], each[[h]]))
-        self.idle = max((float(np.abs(torques).max()) for torques in joints.values()), default=0.0)
+            use = joints.pop(place.limb, JointUse(capped[:0], {}))
+            passive = np.array([*use.passive.values()]) / ARM
+            used.append((np.concatenate((capped, use.shares, -use.shares))[None], each[[h]]))
+            signs.append((np.concatenate((-none, passive, -passive))[None], each[[h]]))
+        self.idle = max((float(np.abs(use.shares).max()) for use in joints.values()), default=0.0)
         parts = [
             *([(own, on_rock)] for own in arrays.loads[touching].T),
             [(arrays.palms[:, ::2], each)],

@@ -369,7 +369,9 @@ def _joint_table(
     table = table_of("limb", numbers=(*(f"{more}{i + 1}" for i in range(columns)), "of", "util"))
     table.padding = 0  # otherwise seven torques do not fit
     for limb, row in torques.items():
-        used = [abs(torque) / limit for torque, limit in zip(row, limits[limb], strict=True)]
+        # a joint without a motor bears nothing of nothing
+        pairs = zip(row, limits[limb], strict=True)
+        used = [abs(torque) / (limit or math.inf) for torque, limit in pairs]
         worst = used.index(max(used))
         cells = [
             f"{torque:z.{0 if abs(torque) >= 1e3 else 1}f}" + ("*" if i == worst else " ")

@@ -355,5 +355,7 @@ def test_given_angles_that_do_not_reach_the_hands_are_refused():
 
 
 def test_joint_loads_of_no_wrench_are_those_of_gravity():
-    loads = JointLoads(("a", "b"), np.array([1.0, -2.0]), np.ones((6, 2)), np.ones(2))
+    loads = JointLoads(
+        ("a", "b"), np.zeros(2, bool), np.array([1.0, -2.0]), np.ones((6, 2)), np.ones(2)
+    )
     np.testing.assert_array_equal(loads.torques(np.zeros(6)), [1.0, -2.0])

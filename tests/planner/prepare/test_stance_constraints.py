@@ -27,7 +27,8 @@ def space() -> WrenchSpace:
 def random_joints(rng: np.random.Generator, count: int = 7) -> JointLoads:
     names = tuple(f"joint{i}" for i in range(count))
     gravity, jacobian = rng.normal(size=count) * 30.0, rng.normal(size=(6, count))
-    return JointLoads(names, gravity, jacobian, rng.uniform(10.0, 200.0, count))
+    sliding = np.zeros(count, dtype=bool)
+    return JointLoads(names, sliding, gravity, jacobian, rng.uniform(10.0, 200.0, count))
 
 
 def random_loads(rng: np.random.Generator) -> np.ndarray:

@@ -190,8 +190,12 @@ def test_what_limbs_share_is_told_with_the_line_that_locks_it():
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('type="revolute"', 'type="prismatic"', "is prismatic; a limb's joints must be revolute"),
         ('link="left_lower"/>', 'link="left_lower"/><mimic joint="a"/>', "follows another (mimic)"),
+        (
+            'link="left_lower"/>',
+            'link="left_lower"/><mimic joint="right_elbow"/>',
+            "follows another (mimic), 'right_elbow', that no motor of this limb moves",
+        ),
     ],
 )
 def test_a_joint_that_no_limb_can_have_is_told_with_what_locks_it(old, new, words):
@@ -266,7 +270,7 @@ def test_bare_numbers_are_in_the_units_of_their_entries():
         ("true", "every_limb.torque_limit: expected object, got bool"),
         ('"80 N·m"', "every_limb.torque_limit: expected object, got str"),
         ("[80.0, true]", "every_limb.torque_limit.value: must be a number or a list of numbers"),
-        ("0", "limbs.leg.torque_limit: must be 0.001 to 1e+06 N·m, got 0"),
+        ("0", "limbs.leg.torque_limit: must be 0.001 to 1e+06 N·m, or in a list 0 for a joint"),
     ],
 )
 def test_what_is_no_bare_number(number, message):
