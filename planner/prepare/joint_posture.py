@@ -78,12 +78,14 @@ def posture(question: Question) -> Posture | None:
     body = stance.body.inverse()
     poses = {hand.limb: body @ hand.pose for hand in stance.hands}
     gravity, acceleration = gravity_and_acceleration(question)
-    if isinstance(stance.joints, str):
-        angles = _solved(question, poses, gravity - acceleration[:3])
-        off = _off(stance, angles, poses)
-        far = {limb: each for limb, each in off.items() if max(each) > EXACT}
-        return replace(posture_at(question, angles), off=far)
-    return posture_at(question, _given(stance, stance.joints, poses))
+    given = _given(stance, poses)
+    asked = {limb: pose for limb, pose in poses.items() if limb in stance.solved_limbs}
+    if not asked:
+        return posture_at(question, given)
+    angles = _solved(question, asked, gravity - acceleration[:3])
+    off = _off(stance, angles, asked)
+    far = {limb: each for limb, each in off.items() if max(each) > EXACT}
+    return replace(posture_at(question, given | angles), off=far)
 
 
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
@@ -140,24 +142,26 @@ def torque_limits(question: Question) -> dict[str, Array]:
     return found
 
 
-def _given(
-    stance: Stance, joints: Mapping[str, Array], poses: Mapping[str, Pose]
-) -> Mapping[str, Array]:
+def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     """Return given angles, which must be possible and where the hands' poses are."""
+    joints, solved = stance.given_joints, stance.solved_limbs
     with within("stance.joints"):
         stance.robot.checked_angles(joints)
     for limb in poses:
-        if limb not in joints:
+        if limb not in joints and limb not in solved:
             raise InvalidInputError(
-                f"missing for {limb}, which holds on; valid are all limbs with a hand, or 'solve'",
+                f"missing for {limb}, which holds on; valid are all limbs with a hand, each with "
+                "angles or 'solve', or 'solve'",
                 field="stance.joints",
             )
-    for i, (limb, (off, turned)) in enumerate(_off(stance, joints, poses).items()):
+    index = {hand.limb: i for i, hand in enumerate(stance.hands)}
+    known = {limb: pose for limb, pose in poses.items() if limb not in solved}
+    for limb, (off, turned) in _off(stance, joints, known).items():
         if off > OFF or turned > TURNED:
             raise InvalidInputError(
                 f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
                 f"up to {OFF:g} m and {TURNED:g} rad are valid",
-                field=f"stance.hands[{i}].pose",
+                field=f"stance.hands[{index[limb]}].pose",
             )
     return joints
 
@@ -182,14 +186,14 @@ def _off(
 
 def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> dict[str, Array]:
     """Return angles for the hands' poses, with low torques where each carries its share."""
-    robot = question.stance.robot
-    force = robot.mass * gravity / len(poses)
+    robot, hands = question.stance.robot, question.stance.hands
+    force = robot.mass * gravity / len(hands)
     shares = {
         limb: np.concatenate([pose.rotation.T @ force, np.zeros(3)]) for limb, pose in poses.items()
     }
     try:
         return solve_limbs(robot, poses, shares, gravity, (OFF, TURNED))
     except UnreachableError as error:
-        index = list(poses).index(next(iter(error.missing)))
+        index = [hand.limb for hand in hands].index(next(iter(error.missing)))
         error.field = f"stance.hands[{index}].pose"
         raise

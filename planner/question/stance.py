@@ -211,16 +211,17 @@ class Stance:
     gravity : ndarray, shape (3,)
         In W [m/s²].
     robot : Robot
-    joints : mapping of str to ndarray, 'solve' or None
-        Angles of each limb's joints [rad], of every limb that holds on at least; or that they are
-        to be found. None: nothing is said of them, and torques do not count.
+    joints : mapping of str to (ndarray or 'solve'), 'solve' or None
+        Angles of each limb's joints [rad], [m] of joints that slide, of every limb that holds on
+        at least; or that they are to be found, of a limb or of all. None: nothing is said of them,
+        and torques do not count.
     """
 
     hands: tuple[HandOnHold, ...]
     body: Pose
     gravity: Array = field(default_factory=lambda: np.array(EARTH))
     robot: Robot = field(default_factory=robosimian)
-    joints: Mapping[str, Array] | Literal["solve"] | None = None
+    joints: Mapping[str, Array | Literal["solve"]] | Literal["solve"] | None = None
 
     def __post_init__(self) -> None:
         self._check_hands()
@@ -233,11 +234,34 @@ class Stance:
         elif self.joints is not None:
             chains = self.robot.chains
             known_limbs(self.joints, self.robot, "joints")
-            joints = {
-                limb: finite_vector(angles, len(chains[limb].joints), f"joints.{limb}")
-                for limb, angles in self.joints.items()
-            }
+            holding = {hand.limb for hand in self.hands}
+            joints: dict[str, Array | Literal["solve"]] = {}
+            for limb, angles in self.joints.items():
+                if not isinstance(angles, str):
+                    count = len(chains[limb].joints)
+                    joints[limb] = finite_vector(angles, count, f"joints.{limb}")
+                elif angles == SOLVE and limb in holding:
+                    joints[limb] = SOLVE
+                else:
+                    raise InvalidInputError(
+                        f"valid are angles or, of a limb that holds on, {SOLVE!r}; got {angles!r}",
+                        field=f"joints.{limb}",
+                    )
             object.__setattr__(self, "joints", joints)
+
+    @property
+    def given_joints(self) -> dict[str, Array]:
+        """Angles that are given, by limb."""
+        joints = {} if self.joints is None or isinstance(self.joints, str) else self.joints
+        return {limb: each for limb, each in joints.items() if not isinstance(each, str)}
+
+    @property
+    def solved_limbs(self) -> frozenset[str]:
+        """Limbs that hold on, and whose angles are to be found."""
+        holding = [hand.limb for hand in self.hands]
+        if self.joints is None or isinstance(self.joints, str):
+            return frozenset(holding if self.joints else ())
+        return frozenset(limb for limb, each in self.joints.items() if isinstance(each, str))
 
     def _check_hands(self) -> None:
         if not self.hands:

@@ -33,6 +33,9 @@ from planner.robots.robot_file import RobotDescription, RobotFile
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
 
+Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
+"""Of limbs' joints, by limb [rad]."""
+
 BEYOND: Final = 1e-6
 """How far an angle may be beyond its joint's limit [rad, or m]: what is left of it in seven
 digits."""
@@ -166,14 +169,20 @@ class Robot:
             self._local.data = self.model.createData()
             return self._local.data
 
-    def configuration(self, angles: Mapping[str, Array]) -> Array:
-        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin."""
-        q = np.array(pin.neutral(self.model))
+    def configuration(self, angles: Angles) -> Array:
+        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin.
+
+        Raises
+        ------
+        InvalidInputError
+            If the joints cannot be there; see `checked_angles`.
+        """
+        q, known = np.array(pin.neutral(self.model)), self.checked_angles(angles)
         for limb, chain in self.chains.items():
-            chain.turn(q, angles.get(limb, chain.rest))
+            chain.turn(q, known.get(limb, chain.rest))
         return q
 
-    def checked_angles(self, angles: Mapping[str, Sequence[float] | Array]) -> dict[str, Array]:
+    def checked_angles(self, angles: Angles) -> dict[str, Array]:
         """Return angles of limbs, if the joints can be there.
 
         Raises
@@ -199,7 +208,7 @@ class Robot:
                 )
         return found
 
-    def hand_poses(self, angles: Mapping[str, Sequence[float] | Array]) -> dict[str, Pose]:
+    def hand_poses(self, angles: Angles) -> dict[str, Pose]:
         """Return every limb's H in B.
 
         Raises
@@ -207,17 +216,16 @@ class Robot:
         InvalidInputError
             If the joints cannot be there; see `checked_angles`.
         """
-        angles = self.checked_angles(angles)
         return {limb: pose for limb, (pose, _) in self.kinematics(angles).items()}
 
-    def jacobians(self, angles: Mapping[str, Array]) -> dict[str, Array]:
+    def jacobians(self, angles: Angles) -> dict[str, Array]:
         """Return every limb's Jacobian, shape (6, n) [m/rad, 1].
 
         It turns the joints' rates into the twist of H against B in H's axes, linear part first.
         """
         return {limb: jacobian for limb, (_, jacobian) in self.kinematics(angles).items()}
 
-    def kinematics(self, angles: Mapping[str, Array]) -> dict[str, tuple[Pose, Array]]:
+    def kinematics(self, angles: Angles) -> dict[str, tuple[Pose, Array]]:
         """Return H in B and the Jacobian of each limb, from one pass."""
         model, data = self.model, self.data
         pin.computeJointJacobians(model, data, self.configuration(angles))
@@ -230,7 +238,7 @@ class Robot:
 
     def statics(
         self,
-        angles: Mapping[str, Array],
+        angles: Angles,
         gravity: Array,
         acceleration: Array | None = None,
     ) -> Statics:
@@ -265,7 +273,7 @@ class Robot:
         rates[:6] = self._to_body.T @ spatial
         return rates
 
-    def com_at(self, angles: Mapping[str, Array]) -> Array:
+    def com_at(self, angles: Angles) -> Array:
         """Return the centre of mass of the robot with its hands in B, shape (3,) [m]."""
         centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))
         return self._from_root.apply(np.array(centre))
@@ -281,7 +289,7 @@ class Robot:
         count = int((self.capsules.steps == 0).sum())
         return self._from_root.apply(self.capsules.ends[:count]), self.capsules.radii[:count]
 
-    def placed_capsules(self, angles: Mapping[str, Array]) -> Array:
+    def placed_capsules(self, angles: Angles) -> Array:
         """Return the segments of all `capsules` in B, shape (n, 2, 3) [m]."""
         data = self.data
         pin.forwardKinematics(self.model, data, self.configuration(angles))
@@ -289,7 +297,7 @@ class Robot:
         placed = [pose.apply(pair) for pose, pair in zip(moved, self.capsules.ends, strict=True)]
         return self._from_root.apply(np.array(placed).reshape(-1, 2, 3))
 
-    def link_chain(self, angles: Mapping[str, Array], limb: str) -> Array:
+    def link_chain(self, angles: Angles, limb: str) -> Array:
         """Return the places in B of a limb's joints and of its H, shape (n + 1, 3) [m]."""
         data, chain = self.data, self.chains[limb]
         pin.framesForwardKinematics(self.model, data, self.configuration(angles))

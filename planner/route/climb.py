@@ -9,12 +9,12 @@ the limb lifts (a stance without that hand); then it takes the new hold:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Literal
 
-from hand_models.base import InvalidInputError, Pose, within
+from hand_models.base import Array, InvalidInputError, Pose, within
 from hand_models.parameters import Draw
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
@@ -26,6 +26,9 @@ from planner.solving import plan
 __all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "evaluate"]
 
 Phase = Literal["start", "shift", "lift", "place"]
+
+JointAngles = Array | Literal["solve"]
+"""Of a limb [rad], or that they are to be found."""
 
 WORTH_A_PROCESS: Final = 40
 """Stages below this many are planned faster here than in processes that must first start."""
@@ -44,10 +47,15 @@ class Move:
         The limb on its new hold.
     body : Pose, optional
         Where the body shifts to first, on the hands it has; B in W.
+    joints : mapping of str to (ndarray or 'solve'), or 'solve'
+        Of a route with joints: angles by limb [rad], of those on the rock from the shift on, of the
+        limb that moves on its new hold. Limbs left out keep theirs, unless the body shifts or they
+        move: then they are found.
     """
 
     hand: HandOnHold
     body: Pose | None = None
+    joints: Mapping[str, JointAngles] | Literal["solve"] = SOLVE
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +203,6 @@ def stages(route: Route) -> Iterator[RouteStage]:
         If a move's limb holds nothing to start with, or is the only one that does, or a hand
         cannot be where it is; the field is relative to the route.
     """
-    if route.start.joints not in (None, SOLVE):
-        raise InvalidInputError(
-            f"the joints change with every move; valid is {SOLVE!r}, or none", field="stance.joints"
-        )
     hands = {hand.limb: hand for hand in route.start.hands}
     for limb in route.limits.per_hand:
         if limb not in hands:
@@ -209,16 +213,19 @@ def stages(route: Route) -> Iterator[RouteStage]:
     body = route.start.body
     told = {hand.limb: f"stance.hands[{i}]" for i, hand in enumerate(route.start.hands)}
     body_told = "stance.body"
+    joints = _joints_of(route.start)
+    joints_told = {limb: f"stance.joints.{limb}" for limb in route.start.given_joints}
     index = 0
 
     def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> RouteStage:
         paths = {f"hands[{i}]": told[hand.limb] for i, hand in enumerate(held)}
-        paths["body"] = body_told
+        paths |= {"body": body_told} | {f"joints.{limb}": at for limb, at in joints_told.items()}
+        on_rock = {hand.limb for hand in held}
         try:
-            stance = replace(route.start, hands=tuple(held), body=body)
+            angles = None if joints is None else _on_rock(joints, on_rock)
+            stance = replace(route.start, hands=tuple(held), body=body, joints=angles)
         except InvalidInputError as error:
             raise _in_route(error, paths) from None
-        on_rock = {hand.limb for hand in held}
         caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
         question = Question(
             stance,
@@ -243,6 +250,17 @@ def stages(route: Route) -> Iterator[RouteStage]:
             raise InvalidInputError(
                 "the only hand on the rock cannot lift", field=f"moves[{number - 1}].limb"
             )
+        given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
+        if joints is None and given:
+            raise InvalidInputError(
+                "the start stance says nothing of joints; give stance.joints, or 'solve' there",
+                field=f"moves[{number - 1}].joints",
+            )
+        joints_told |= {each: f"moves[{number - 1}].joints.{each}" for each in given}
+        if joints is not None:
+            if move.body is not None:
+                joints |= dict.fromkeys(hands, SOLVE)
+            joints |= {each: angles for each, angles in given.items() if each != limb}
         if move.body is not None:
             body, body_told = move.body, f"moves[{number - 1}].body"
             index += 1
@@ -250,8 +268,30 @@ def stages(route: Route) -> Iterator[RouteStage]:
         index += 1
         yield stage(number, "lift", limb, [hand for hand in hands.values() if hand.limb != limb])
         hands[limb], told[limb] = move.hand, f"moves[{number - 1}]"
+        if joints is not None:
+            joints[limb] = given.get(limb, SOLVE)
         index += 1
         yield stage(number, "place", limb, list(hands.values()))
+
+
+def _joints_of(start: Stance) -> dict[str, JointAngles] | None:
+    """Return the joints of a start stance limb by limb; None where nothing is said of them."""
+    if start.joints is None:
+        return None
+    found: dict[str, JointAngles] = dict.fromkeys(start.solved_limbs, SOLVE)
+    return found | start.given_joints
+
+
+def _on_rock(
+    joints: Mapping[str, JointAngles], limbs: Collection[str]
+) -> Mapping[str, JointAngles] | Literal["solve"]:
+    """Return the joints of a stage; of limbs in the air there is nothing to find."""
+    found = {
+        limb: angles
+        for limb, angles in joints.items()
+        if limb in limbs or not isinstance(angles, str)
+    }
+    return found if any(not isinstance(angles, str) for angles in found.values()) else SOLVE
 
 
 def evaluate(
@@ -314,8 +354,9 @@ def _in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInpu
     """Return the error of a stage's question with its field as the route tells it."""
     place = (error.field or "").removeprefix("stance.")
     for part, path in paths.items():
-        if place == part or place.startswith(f"{part}."):
-            error.field = path + place.removeprefix(part)
+        rest = place.removeprefix(part)
+        if place.startswith(part) and rest[:1] in ("", ".", "["):
+            error.field = path + rest
     return error
 
 

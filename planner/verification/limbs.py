@@ -144,7 +144,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
     most_off, most_turned = PLACED
-    solved = isinstance(stance.joints, str)
+    solved, told_angles = stance.solved_limbs, stance.given_joints
     body = stance.body.inverse()
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
@@ -157,7 +157,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
         told_off, told_turned = where.off.get(place.limb, (0.0, 0.0))
         near = off <= most_off and turned <= most_turned
         told = abs(off - told_off) <= TOLD and abs(turned - told_turned) <= TOLD
-        if not (near and (told or not solved)):
+        if not (near and (told or place.limb not in solved)):
             found.append(
                 f"{place.limb}: its joints put the hand {off:.3g} m and {turned:.3g} rad from its "
                 "pose"
@@ -167,8 +167,8 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
         beyond = np.maximum(chain.lower - angles, angles - chain.upper)
         if not float(beyond.max()) <= BEYOND:
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
-        if not isinstance(stance.joints, str | None):
-            given = stance.joints.get(limb, np.clip(0.0, chain.lower, chain.upper))
+        if limb not in solved:
+            given = told_angles.get(limb, np.clip(0.0, chain.lower, chain.upper))
             if not np.array_equal(given, angles):
                 found.append(f"{limb}: its joints are not at the angles that were given")
 

@@ -97,10 +97,11 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     kind = start.robot.hand
     moved = [_hand(move, kind.table, rocks, f"moves[{i}]") for i, move in enumerate(request.moves)]
     bodies = [pose_of(move.body, f"moves[{i}].body") for i, move in enumerate(request.moves)]
+    angles = [_joints(move.joints) or "solve" for move in request.moves]
     return Route(
         name=request.name,
         start=start,
-        moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies)),
+        moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies, angles)),
         load=_load(request.load),
         limits=_limits(request.limits),
         objective=request.objective,
@@ -142,11 +143,14 @@ def _stance(message: requests.Stance, robots: Robots) -> tuple[Stance, Rocks]:
 
 
 def _joints(
-    message: dict[str, list[float]] | Literal["solve"] | None,
-) -> dict[str, Array] | Literal["solve"] | None:
+    message: dict[str, list[float] | Literal["solve"]] | Literal["solve"] | None,
+) -> dict[str, Array | Literal["solve"]] | Literal["solve"] | None:
     if not isinstance(message, dict):
         return message
-    return {limb: np.array(angles) for limb, angles in message.items()}
+    return {
+        limb: angles if isinstance(angles, str) else np.array(angles)
+        for limb, angles in message.items()
+    }
 
 
 def _load(message: requests.Load | None) -> Load:

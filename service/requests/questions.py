@@ -28,7 +28,7 @@ from service.requests.request import (
     Tensions,
     Wrench,
 )
-from service.requests.stance import Entries, Hand, HandEntries, Stance
+from service.requests.stance import Angles, Entries, Hand, HandEntries, Stance
 
 __all__ = [
     "Axis",
@@ -273,6 +273,14 @@ class Move(Hand, frozen=True, kw_only=True):
     body: Annotated[
         Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
     ] = None
+    joints: Annotated[
+        dict[Name, Angles | Literal["solve"]] | Literal["solve"],
+        Meta(
+            description="of a start stance with joints, angles by limb: of those on the rock from "
+            "the shift on, of the limb that moves on its new hold. Limbs left out keep theirs, "
+            "unless the body shifts or they move: then they are found"
+        ),
+    ] = "solve"
 
 
 class RouteRequest(Request, frozen=True, kw_only=True):

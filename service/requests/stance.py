@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta
 
@@ -22,13 +22,20 @@ from service.requests.request import (
 )
 
 __all__ = [
+    "Angles",
     "Grasp",
     "Hand",
     "Place",
     "Stance",
 ]
 
-OuterRotation = Annotated[float, Meta(ge=0.0, le=math.pi + 1e-6, description="[rad]")]
+ROUNDED: Final = 5e-4
+"""How far above π an outer rotation may be, as π rounded to three decimals is [rad]."""
+
+OuterRotation = Annotated[
+    float,
+    Meta(ge=0.0, le=math.pi + ROUNDED, description="[rad]; what rounding puts above π is π"),
+]
 Preload = Annotated[
     FourTensions,
     Meta(
@@ -41,7 +48,11 @@ Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
 Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="not zero")]
 Angles = Annotated[
     list[Angle],
-    Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [rad]"),
+    Meta(
+        min_length=1,
+        max_length=64,
+        description="of a limb's joints from the body outward [rad; m of joints that slide]",
+    ),
 ]
 Entries = Annotated[
     dict[Name, Any],
@@ -150,10 +161,11 @@ class Stance(Strict, frozen=True, kw_only=True):
     gravity: Acceleration | None = None
     body: Annotated[Pose, Meta(description="of B in W")]
     joints: Annotated[
-        dict[Name, Angles] | Literal["solve"] | None,
+        dict[Name, Angles | Literal["solve"]] | Literal["solve"] | None,
         Meta(
-            description="angles of every limb with a hand, or that inverse kinematics finds them; "
-            "either way hands may be 10 mm and 0.05 rad off; with joints their torques count"
+            description="angles of every limb with a hand, or that inverse kinematics finds them, "
+            "of a limb or of all; either way hands may be 10 mm and 0.05 rad off; with joints "
+            "their torques count"
         ),
     ] = None
     rocks: Annotated[

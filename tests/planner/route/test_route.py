@@ -400,13 +400,6 @@ def test_a_stage_that_no_joints_reach_is_marked_and_the_climb_goes_on(route, tmp
     assert files["picture"].read_bytes().startswith(PNG)
 
 
-def test_the_joints_of_a_route_are_not_given_for_one_stance(route):
-    angles = {limb: np.zeros(7) for limb in route.start.robot.limbs}
-    with pytest.raises(InvalidInputError, match="change with every move") as caught:
-        evaluate(replace(route, start=replace(route.start, joints=angles)))
-    assert caught.value.field == "stance.joints"
-
-
 def test_a_hands_cap_counts_in_every_stage_where_it_holds_on(route):
     lifted = route.moves[0].hand.limb
     cap = {lifted: ForceCap(200.0)}
