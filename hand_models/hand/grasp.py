@@ -13,6 +13,9 @@ __all__ = ["Grasp"]
 OPPOSED: Final = 1e-6
 """How close to π an outer rotation counts as a pinch [rad]."""
 
+ROUNDED: Final = 5e-4
+"""How far above π an outer rotation is taken for it [rad]: π rounded to three decimals is."""
+
 
 @dataclass(frozen=True)
 class Grasp:
@@ -21,7 +24,7 @@ class Grasp:
     Attributes
     ----------
     outer_rotation : float
-        Of the outer fingers, in [0, π] [rad].
+        Of the outer fingers, in [0, π] [rad]; up to `ROUNDED` above is π.
     closing_tension : float, optional
         Of each tendon at the moment the tiles caught the rock [N]; the parameter file's default.
     palm : bool
@@ -39,10 +42,11 @@ class Grasp:
     fingernail: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.outer_rotation <= math.pi + OPPOSED:
+        if not 0.0 <= self.outer_rotation <= math.pi + ROUNDED:
             raise InvalidInputError(
                 f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
             )
+        object.__setattr__(self, "outer_rotation", min(self.outer_rotation, math.pi))
         if self.closing_tension is not None:
             check_positive(self.closing_tension, "N", "closing_tension")
 

@@ -91,7 +91,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @click.option(
     "--outer-rotation",
     "rotations",
-    type=FiniteRange(0.0, math.pi + 1e-6),
+    type=FiniteRange(0.0, math.pi + 5e-4),
     multiple=True,
     default=(0.0, math.pi),
     show_default="0 and π",

@@ -253,6 +253,29 @@ def test_impossible_grasps_are_refused_by_field(values, field):
     assert caught.value.field == field
 
 
+@pytest.mark.parametrize(
+    "rounded", [3.142, 3.1416, 3.141593, 3.1415927, 3.14159266, math.pi, math.pi + 4e-4]
+)
+def test_half_a_turn_that_is_rounded_up_is_half_a_turn(rounded):
+    grasp = Grasp(rounded)
+    assert grasp == Grasp(math.pi)
+    assert grasp.pinch
+    assert HAND.settle(Cylinder(0.3), ROCK, grasp).positions.tolist() == (
+        HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi)).positions.tolist()
+    )
+
+
+@pytest.mark.parametrize("angle", [3.1, 3.14, 3.141, 3.1415, 3.14159])
+def test_what_is_rounded_down_stays_as_it_is(angle):
+    assert Grasp(angle).outer_rotation == angle
+
+
+@pytest.mark.parametrize("angle", [3.143, 3.15, 3.16, 22.0 / 7.0, 180.0, math.pi + 6e-4])
+def test_beyond_that_it_is_refused(angle):
+    with pytest.raises(InvalidInputError, match="must be in"):
+        Grasp(angle)
+
+
 def test_a_base_tile_fades_with_its_distance_from_the_rock():
     """From rock that stands through its plane, within the spines' travel too, to beyond it."""
     found, offs = [], np.linspace(-2e-4, 6e-3, 125)
