@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.parameters import ParameterTable
@@ -45,6 +46,8 @@ class Capsules(NamedTuple):
         Of their segments, in these joints' frames [m].
     radii : ndarray, shape (n,)
         [m]
+    assumed : ndarray of bool, shape (n,)
+        Whether the radius is in no file of the robot, but assumed.
     """
 
     names: tuple[str, ...]
@@ -53,6 +56,7 @@ class Capsules(NamedTuple):
     joints: Indices
     ends: Array
     radii: Array
+    assumed: NDArray[np.bool_]
 
 
 class _Capsule(NamedTuple):
@@ -62,6 +66,7 @@ class _Capsule(NamedTuple):
     joint: int
     ends: Array
     radius: float
+    assumed: bool = False
 
 
 def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Chain]) -> Capsules:
@@ -74,15 +79,16 @@ def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Ch
     found = list(_given(model, described, places))
     known = {capsule.joint for capsule in found}
     for limb, chain in chains.items():
-        radius = described.mounts[limb].radius
-        radius = _default_radius() if radius is None else radius
+        known_radius = described.mounts[limb].radius
+        assumed = known_radius is None
+        radius = _default_radius() if known_radius is None else known_radius
         link = model.frames[model.getFrameId(described.mounts[limb].link, pin.FrameType.BODY)]
         steps = [model.jointPlacements[joint].translation for joint in chain.ids[1:]]
         tips = zip(chain.ids, [*steps, link.placement.translation], strict=True)
         for step, (joint, tip) in enumerate(tips, start=1):
             if joint not in known:
                 name, segment = chain.moving[step - 1], np.array([np.zeros(3), tip])
-                found.append(_Capsule(name, limb, step, joint, segment, radius))
+                found.append(_Capsule(name, limb, step, joint, segment, radius, assumed))
     order = [None, *chains]
     found.sort(key=lambda each: (order.index(each.limb), each.step))
     return Capsules(
@@ -92,6 +98,7 @@ def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Ch
         joints=np.array([each.joint for each in found], dtype=np.intp),
         ends=np.array([each.ends for each in found]).reshape(-1, 2, 3),
         radii=np.array([each.radius for each in found], dtype=float),
+        assumed=np.array([each.assumed for each in found], dtype=bool),
     )
 
 

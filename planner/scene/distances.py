@@ -106,12 +106,14 @@ def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, .
         "link_in_rock": _with_rock(scene, moving, rock_solids(scene)),
         "links_collide": _among_links(scene, links, hands),
     }
-    solved = isinstance(scene.stance.joints, str)
+    stance = scene.stance
+    one_by_one = () if isinstance(stance.joints, str) else {*robot.limbs} - stance.solved_limbs
     found: dict[tuple[str, ...], _Near] = {}
     for kind, pairs in asked.items():
         for near in _inside(pairs):
             limbs = [owners.get(solid.name) for solid in (near.first, near.second)]
-            key = (kind, *([] if solved else sorted(limb for limb in limbs if limb is not None)))
+            given = [limb for limb in limbs if limb is not None and limb in one_by_one]
+            key = (kind, *sorted(given))
             if key not in found or near.distance < found[key].distance:
                 found[key] = near
     return tuple(_link_finding(*key[:2], near=near) for key, near in found.items())
@@ -119,10 +121,21 @@ def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, .
 
 def _link_finding(kind: str, limb: str | None = None, *, near: _Near) -> Finding:
     """Return what is said of a link; ``limb``: whose, where its joints were given."""
-    field, slip = "stance.joints", "'solve' looks at the hands alone; give angles that keep clear"
+    field = "stance.joints"
+    slip = (
+        "'solve' looks at the hands alone; give angles that keep clear, of a route in "
+        "moves[].joints, too"
+    )
     if limb is not None:
         field, slip = f"stance.joints.{limb}", "are its angles in rad, from the body outward?"
-    deep = -near.distance
+    deep, assumed = -near.distance, near.first.assumed + near.second.assumed
+    if deep <= assumed:
+        # thinner links would be clear of each other
+        thick = max(near.first.assumed, near.second.assumed)
+        slip = (
+            f"links are taken to have a radius of {1e3 * thick:g} mm, as the robot's file says "
+            "nothing of it; give their capsules there, or the limb's radius"
+        )
     message = f"{near.first.name} is {deep:.2g} m in {near.second.name}: {slip}"
     return Finding(kind, field, message, deep, "m")
 
@@ -140,7 +153,10 @@ def _links(scene: Scene, angles: Mapping[str, Array]) -> tuple[Solid, ...]:
     robot = scene.stance.robot
     named = zip(robot.capsules.names, robot.capsules.limbs, strict=True)
     names = [BODY if limb is None else name for name, limb in named]
-    return capsule_solids(names, robot.placed_capsules(angles), robot.capsules.radii)
+    radii = robot.capsules.radii
+    solids = capsule_solids(names, robot.placed_capsules(angles), radii)
+    assumed = (radii * robot.capsules.assumed).tolist()
+    return tuple([each._replace(assumed=by) for each, by in zip(solids, assumed, strict=True)])
 
 
 # Pairs of them ------------------------------------------------------------------------------------

@@ -46,6 +46,8 @@ class Solid(NamedTuple):
         Of a ball about it, in B [m].
     bound : float
         Radius of that ball; infinite for rock [m].
+    assumed : float
+        How much of its thickness is in no file of the robot, but assumed [m].
     """
 
     name: str
@@ -53,6 +55,7 @@ class Solid(NamedTuple):
     place: Any
     middle: Array
     bound: float
+    assumed: float = 0.0
 
 
 def capsule_solids(names: Iterable[str], ends: Array, radii: Array) -> tuple[Solid, ...]:

@@ -11,7 +11,7 @@ from hand_models.rock import Cylinder, Edge, Ellipsoid, Mesh, Plane, Profile, Sp
 from planner.prepare import posture
 from planner.prepare.settled_stance import settle_stance
 from planner.question import Question, Stance
-from planner.robots import robosimian
+from planner.robots import Robot, robosimian
 from planner.scene import clearance, link_findings, scene_of
 from planner.solving import plan
 from service.answering.questions import question
@@ -210,3 +210,45 @@ def test_links_in_rock_are_told_by_limb_for_given_joints_and_once_for_solved_one
     (told,) = [each for each in link_findings(solved, angles) if each.kind == "link_in_rock"]
     assert told.field == "stance.joints"
     assert told.value == max(each.value for each in given)
+
+
+def thin(radius=None):
+    """RoboSimian without capsules of its own: links of a radius, by default the assumed one."""
+    own = robosimian()
+    mounts = {limb: replace(mount, radius=radius) for limb, mount in own.description.mounts.items()}
+    return Robot(replace(own.description, mounts=mounts, capsules={}), own.urdf, own.hand)
+
+
+def beside_a_wall(robot, below):
+    """The findings of links that are level, so far above the middle of their joints' lines."""
+    angles = {limb: np.zeros(7) for limb in robot.limbs}
+    stance = at_joints(robot, angles, ("front_right",), hold=Plane())
+    lowest = min(robot.link_chain(angles, limb)[:-1, 2].min() for limb in robot.limbs)
+    wall = Pose(np.array([0.0, 0.0, lowest - below]), np.diag([1.0, -1.0, -1.0]))
+    there = replace(scene(stance), rocks=(wall.inverse(),))
+    return [each for each in link_findings(there, angles) if each.kind == "link_in_rock"]
+
+
+@pytest.mark.parametrize("below", [0.001, 0.005, 0.01, 0.015, 0.02, 0.025])
+def test_a_radius_that_is_assumed_is_named_where_it_is_the_cause(below):
+    found = beside_a_wall(thin(), below)
+    assert found
+    for each in found:
+        assert "links are taken to have a radius of 50 mm" in each.message
+        assert "capsules there, or the limb's radius" in each.message
+        assert "in rad" not in each.message
+
+
+@pytest.mark.parametrize(
+    ("radius", "below"), [(None, -0.03), (None, -0.1), (0.05, 0.01), (0.05, -0.03), (0.08, 0.02)]
+)
+def test_it_is_not_where_it_is_known_or_where_angles_are_wrong_without_it(radius, below):
+    found = beside_a_wall(thin(radius), below)
+    assert found
+    # thicker links may have others near the same wall
+    worst = max(found, key=lambda each: each.value)
+    assert "are its angles in rad, from the body outward?" in worst.message
+
+
+def test_links_that_are_as_thin_as_they_are_known_to_be_are_clear():
+    assert beside_a_wall(thin(0.01), 0.02) == []
