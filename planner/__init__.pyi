@@ -75,6 +75,7 @@ from .result import (
     WristPlan as WristPlan,
 )
 from .robots import (
+    Payload as Payload,
     Robot as Robot,
     RobotFile as RobotFile,
     robosimian as robosimian,

@@ -302,9 +302,7 @@ class BodySearch:
         question, where = self.prepared.question, self.prepared.where
         if question.load.com is not None:
             return np.array(question.load.com)
-        robot = question.stance.robot
-        own = where is not None and question.load.own
-        return robot.com_at(where.angles) if own and where is not None else np.asarray(robot.com)
+        return question.stance.robot.com if where is None else where.weights.com
 
     def _change(self, shift: Array, tilt: _Tilt) -> Change:
         stance = self.prepared.question.stance

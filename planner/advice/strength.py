@@ -95,13 +95,10 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
     ``factor``: the load factor, if there is one.
     """
     question = trials.question
-    load, where = question.load, trials.base.prepared.where
+    load = question.load
     if question.body_wrench is not None or factor is None or any(load.angular_acceleration):
         return []
     mass = question.stance.robot.mass if load.mass is None else load.mass
-    com = load.com
-    if where is not None and load.own:
-        com = tuple(question.stance.robot.com_at(where.angles).tolist())
     found: list[Tried] = []
     low, high = 0.0, min(factor, 1.0)
     share = high * (1.0 - WITHIN)
@@ -109,8 +106,6 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
         if share < LIGHTEST:
             break
         changes: dict[str, Any] = {"load.mass": share * mass}
-        if com is not None:
-            changes["load.com"] = list(com)
         words = f"let the body weigh {share * mass:.1f} kg, not {mass:.1f} kg"
         size = -math.log(share) / UNIT
         tried = trials.of([Change("mass", (), words, changes, size)])

@@ -244,17 +244,17 @@ def _with_idle(data: StanceData, question: Question, where: Posture | None) -> S
 def _motion(question: Question, where: Posture | None, point: LinearisationPoint) -> Motion | None:
     """Return how acceleration enters a question; None if its body wrench is given.
 
-    Angular acceleration is known only for the robot's own weight at known joints.
+    Angular acceleration is known only at known joints, without a centre of mass that is given.
     """
     if question.body_wrench is not None:
         return None
-    count = 6 if where is not None and question.load.own else 3
+    count = 6 if where is not None and question.load.com is None else 3
     found = []
     for x, y, z, *turning in np.vstack([np.zeros(6), np.eye(6)[:count]]).tolist():
         load = replace(question.load, acceleration=(x, y, z), angular_acceleration=(*turning,))
         moving = replace(question, load=load)
         there = None if where is None else posture_at(moving, where.angles)
-        wrench = moving.needed_wrench(None if there is None else there.body_wrench)
+        wrench = moving.needed_wrench(None if there is None else there.weights)
         _, hands = assemble(moving, there, wrench)
         found.append(_with_idle(hands.sets(point).data, moving, there))
     rest, *others = found

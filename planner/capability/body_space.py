@@ -205,7 +205,7 @@ class BodySpace:
 
     @property
     def turns(self) -> bool:
-        """Whether angular accelerations can be told, too: for the robot's own load and joints."""
+        """Whether angular accelerations can be told, too: with joints, and no com of a load."""
         motion = self._programs.motion
         return motion is not None and motion.wrench.shape[1] == 6
 
@@ -269,7 +269,7 @@ class BodySpace:
         if len(direction) not in (3, k):
             raise InvalidInputError(
                 f"{' or '.join(str(n) for n in sorted({3, k}))} components are needed, got "
-                f"{len(direction)}; angular ones need joints and the robot's own load",
+                f"{len(direction)}; angular ones need joints, and no com of a load",
                 field="direction",
             )
         size_of(direction)

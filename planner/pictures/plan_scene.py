@@ -317,8 +317,8 @@ def _load(plan: Plan, question: Question) -> DrawnLoad:
     stance, load = question.stance, question.load
     robot, turn = stance.robot, stance.body.rotation
     com = robot.com if plan.joints is None else robot.com_at(plan.joints)
-    if question.body_wrench is None and not load.own:
-        com = robot.com if load.com is None else np.asarray(load.com)
+    if question.body_wrench is None and load.com is not None:
+        com = np.asarray(load.com)
     force, moment = -plan.body_wrench[:3], -plan.body_wrench[3:]
     moment = moment - np.cross(com, force)
     weight = robot.mass * turn.T @ stance.gravity

@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 import scipy
 
-from hand_models.base import Array, InvalidInputError, Pose, within
+from hand_models.base import Array, InvalidInputError, Pose, within, wrench_transport
 from planner.prepare.stance_constraints import JointLoads
-from planner.question import Question, Stance
-from planner.robots import UnreachableError, solve_limbs
+from planner.question import Question, Stance, Weights
+from planner.robots import UnreachableError, held_up, solve_limbs
 
 __all__ = ["Posture", "posture"]
 
@@ -42,8 +42,8 @@ class Posture:
         Of every limb [rad].
     joints : mapping of str to JointLoads
         What every limb's joints bear.
-    body_wrench : ndarray, shape (6,)
-        That the rock must exert on the robot for its own weight and acceleration, in B.
+    weights : Weights
+        What the robot and its payloads weigh there.
     off : mapping of str to tuple of float, float
         By limb, of those whose pose no joint angles were found for, only some near it: how far its
         hand is off there [m], and by how much it is turned [rad].
@@ -51,7 +51,7 @@ class Posture:
 
     angles: Mapping[str, Array]
     joints: Mapping[str, JointLoads]
-    body_wrench: Array
+    weights: Weights
     off: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def idle(self, stance: Stance) -> dict[str, JointLoads]:
@@ -77,27 +77,39 @@ def posture(question: Question) -> Posture | None:
         return None
     body = stance.body.inverse()
     poses = {hand.limb: body @ hand.pose for hand in stance.hands}
-    gravity, acceleration = gravity_and_acceleration(question)
     given = _given(stance, poses)
     asked = {limb: pose for limb, pose in poses.items() if limb in stance.solved_limbs}
     if not asked:
         return posture_at(question, given)
-    angles = _solved(question, asked, gravity - acceleration[:3])
+    angles = _solved(question, asked)
     off = _off(stance, angles, asked)
     far = {limb: each for limb, each in off.items() if max(each) > EXACT}
     return replace(posture_at(question, given | angles), off=far)
 
 
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
-    """Return what the joints bear at these angles; limbs left out are at rest."""
-    robot = question.stance.robot
-    gravity, acceleration = gravity_and_acceleration(question)
+    """Return what the joints bear at these angles; limbs left out are at rest.
+
+    Hands act on the rock where the stance has them, also where the joints put them a little off:
+    what balances the body and what the joints bear are wrenches at one pose.
+    """
+    stance, robot, load = question.stance, question.stance.robot, question.load
     whole = {
         limb: np.asarray(angles.get(limb, chain.rest), dtype=float)
         for limb, chain in robot.chains.items()
     }
-    statics = robot.statics(whole, gravity, acceleration)
-    jacobians = robot.jacobians(whole)
+    with within("load"):
+        linear, angular = load.motion(stance)
+        carriers = robot.carriers(whole, load.payloads)
+    statics = robot.statics(whole, -linear, np.concatenate([np.zeros(3), angular]))
+    torques, jacobians = statics.joint_torque, _jacobians_at(stance, whole)
+    places = []
+    for payload, (pose, motions) in zip(load.payloads, carriers, strict=True):
+        places.append(pose.apply(np.array(payload.com)))
+        wrench = held_up(payload.mass, places[-1], linear, angular)
+        local = wrench_transport(pose.inverse()) @ wrench
+        for limb, motion in motions.items():
+            torques[limb] = torques[limb] + motion.T @ local
     limits = torque_limits(question)
     return Posture(
         angles=whole,
@@ -105,28 +117,25 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
             limb: JointLoads(
                 robot.chains[limb].joints,
                 robot.chains[limb].sliding,
-                statics.joint_torque[limb],
+                torques[limb],
                 jacobians[limb],
                 limits[limb],
             )
             for limb in robot.limbs
         },
-        body_wrench=statics.body_wrench,
+        weights=Weights(statics.body_wrench, robot.com_at(whole), np.array(places).reshape(-1, 3)),
     )
 
 
-def gravity_and_acceleration(question: Question) -> tuple[Array, Array]:
-    """Return gravity (3,) and the body's acceleration (6,), linear and angular, in B.
-
-    A body wrench that is given leaves the acceleration open: it counts as none.
-    """
-    turn = question.stance.body.rotation.T
-    acceleration = np.zeros(6)
-    if question.body_wrench is None:
-        load = question.load
-        acceleration[:3] = turn @ np.asarray(load.acceleration)
-        acceleration[3:] = turn @ np.asarray(load.angular_acceleration)
-    return turn @ question.stance.gravity, acceleration
+def _jacobians_at(stance: Stance, angles: Mapping[str, Array]) -> dict[str, Array]:
+    """Return every limb's Jacobian (6, n) of H where the stance has it, fixed to the last link."""
+    found, body = {}, stance.body.inverse()
+    asked = {hand.limb: body @ hand.pose for hand in stance.hands}
+    for limb, (reached, jacobian) in stance.robot.kinematics(angles).items():
+        found[limb] = jacobian
+        if limb in asked:
+            found[limb] = wrench_transport(reached.inverse() @ asked[limb]).T @ jacobian
+    return found
 
 
 def torque_limits(question: Question) -> dict[str, Array]:
@@ -184,8 +193,9 @@ def _off(
     }
 
 
-def _solved(question: Question, poses: Mapping[str, Pose], gravity: Array) -> dict[str, Array]:
+def _solved(question: Question, poses: Mapping[str, Pose]) -> dict[str, Array]:
     """Return angles for the hands' poses, with low torques where each carries its share."""
+    gravity = -question.load.motion(question.stance)[0]
     robot, hands = question.stance.robot, question.stance.hands
     force = robot.mass * gravity / len(hands)
     shares = {

@@ -123,7 +123,7 @@ def prepare_stance(question: Question) -> PreparedStance:
     checked_question(question)
     where = posture(question)
     with within("load"):
-        wrench = question.needed_wrench(None if where is None else where.body_wrench)
+        wrench = question.needed_wrench(None if where is None else where.weights)
     return PreparedStance(question, where, *assemble(question, where, wrench), wrench)
 
 

@@ -3,12 +3,12 @@ from .draws import (
     drawn_hands as drawn_hands,
     drawn_quantities as drawn_quantities,
 )
+from .load import Load as Load, Weights as Weights
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
     BodyRange as BodyRange,
     ForceCap as ForceCap,
     Limits as Limits,
-    Load as Load,
     Objective as Objective,
     Question as Question,
     Want as Want,

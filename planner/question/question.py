@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
-import numpy as np
-
-from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, skew, within
+from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
 from hand_models.hand import FINGERS
 from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
+from planner.question.load import Load, Weights
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Load", "Objective", "Question", "Want"]
+__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Objective", "Question", "Want"]
 
 Frame = Literal["hand", "body", "world"]
 
@@ -25,50 +24,6 @@ FRAMES: Final = get_args(Frame)
 
 LEAST: Final = 1e-3
 """Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
-
-
-@dataclass(frozen=True)
-class Load:
-    """What the body weighs and how it is to move.
-
-    Attributes
-    ----------
-    mass : float, optional
-        [kg]; the robot's own with its hands.
-    com : tuple of float, optional
-        Centre of mass in B [m]; the robot's own.
-    acceleration, angular_acceleration : tuple of float
-        Of the body in W [m/s², rad/s²]; the body does not turn yet. The angular one needs joints,
-        which tell how the robot's mass is spread.
-    """
-
-    mass: float | None = None
-    com: tuple[float, float, float] | None = None
-    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    angular_acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @property
-    def own(self) -> bool:
-        """Whether it is the robot's own weight."""
-        return self.mass is None and self.com is None
-
-    def body_wrench(self, stance: Stance) -> Array:
-        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
-
-        ``f = m (a − g)`` at the centre of mass.
-        """
-        mass = stance.robot.mass if self.mass is None else self.mass
-        check_positive(mass, "kg", "mass")
-        com = finite_vector(stance.robot.com if self.com is None else self.com, 3, "com")
-        acceleration = finite_vector(self.acceleration, 3, "acceleration")
-        if any(self.angular_acceleration):
-            raise InvalidInputError(
-                "needs the stance's joints, and neither mass nor com", field="angular_acceleration"
-            )
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = mass * stance.body.rotation.T @ (acceleration - stance.gravity)
-            moment = skew(com) @ force
-        return checked_body_wrench(np.concatenate([force, moment]), None)
 
 
 @dataclass(frozen=True)
@@ -216,6 +171,8 @@ class Question:
     body_wrench : ndarray, shape (6,), optional
         In B [N, N·m]; computed from ``load`` if it is not given.
     load : Load
+        Its acceleration and payloads count in the joints' torques whether or not the body wrench is
+        given.
     limits : Limits
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance', and 'advice',
@@ -330,16 +287,14 @@ class Question:
                         field=f"limits.joint_torque.{limb}",
                     )
 
-    def needed_wrench(self, own: Array | None = None) -> Array:
+    def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench that is planned for, shape (6,) [N, N·m].
 
         Parameters
         ----------
-        own : ndarray, shape (6,), optional
-            That of the robot's own weight and acceleration, where its joints are known.
+        weights : Weights, optional
+            What the robot weighs, where its joints are known.
         """
         if self.body_wrench is not None:
             return self.body_wrench
-        if own is not None and self.load.own:
-            return checked_body_wrench(own, None)
-        return self.load.body_wrench(self.stance)
+        return self.load.body_wrench(self.stance, weights)

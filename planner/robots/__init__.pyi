@@ -4,6 +4,7 @@ from .inverse_kinematics import (
     solve_limbs as solve_limbs,
 )
 from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
+from .payload import Payload as Payload, held_up as held_up
 from .robot import (
     Robot as Robot,
     robosimian as robosimian,

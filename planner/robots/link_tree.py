@@ -8,12 +8,13 @@ hand.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Pose, turns_about
+from planner.robots.payload import Payload
 from planner.robots.robot import Robot
 from planner.robots.urdf import parse_urdf
 
@@ -31,11 +32,17 @@ class LimbTorques(NamedTuple):
         Of its own weight and acceleration, which the rock must give, in B [N, N·m].
     hands : dict of str to Pose
         H in B.
+    com : ndarray, shape (3,)
+        Centre of mass in B [m].
+    payloads : ndarray, shape (6,)
+        Of the weight and acceleration of its payloads, in B [N, N·m].
     """
 
     torques: dict[str, Array]
     body_wrench: Array
     hands: dict[str, Pose]
+    com: Array
+    payloads: Array
 
 
 class LinkTree:
@@ -97,6 +104,9 @@ class LinkTree:
         wrenches: Mapping[str, Array],
         gravity: Array,
         acceleration: Array,
+        *,
+        held: Mapping[str, Pose] | None = None,
+        payloads: Sequence[Payload] = (),
     ) -> LimbTorques:
         """Return what holds the robot up while its body accelerates and nothing turns yet.
 
@@ -110,6 +120,11 @@ class LinkTree:
             In B [m/s²].
         acceleration : ndarray, shape (6,)
             Of B in B, linear and angular [m/s², rad/s²].
+        held : mapping of str to Pose, optional
+            H in B where hands exert these, fixed to their links; where the joints put it by
+            default.
+        payloads : sequence of Payload
+            What the links carry.
         """
         chains, mounts = self.robot.chains, self.robot.description.mounts
         by_name = {
@@ -128,16 +143,25 @@ class LinkTree:
         linear, angular = acceleration[:3] - gravity, acceleration[3:]
         needed = _moved(masses, coms, linear, angular)
         needed[:, 3:] += inertias @ angular
-        pushed = np.zeros_like(needed)
+        pushed, carried = np.zeros_like(needed), np.zeros_like(needed)
+        moments_of_mass = masses @ coms
         for limb, mount in mounts.items():
             hand, at = hands[limb], index[mount.link]
             com = hand.apply(np.array(mount.hand_com))
             needed[at] += _moved(np.array([self.robot.hand.mass]), com[None], linear, angular)[0]
+            moments_of_mass += self.robot.hand.mass * com
             if limb in wrenches:
+                hand = hand if held is None else held[limb]
                 force, moment = (hand.rotation @ part for part in wrenches[limb].reshape(2, 3))
                 pushed[at, :3] += force
                 pushed[at, 3:] += moment + np.cross(hand.position, force)
-        total = self._beyond @ (needed + pushed)
+        for load in payloads:
+            on_hand = mounts.get(load.limb or "")
+            name = str(load.link) if on_hand is None else on_hand.link
+            frame = places[name] if on_hand is None else places[name] @ on_hand.pose
+            place = frame.apply(np.array(load.com))
+            carried[index[name]] += _moved(np.array([load.mass]), place[None], linear, angular)[0]
+        total = self._beyond @ (needed + pushed + carried)
         moments = total[:, 3:] - np.cross(origins, total[:, :3])
         axes = _turned(turns[1:], np.array([joint.axis for joint in self._joints]))
         # along the axis of a joint that slides, about that of one that turns
@@ -152,6 +176,8 @@ class LinkTree:
             {limb: np.array([torque[name] for name in chains[limb].joints]) for limb in chains},
             needed.sum(axis=0),
             hands,
+            moments_of_mass / (masses.sum() + len(mounts) * self.robot.hand.mass),
+            carried.sum(axis=0),
         )
 
 

@@ -92,9 +92,6 @@ class StreamStance:
         _refuse(question)
         question = replace(question, want=frozenset(), draws=None, present={}, deadline=None)
         known = KnownStance(question)
-        if question.body_wrench is None:
-            # whatever accelerates now does not do so in the wrenches to come
-            known = KnownStance(replace(question, body_wrench=known.prepared.wrench))
         self.known, prepared = known, known.prepared
         self.first = prepared.wrench
         self.cap = question.limits.utilisation
@@ -103,7 +100,8 @@ class StreamStance:
         self.columns = tuple(space.columns for space in spaces)
         self.shape = len(spaces), max(map(len, self.columns))
         reader = LoadRecovery(prepared.batch, spaces)
-        check = Check(prepared.question, prepared.batch, prepared.where)
+        # any wrench, not only that of the load
+        check = Check(prepared.turned(self.first).question, prepared.batch, prepared.where)
         self.check = LoadsCheck(check, reader, self.columns)
         self.drive = prepared.batch.hands[0].hand.drive
         self.winches = _winches(reader, spaces)

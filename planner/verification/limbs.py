@@ -85,9 +85,10 @@ def check_limbs(
     robot = question.stance.robot
     own = _hold_up(question, wrenches, where)
     _check_places(found, question, where, own)
-    if question.body_wrench is None and question.load.own:
-        off = float(np.linalg.norm(body_wrench - own.body_wrench))
-        if not off <= WEIGHT * max(1.0, float(np.linalg.norm(own.body_wrench))):
+    if question.body_wrench is None:
+        needed = _needed(question, own)
+        off = float(np.linalg.norm(body_wrench - needed))
+        if not off <= WEIGHT * max(1.0, float(np.linalg.norm(needed))):
             found.append(f"the robot's weight and acceleration ask for {off:.3g} N or N·m else")
     for limb in robot.limbs:
         said = where.joints[limb]
@@ -126,18 +127,30 @@ def _limits(question: Question, limb: str) -> Array:
 
 
 def _hold_up(question: Question, wrenches: Mapping[str, Array], where: Posture) -> LimbTorques:
-    stance = question.stance
-    into_body = stance.body.rotation.T
-    acceleration = np.zeros((2, 3))
-    if question.body_wrench is None:
-        load = question.load
-        acceleration = np.array([load.acceleration, load.angular_acceleration])
+    stance, load = question.stance, question.load
+    into_body, body = stance.body.rotation.T, stance.body.inverse()
+    acceleration = np.array([load.acceleration, load.angular_acceleration])
     return LinkTree(stance.robot).hold_up(
         where.angles,
         wrenches,
         into_body @ stance.gravity,
         (acceleration @ into_body.T).ravel(),
+        held={place.limb: body @ place.pose for place in stance.hands},
+        payloads=load.payloads,
     )
+
+
+def _needed(question: Question, own: LimbTorques) -> Array:
+    """Return the body wrench of what is carried, in B, shape (6,) [N, N·m]."""
+    stance, load = question.stance, question.load
+    mass, place, found = stance.robot.mass, own.com, own.body_wrench
+    if load.com is not None:
+        mass, place, found = 0.0, np.array(load.com), np.zeros(6)
+    more = (stance.robot.mass if load.mass is None else load.mass) - mass
+    turn = stance.body.rotation
+    force = more * (np.array(load.acceleration) - stance.gravity) @ turn
+    force = force + more * np.cross(np.array(load.angular_acceleration) @ turn, place)
+    return np.asarray(found + own.payloads + np.concatenate([force, np.cross(place, force)]))
 
 
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:

@@ -41,8 +41,7 @@ class LoadsCheck:
     Parameters
     ----------
     check : Check
-        Of plans of the stance, with fixed wrists alone and a body wrench, so that nothing
-        accelerates; without present tensions.
+        Of plans of the stance, with fixed wrists alone and a body wrench; without present tensions.
     reader : LoadRecovery
         Reads the loads of its hands.
     columns : sequence of tuple of str

@@ -23,6 +23,7 @@ from planner import (
     HandOnHold,
     Limits,
     Load,
+    Payload,
     Question,
     Stance,
     settle_each,
@@ -154,7 +155,19 @@ def _joints(
 
 
 def _load(message: requests.Load | None) -> Load:
-    return Load() if message is None else Load(**msgspec.structs.asdict(message))
+    if message is None:
+        return Load()
+    payloads = []
+    for i, each in enumerate(message.payloads):
+        with within(f"load.payloads[{i}]"):
+            payloads.append(Payload(each.mass, each.link, each.limb, each.com))
+    return Load(
+        mass=message.mass,
+        com=message.com,
+        acceleration=message.acceleration,
+        angular_acceleration=message.angular_acceleration,
+        payloads=tuple(payloads),
+    )
 
 
 def _limits(message: requests.Limits) -> Limits:

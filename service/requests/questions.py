@@ -92,16 +92,47 @@ Radius = Annotated[
 ]
 
 
+class Payload(Strict, frozen=True, kw_only=True):
+    """A mass that is fixed to a link, or to a limb's hand, beside the robot's own."""
+
+    mass: Mass
+    link: Annotated[Name | None, Meta(description="of the robot's URDF; give this or limb")] = None
+    limb: Annotated[Name | None, Meta(description="whose hand carries it")] = None
+    com: Annotated[
+        Position, Meta(description="centre of mass, in the link's frame or in H of the hand [m]")
+    ] = (0.0, 0.0, 0.0)
+
+
 class Load(Strict, frozen=True, kw_only=True):
     """What the body weighs and how it is to move; by default the robot's own weight, at rest."""
 
-    mass: Mass | None = None
-    com: Annotated[Position | None, Meta(description="centre of mass in B")] = None
+    mass: Annotated[
+        Mass | None,
+        Meta(
+            description="of the robot with its hands [kg]; its file's by default. A mass alone is "
+            "weighed at the posture's centre of mass where joints are known"
+        ),
+    ] = None
+    com: Annotated[
+        Position | None,
+        Meta(
+            description="centre of mass in B; by default the posture's where joints are known, "
+            "else that of the robot's file"
+        ),
+    ] = None
     acceleration: Acceleration = (0.0, 0.0, 0.0)
     angular_acceleration: Annotated[
         tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
-        Meta(description="in W [rad/s²]; needs the stance's joints"),
+        Meta(description="in W [rad/s²]; needs the stance's joints, and no com"),
     ] = (0.0, 0.0, 0.0)
+    payloads: Annotated[
+        list[Payload],
+        Meta(
+            max_length=64,
+            description="masses on links or in hands, beside mass; they count in the body wrench "
+            "and in the joints' torques",
+        ),
+    ] = []
 
 
 class ForceCap(Strict, frozen=True, kw_only=True):

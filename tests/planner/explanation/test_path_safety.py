@@ -36,7 +36,7 @@ class Peer:
     def __init__(self, question: Question) -> None:
         where = posture(question)
         self.question = question
-        wrench = question.needed_wrench(None if where is None else where.body_wrench)
+        wrench = question.needed_wrench(None if where is None else where.weights)
         _, hands = assemble(question, where, wrench)
         self.sets = list(hands.spaces)
         rows = peer.rows(question, self.sets)

@@ -29,7 +29,7 @@ SEEDS = st.integers(0, 40)
 
 def gathered(question: Question) -> tuple[HandSets, StanceData]:
     where = posture(question)
-    wrench = question.needed_wrench(None if where is None else where.body_wrench)
+    wrench = question.needed_wrench(None if where is None else where.weights)
     _, hands = assemble(question, where, wrench)
     return hands, hands.sets(hands.at_rest(hands.idle)).data
 

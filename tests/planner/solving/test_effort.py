@@ -45,7 +45,7 @@ class Quadratic:
 
     def __init__(self, question: Question) -> None:
         where = posture(question)
-        wrench = question.needed_wrench(None if where is None else where.body_wrench)
+        wrench = question.needed_wrench(None if where is None else where.weights)
         _, self.hands = assemble(question, where, wrench)
         sets = list(self.hands.spaces)
         self.rows = peer.rows(question, sets)

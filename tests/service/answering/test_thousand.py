@@ -49,7 +49,7 @@ def asked(request: dict) -> Question | None:
 def gathered(question: Question) -> tuple[list[WrenchSpace], np.ndarray]:
     """Each hand's set with all its rows, and the body wrench that is needed."""
     where = posture(question)
-    wrench = question.needed_wrench(None if where is None else where.body_wrench)
+    wrench = question.needed_wrench(None if where is None else where.weights)
     _, hands = assemble(question, where, wrench)
     return list(hands.spaces), wrench
 

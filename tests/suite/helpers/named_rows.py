@@ -44,7 +44,7 @@ class NamedRows(NamedTuple):
 def named_rows(question: Question, cap: float | None) -> NamedRows:
     """The rows of a question; what joints, caps and present tensions say is in the hands' sets."""
     where = posture(question)
-    wrench = question.needed_wrench(None if where is None else where.body_wrench)
+    wrench = question.needed_wrench(None if where is None else where.weights)
     _, hands = assemble(question, where, wrench)
     spaces = list(hands.spaces)
     rows = peer.rows(question, spaces)

@@ -1,0 +1,131 @@
+"""What a robot weighs and carries, how it is to move, and the wrench that this takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
+from planner.question.stance import Stance, checked_body_wrench
+from planner.robots import Payload, held_up
+
+__all__ = ["Load", "Weights"]
+
+
+class Weights(NamedTuple):
+    """What a robot weighs where its joints are known.
+
+    Attributes
+    ----------
+    body_wrench : ndarray, shape (6,)
+        That the rock must exert for the weight and acceleration of the robot's own links, in B
+        [N, N·m].
+    com : ndarray, shape (3,)
+        Centre of mass of these, in B [m].
+    payloads : ndarray, shape (p, 3)
+        Places of the load's payloads, in B [m].
+    """
+
+    body_wrench: Array
+    com: Array
+    payloads: Array
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the body weighs and how it is to move.
+
+    Attributes
+    ----------
+    mass : float, optional
+        Of the robot with its hands [kg]; that of its file by default. Where joints are known, what
+        it is above or below that counts at the centre of mass of the posture, on the body.
+    com : tuple of float, optional
+        Centre of mass in B [m]; that of the posture where joints are known, else that of the
+        robot's file.
+    acceleration, angular_acceleration : tuple of float
+        Of the body in W [m/s², rad/s²]; the body does not turn yet. The angular one needs joints,
+        which give how the robot's mass is spread, and no com.
+    payloads : tuple of Payload
+        Masses on links, beside ``mass``.
+    """
+
+    mass: float | None = None
+    com: tuple[float, float, float] | None = None
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular_acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    payloads: tuple[Payload, ...] = ()
+
+    def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:
+        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
+
+        ``f = m (a − g)`` at the centre of mass, and the same of each payload at its place.
+
+        Parameters
+        ----------
+        stance : Stance
+        weights : Weights, optional
+            Where joints are known.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is none, or needs joints that are not known; the field is relative to the
+            load.
+        """
+        own = stance.robot.mass
+        mass = own if self.mass is None else self.mass
+        check_positive(mass, "kg", "mass")
+        given = None if self.com is None else finite_vector(self.com, 3, "com")
+        linear, angular = self.motion(stance)
+        if angular.any() and (weights is None or given is not None):
+            raise InvalidInputError(
+                "needs the stance's joints, and no com", field="angular_acceleration"
+            )
+        if given is not None or weights is None:
+            found = held_up(mass, stance.robot.com if given is None else given, linear, angular)
+        else:
+            found = weights.body_wrench + held_up(mass - own, weights.com, linear, angular)
+        places = self.payload_places(stance) if weights is None else weights.payloads
+        for payload, place in zip(self.payloads, places, strict=True):
+            found = found + held_up(payload.mass, place, linear, angular)
+        return checked_body_wrench(found, None)
+
+    def motion(self, stance: Stance) -> tuple[Array, Array]:
+        """Return the acceleration of B's origin less gravity, and the angular one, in B.
+
+        Shapes (3,) each [m/s², rad/s²].
+        """
+        into_body = stance.body.rotation.T
+        acceleration = finite_vector(self.acceleration, 3, "acceleration")
+        angular = finite_vector(self.angular_acceleration, 3, "angular_acceleration")
+        return into_body @ (acceleration - stance.gravity), into_body @ angular
+
+    def payload_places(self, stance: Stance) -> Array:
+        """Return where payloads are while joints are not known, in B, shape (p, 3) [m].
+
+        Raises
+        ------
+        InvalidInputError
+            If one is neither on the body nor in a hand of the stance; the field is relative to the
+            load.
+        """
+        hands = {hand.limb: hand.pose for hand in stance.hands}
+        body, places = stance.body.inverse(), []
+        for i, payload in enumerate(self.payloads):
+            with within(f"payloads[{i}]"):
+                stance.robot.check_carrier(payload)
+                if payload.link == stance.robot.description.body:
+                    places.append(np.array(payload.com))
+                elif payload.limb in hands:
+                    places.append((body @ hands[payload.limb]).apply(np.array(payload.com)))
+                else:
+                    raise InvalidInputError(
+                        f"where it is depends on joints that the stance does not give: add "
+                        f"stance.joints, or put it on {stance.robot.description.body!r} or a "
+                        "hand of the stance",
+                        field="link" if payload.limb is None else "limb",
+                    )
+        return np.array(places).reshape(-1, 3)
