@@ -1,0 +1,296 @@
+"""Every field of a question is answered alike, however it is asked.
+
+By `plan`, by a stance that is known, by a stream of set-points, in a batch and as a service. Fields
+are listed from the types of requests: one that is new here has no variant, and fails the test.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import typing
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from hand_models.base import UnsupportedError
+from planner import KnownStance, Plan, Question, WrenchStream, plan
+from service.answering import handle, question
+from service.commands.stances import read_request
+from service.processes import plan_many
+from service.requests import PlanRequest
+from tests.suite.helpers.requests import MSGPACK
+
+UTILISATION = 1e-7
+"""How far two answers' utilisations may be from each other: what optima are proven to."""
+
+STREAMS = 1e-3
+"""The same of set-points, which are mixtures of plans."""
+
+HAND = "stance.hands.0."
+"""Path of the first hand's fields."""
+
+RIGHT = "front_right"
+
+INTO_THE_WALL = {
+    "position": [0.0, -0.45, 0.6],
+    "orientation": [0.0, 0.7071067811865476, 0.0, 0.7071067811865476],
+}
+"""A frame on the wall, z into the rock."""
+
+PLACED = {
+    "stance.joints": "solve",
+    HAND + "pose": None,
+    HAND + "hold": {"shape": "sphere", "diameter": 0.3, "pose": INTO_THE_WALL},
+}
+"""A hand on a ball of the wall, by its place."""
+
+THERE = {"point": [0.0, -0.45, 0.6], "approach": [1.0, 0.0, 0.0]}
+
+# of each field of each part of a request, what to write where
+VARIANTS: dict[str, list[dict[str, Any]]] = {
+    "PlanRequest.v": [{}],
+    "PlanRequest.id": [{"id": "x"}],
+    "PlanRequest.deadline": [{"deadline": 100.0}],
+    "PlanRequest.stance": [{}],
+    "PlanRequest.body_wrench": [{"body_wrench": [700.0, 20.0, -30.0, 5.0, 210.0, -8.0]}],
+    "PlanRequest.load": [{"load": {}}],
+    "PlanRequest.objective": [{"objective": "min_effort"}],
+    "PlanRequest.limits": [{"limits": {}}],
+    "PlanRequest.present": [{"present": {RIGHT: [50.0, 60.0, 60.0, 50.0]}}],
+    "PlanRequest.confidence": [],  # refused
+    "PlanRequest.detail": [{"detail": "full"}],
+    "PlanRequest.want": [{"want": ["load_factor", "prices", "clearance", "model"]}],
+    "PlanRequest.draws": [
+        {
+            "want": ["spread"],
+            "draws": [
+                {
+                    "surfaces": {
+                        "rock": {"shear_limit": {"value": 50.0, "unit": "N", "source": "assumed"}}
+                    }
+                }
+            ],
+        }
+    ],
+    "PlanRequest.explain": [{"explain": False, "load.mass": 200.0}],
+    "PlanRequest.body_range": [{"body_range": {"shift": 0.1}}],
+    "BodyRange.shift": [{"body_range": {"shift": 0.01}}],
+    "BodyRange.tilt": [{"body_range": {"tilt": 0.01}}],
+    "Load.mass": [{"load.mass": mass} for mass in (40.0, 110.288, 150.0)],
+    "Load.com": [{"load.com": [0.05, 0.02, -0.1]}],
+    "Load.acceleration": [{"load.acceleration": way} for way in ([0.2, 0, 0], [0, -0.1, 0.3])],
+    "Load.angular_acceleration": [{"load.angular_acceleration": [0.1, 0.2, -0.3]}],
+    "Load.payloads": [
+        {"load.payloads": [{"mass": 3.0, "limb": RIGHT}], "load.acceleration": [0.0, 0.3, 0.2]}
+    ],
+    "Payload.mass": [{"load.payloads": [{"mass": 8.0, "limb": RIGHT}]}],
+    "Payload.link": [{"load.payloads": [{"mass": 8.0, "link": "limb2_link4"}]}],
+    "Payload.limb": [{"load.payloads": [{"mass": 8.0, "limb": "rear_left"}]}],
+    "Payload.com": [{"load.payloads": [{"mass": 8.0, "link": "torso", "com": [0.1, 0.2, 0.1]}]}],
+    "Limits.utilisation": [{"limits.utilisation": most} for most in (0.8, 0.95)],
+    "Limits.tendon_tension": [{"limits.tendon_tension": 90.0}],
+    "Limits.joint_torque": [{"limits.joint_torque": 60.0}, {"limits.joint_torque": {RIGHT: 30.0}}],
+    "Limits.per_hand": [{"limits.per_hand": {RIGHT: {"largest_force": 150.0}}}],
+    "Limits.tension_change": [
+        {"limits.tension_change": 30.0, "present": {RIGHT: [60.0, 80.0, 80.0, 60.0]}}
+    ],
+    "ForceCap.largest_force": [
+        {"limits.per_hand": {RIGHT: {"largest_force": [[-400, 400], None, [-50, 200]]}}}
+    ],
+    "ForceCap.frame": [
+        {"limits.per_hand": {RIGHT: {"largest_force": [[-150, 150], None, None], "frame": frame}}}
+        for frame in ("world", "body")
+    ],
+    "Stance.robot": [{"stance.robot": "robosimian"}],
+    "Stance.hand": [
+        {
+            "stance.hand": {
+                "tendon": {"maximum_tension": {"value": 120.0, "unit": "N", "source": "assumed"}}
+            }
+        }
+    ],
+    "Stance.gravity": [{"stance.gravity": down} for down in ([0, 0, -3.71], [1.0, 0.5, -9.0])],
+    "Stance.body": [{"stance.joints": "solve", "stance.body.position": [-0.42, 0.02, 0.0]}],
+    "Stance.joints": [{"stance.joints": None}, {"stance.joints": "solve"}],
+    "Stance.rocks": [
+        {
+            "stance.rocks": {"log": {"shape": "cylinder", "diameter": 0.3}},
+            HAND + "hold": {"shape": "rock", "rock": "log"},
+        }
+    ],
+    "Stance.hands": [{"stance.hands": 3}],
+    "Hand.limb": [{}],
+    "Hand.pose": [{"stance.joints": "solve", HAND + "pose.position": [0.02, -0.45, 0.6]}],
+    "Hand.place": [{**PLACED, HAND + "place": THERE}],
+    "Hand.hold": [{HAND + "hold": {"shape": "sphere", "diameter": 0.4}}],
+    "Hand.surface": [
+        {HAND + "surface": "concrete-coarse"},
+        {HAND + "surface": {"shear_limit": 50}},
+    ],
+    "Hand.grasp": [{HAND + "grasp": {}}],
+    "Hand.wrist": [{HAND + "wrist": "floating"}],
+    "Hand.tendon_preload": [
+        {HAND + "wrist": "floating", HAND + "tendon_preload": [30.0, 30.0, 30.0, 30.0]}
+    ],
+    "Hand.wrench": [{HAND + "wrench": [None, None, -60.0, None, None, None]}],
+    "Hand.seat": [{HAND + "seat": "best"}],
+    "Hand.seat_direction": [{HAND + "seat": "best", HAND + "seat_direction": [1, 0, -1, 0, 0, 0]}],
+    "Grasp.outer_rotation": [{HAND + "grasp.outer_rotation": 3.0}],
+    "Grasp.closing_tension": [{HAND + "grasp.closing_tension": 30.0}],
+    "Grasp.palm": [{HAND + "grasp.palm": False}],
+    "Grasp.lateral": [{HAND + "grasp.lateral": False}],
+    "Grasp.fingernail": [{HAND + "grasp.fingernail": True}],
+    "Place.point": [{}],
+    "Place.approach": [{}],
+    "Place.wrist_angle": [{**PLACED, HAND + "place": {**THERE, "wrist_angle": 0.1}}],
+    "Place.frame": [
+        {**PLACED, HAND + "place": {"point": [0, 0, 0], "approach": [0, 0, 1], "frame": "rock"}}
+    ],
+    "Place.up": [{**PLACED, HAND + "place": {**THERE, "up": [0.0, 0.3, 1.0]}}],
+    "Pose.position": [{}],
+    "Pose.orientation": [{}],
+    "Draw.hand": [
+        {
+            "want": ["spread"],
+            "draws": [
+                {
+                    "hand": {
+                        "tendon": {
+                            "maximum_tension": {"value": 90.0, "unit": "N", "source": "assumed"}
+                        }
+                    }
+                }
+            ],
+        }
+    ],
+    "Draw.surfaces": [{}],
+}
+
+ROCKS = ("service.requests.holds",)
+"""Modules whose parts are holds, of which a hand has one as a whole."""
+
+
+def parts(kind: Any, seen: set[type]) -> Iterator[type]:
+    """The structs of a request, each once."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        if kind in seen or kind.__module__ in ROCKS:
+            return
+        seen.add(kind)
+        yield kind
+        for entry in msgspec.structs.fields(kind):
+            yield from parts(entry.type, seen)
+    for inner in typing.get_args(kind):
+        yield from parts(inner, seen)
+
+
+FIELDS = [
+    f"{part.__name__}.{entry.name}"
+    for part in parts(PlanRequest, set())
+    for entry in msgspec.structs.fields(part)
+]
+CASES = [(name, i) for name in VARIANTS for i in range(len(VARIANTS[name]))]
+TRIVIAL = [case for case in CASES if not VARIANTS[case[0]][case[1]]]
+
+
+@lru_cache
+def plain(name: str) -> bytes:
+    return msgspec.json.encode(read_request(name))
+
+
+def request_of(name: str, i: int) -> dict[str, Any]:
+    """The bundled stance with joints, changed."""
+    asked = json.loads(plain("wall-300-joints"))
+    asked["want"] = ["load_factor", "prices"]
+    for path, value in copy.deepcopy(VARIANTS[name][i]).items():
+        if path == "stance.hands":
+            asked["stance"]["hands"] = asked["stance"]["hands"][:value]
+            continue
+        part, *others, last = [asked, *path.split(".")]
+        for step in others:
+            part = part[int(step)] if isinstance(part, list) else part.setdefault(step, {})
+        part[last] = value
+    return asked
+
+
+def alike(one: dict[str, Any], other: dict[str, Any], within: float) -> None:
+    """Two answers' numbers are the same."""
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        if isinstance(value, str | None) or value is None or other[name] is None:
+            assert value == other[name], name
+        else:
+            np.testing.assert_allclose(
+                np.asarray(value, float), np.asarray(other[name], float), atol=within, err_msg=name
+            )
+
+
+def numbers(answer: Any) -> dict[str, Any]:
+    """What every way says of a plan, by the names that objects and replies share."""
+    torque = answer.joint_torque
+    most = max(map(np.abs, map(np.max, map(np.abs, torque.values())))) if torque else None
+    return {
+        "status": answer.status,
+        "utilisation": answer.utilisation,
+        "load_factor": answer.load_factor,
+        "effort": answer.effort,
+        "body_wrench": answer.body_wrench,
+        "torque": None if most is None else most / 100.0,
+    }
+
+
+def test_every_field_of_a_question_has_a_variant():
+    assert sorted(VARIANTS) == sorted(FIELDS)
+
+
+@pytest.mark.parametrize(("name", "i"), [case for case in CASES if case not in TRIVIAL])
+def test_a_question_is_answered_alike_in_every_way(name: str, i: int):
+    asked = request_of(name, i)
+    decoded = msgspec.convert(asked, PlanRequest)
+    as_question = question(decoded)
+    answer = plan(as_question)
+    assert answer.status != "failed", answer.reason
+    assert answer.verified
+    told = numbers(answer)
+
+    json_reply = handle("crux/robosimian/plan", json.dumps(asked).encode())
+    packed = handle("crux/robosimian/plan", msgspec.msgpack.encode(asked), MSGPACK)
+    assert json_reply.good, json_reply.payload
+    assert packed.good, packed.payload
+    (in_batch,) = plan_many([decoded])
+    alike(told, numbers(in_batch), UTILISATION)
+    served = json.loads(json_reply.payload)
+    for reply in (served, msgspec.msgpack.decode(packed.payload)):
+        for key in ("status", "utilisation", "load_factor", "effort", "limiting", "joint_torque"):
+            assert reply[key] == served[key], key
+    assert served["status"] == answer.status
+    if answer.utilisation is not None:
+        assert served["utilisation"] == pytest.approx(answer.utilisation, abs=UTILISATION)
+
+    again = KnownStance(as_question).plan(answer.body_wrench)
+    assert again.status == answer.status, again.reason
+    alike(told, numbers(again), UTILISATION)
+    if answer.prices is not None:
+        assert [each.name for each in again.prices or ()] == [each.name for each in answer.prices]
+
+    _stream(as_question, answer)
+
+
+def _stream(asked: Question, answer: Plan) -> None:
+    """Set-points of the same wrench, where a stream takes such a question."""
+    try:
+        stream = WrenchStream(asked)
+    except UnsupportedError:
+        return
+    with stream:
+        points = stream.set_points(answer.body_wrench)
+    np.testing.assert_allclose(stream.first, answer.body_wrench, rtol=1e-12, atol=1e-9)
+    assert points.verified, points.reason
+    assert points.status == answer.status
+    if answer.utilisation is not None:
+        assert math.isclose(points.utilisation, answer.utilisation, abs_tol=STREAMS)
