@@ -87,23 +87,24 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
         Its body wrench is left aside: see `wrench_findings`.
     """
     stance = question.stance
-    return (
+    robot = tuple(_robot(stance.robot))
+    found = (
         *_gravity(stance),
-        *_robot(stance.robot),
-        *_load(question),
+        *robot,
         *_surfaces(stance),
-        *_holds(stance),
         *_tensions(question),
         *_caps(question),
-        *_joints(question),
     )
+    # a robot that is odd itself is no measure of others
+    return found if robot else (*found, *_load(question), *_holds(stance), *_joints(question))
 
 
 def wrench_findings(question: Question) -> tuple[Finding, ...]:
     """Return whether a body wrench that is given looks as if it were in another unit."""
-    if question.body_wrench is None or not question.load.own:
+    stance, wrench = question.stance, question.body_wrench
+    if wrench is None or not question.load.own or any(_robot(stance.robot)):
         return ()
-    return tuple(_wrench(question.stance, question.body_wrench))
+    return tuple(_wrench(stance, wrench))
 
 
 def _finding(field: str, message: str, value: float, unit: str) -> Finding:
@@ -184,7 +185,13 @@ def _robot(robot: Robot) -> Iterator[Finding]:
     field, hand = "stance.robot", robot.hand
     stone = _number("rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
     links = robot.mass - len(robot.limbs) * hand.mass
-    if robot.mass > stone:
+    if not SHORT * hand.palm_length <= robot.reach <= LONG * hand.palm_length:
+        message = (
+            f"the robot's limbs reach {robot.reach:.3g} m, and a palm is {hand.palm_length:.2g} m "
+            "long: are the lengths of its URDF in m?"
+        )
+        yield _finding(field, message, robot.reach, "m")
+    elif robot.mass > stone:
         message = (
             f"the robot weighs {robot.mass:.6g} kg, more than a ball of rock as far as its limbs "
             f"reach, {robot.reach:.2g} m: are the masses of its URDF in kg?"
@@ -196,12 +203,6 @@ def _robot(robot: Robot) -> Iterator[Finding]:
             "the masses of its URDF in kg?"
         )
         yield _finding(field, message, links, "kg")
-    if not SHORT * hand.palm_length <= robot.reach <= LONG * hand.palm_length:
-        message = (
-            f"the robot's limbs reach {robot.reach:.3g} m, and a palm is {hand.palm_length:.2g} m "
-            "long: are the lengths of its URDF in m?"
-        )
-        yield _finding(field, message, robot.reach, "m")
 
 
 # What holds ---------------------------------------------------------------------------------------
