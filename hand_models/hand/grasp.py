@@ -24,7 +24,7 @@ class Grasp:
     Attributes
     ----------
     outer_rotation : float
-        Of the outer fingers, in [0, π] [rad]; up to `ROUNDED` above is π.
+        Of the outer fingers, in [0, π] [rad]; what is above by no more than `ROUNDED` is π.
     closing_tension : float, optional
         Of each tendon at the moment the tiles caught the rock [N]; the parameter file's default.
     palm : bool
@@ -46,7 +46,8 @@ class Grasp:
             raise InvalidInputError(
                 f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
             )
-        object.__setattr__(self, "outer_rotation", min(self.outer_rotation, math.pi))
+        if self.outer_rotation > math.pi + OPPOSED:
+            object.__setattr__(self, "outer_rotation", math.pi)
         if self.closing_tension is not None:
             check_positive(self.closing_tension, "N", "closing_tension")
 

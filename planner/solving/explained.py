@@ -42,7 +42,7 @@ from planner.result import (
     TensionPath,
     Time,
 )
-from planner.scene import clearance, scene_of
+from planner.scene import clearance, scene_of, wrench_findings
 from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
 from planner.solving.prepared_checks import PreparedChecks, Reading
 from planner.solving.solution import Solution, not_least
@@ -108,6 +108,7 @@ def explained_plan(
         spread = find_spread(prepared, checks.idle, found.least_use)
         unfinished += late("spread") if spread is None else ()
     read, hands = told.plan, None if told.plan is None else told.plan.hands
+    odd = wrench_findings(question)
     return Plan(
         status=told.status,
         body_wrench=prepared.wrench,
@@ -129,8 +130,12 @@ def explained_plan(
         path=told.path,
         verified=told.status != "failed",
         reason=told.reason,
-        findings=checks.findings,
-        warnings=(*checks.oddities, *_warnings(prepared, found, factor, told, unfinished)),
+        findings=(*checks.findings, *odd),
+        warnings=(
+            *checks.oddities,
+            *(each.message for each in odd),
+            *_warnings(prepared, found, factor, told, unfinished),
+        ),
         solver=Solver(SOLVER, found.outcome.status, found.outcome.iterations),
         time=Time(times.model, times.solve, time.perf_counter() - start),
         unfinished=unfinished,

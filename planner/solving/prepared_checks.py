@@ -21,7 +21,7 @@ from planner.result import (
     WristPlan,
     recover_floating_hand,
 )
-from planner.scene import findings, link_findings, scene_of
+from planner.scene import findings, link_findings, scene_of, unit_findings
 from planner.verification import Check
 
 __all__ = [
@@ -46,7 +46,7 @@ class PreparedChecks(NamedTuple):
     idle : tuple of LimitUse
         How much of their joints' torque limbs without a hand use.
     findings : tuple of Finding
-        What is odd about the stance as a scene.
+        What is odd about the stance as a scene, and about the sizes of the question's numbers.
     oddities : tuple of str
         What is odd about it, these included, in words.
     """
@@ -73,7 +73,8 @@ def prepare_checks(prepared: PreparedStance) -> PreparedChecks:
         If the stance cannot be; the field is relative to the question.
     """
     hands, stance, batch = prepared.hands, prepared.question.stance, prepared.batch
-    odd, where = scene_findings(prepared), prepared.where
+    odd = (*scene_findings(prepared), *unit_findings(prepared.question))
+    where = prepared.where
     return PreparedChecks(
         recovery=None if hands.floating else _recovery(prepared),
         check=Check(prepared.question, batch, where),

@@ -49,6 +49,9 @@ FLOATING: Final = 4
 MOST_POINTS: Final = 40_000
 """Of the outlines of all hands of a stance, of some 0.1 ms each."""
 
+MOST_TURNED: Final = 4.0 * math.pi
+"""Largest angle of a wrist that is taken for one [rad]: beyond two turns, it is in degrees."""
+
 GRASPS: Final = 64
 """Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
 
@@ -241,6 +244,12 @@ def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: s
 def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
     """Return where on a rock a hand is seated, in the rock's frame."""
     up = place.up
+    if abs(place.wrist_angle) > MOST_TURNED:
+        raise InvalidInputError(
+            f"must be within ±{MOST_TURNED:.4g} rad, two turns, got {place.wrist_angle:g}: is it "
+            "in rad?",
+            field="place.wrist_angle",
+        )
     if place.frame == "world":
         from_world = rock_pose.inverse()
         axes, point, up = from_world.rotation, from_world.apply(place.point), up or VERTICAL

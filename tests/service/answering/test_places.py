@@ -125,3 +125,20 @@ def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture
     print_plan(reply, console())
     x, *_ = reply.poses[reply.hands[0].limb].position
     assert f"front_right is at ({x:.4f}, " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("angle", [15.0, 30.0, 45.0, 57.3, 90.0, 180.0, 270.0, 360.0, -90.0, -45.0])
+def test_an_angle_of_the_wrist_in_degrees_is_refused(angle: float) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        plan(plan_request(placed(wrist_angle=angle)))
+    assert caught.value.field == "stance.hands[0].place.wrist_angle"
+    assert f"got {angle:g}: is it in rad?" in caught.value.message
+
+
+def test_more_than_a_turn_is_the_same_as_the_rest_of_it() -> None:
+    poses = []
+    for angle in (0.2, 0.2 + 2.0 * np.pi, 0.2 - 4.0 * np.pi + 2.0 * np.pi):
+        reply = plan(plan_request(placed(wrist_angle=angle)))
+        poses.append(next(iter(reply.poses.values())))
+    for pose in poses[1:]:
+        np.testing.assert_allclose(pose.position, poses[0].position, atol=1e-9)

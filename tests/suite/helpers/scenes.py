@@ -12,14 +12,33 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Pose
 from hand_models.hand import Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Mesh, Plane, Profile, Sphere
+from hand_models.tile import Surface
 from planner.prepare.settled_stance import settle_stance
-from planner.question import HandOnHold, Stance
+from planner.question import HandOnHold, Question, Stance
 from planner.result import Finding
-from planner.scene import findings, scene_of
+from planner.scene import findings, scene_of, unit_findings
 from tests.suite.helpers.stances import PALM_TO_WALL, PLACES, ROCK, on_wall, possible, wall
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, 0.0, -1.62), (0.0, 0.0, -3.71))
 """Of the Earth, the Moon and Mars [m/s²]."""
+
+SMALL_BODIES = (
+    0.0,
+    1e-5,
+    5.7e-3,
+    0.064,
+    0.113,
+    0.22,
+    0.288,
+    0.62,
+    0.78,
+    1.236,
+    1.315,
+    1.352,
+    1.796,
+)
+"""Gravity on none, Bennu, Phobos, Mimas, Enceladus, Vesta, Ceres, Pluto, Triton, Callisto, Europa,
+Titan and Io [m/s²]."""
 
 LEANS = (-math.pi / 2.0, -1.2, -0.5, 0.0, 0.3, 0.9, math.pi / 2.0)
 """Of walls, from level ground to a ceiling [rad]."""
@@ -37,8 +56,8 @@ GRASPS = (
 
 
 def look(stance: Stance) -> tuple[Finding, ...]:
-    """What is odd about a stance."""
-    return findings(scene_of(stance, settle_stance(stance)))
+    """What is odd about a stance, its numbers included."""
+    return (*findings(scene_of(stance, settle_stance(stance))), *unit_findings(Question(stance)))
 
 
 def kinds(stance: Stance) -> set[str]:
@@ -233,6 +252,22 @@ def inside_a_boulder(stance: Stance) -> Stance:
     return replace(nearer(stance, 1.0), hands=hands)
 
 
+def with_gravity(stance: Stance, size: float) -> Stance:
+    """Gravity of that size [m/s²]."""
+    return replace(stance, gravity=size * stance.gravity / np.linalg.norm(stance.gravity))
+
+
+def with_strength(stance: Stance, **numbers: float) -> Stance:
+    """All hands on rock of those numbers."""
+    surface = Surface.from_values(numbers)
+    return all_of(stance, lambda s, i: with_hand(s, i, surface=surface))
+
+
+def with_grasp(stance: Stance, **changes: float) -> Stance:
+    """All hands with another grasp."""
+    return all_of(stance, lambda s, i: with_hand(s, i, grasp=replace(s.hands[i].grasp, **changes)))
+
+
 def all_of(stance: Stance, slip: Callable[[Stance, int], Stance]) -> Stance:
     for i in range(len(stance.hands)):
         stance = slip(stance, i)
@@ -281,6 +316,20 @@ SLIPS: dict[str, tuple[Callable[[Stance], Stance], set[str]]] = {
     "a hand in the body": (in_the_body, {"hand_in_body"}),
     "a hand three metres up": (lifted, {"out_of_reach"}),
     "the body in a boulder": (inside_a_boulder, {REFUSED}),
+    "gravity in g": (lambda s: with_gravity(s, 1.0), {"unit"}),
+    "gravity in g, with digits": (lambda s: with_gravity(s, 9.81 / 9.80665), {"unit"}),
+    "gravity in cm/s²": (lambda s: with_gravity(s, 981.0), {"unit"}),
+    "gravity in mm/s²": (lambda s: with_gravity(s, 9810.0), {"unit"}),
+    "gravity in ft/s²": (lambda s: with_gravity(s, 32.17), {"unit"}),
+    "a hand's pull-off of a tile": (lambda s: with_strength(s, shear_limit=353.0), {"unit"}),
+    "what a hand holds, of a tile": (lambda s: with_strength(s, shear_limit=490.0), {"unit"}),
+    "a tendon's tension, of a tile": (lambda s: with_strength(s, shear_limit=700.0), {"unit"}),
+    "a tile's strength in mN": (lambda s: with_strength(s, shear_limit=57000.0), {"unit"}),
+    "a tile's strength in kN": (lambda s: with_strength(s, shear_limit=0.057), {"unit"}),
+    "a closing tension in gf": (lambda s: with_grasp(s, closing_tension=3770.0), {REFUSED}),
+    "a closing tension in kgf": (lambda s: with_grasp(s, closing_tension=3.77), {"unit", REFUSED}),
+    "a log in mm": (lambda s: with_hand(s, 0, hold=Cylinder(60.0)), {"unit"}),
+    "a ball in cm": (lambda s: with_hand(s, 0, hold=Sphere(25.0)), {"unit"}),
 }
 """Slips by name, and what tells of each."""
 

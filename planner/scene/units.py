@@ -1,0 +1,334 @@
+"""What is odd about the sizes of a question's numbers: another unit is likely.
+
+Each number is held against what is known of the robot: its own weight, what its hands hold, how far
+its limbs reach, and against the presets' strengths. What another unit of the field would explain is
+a finding of the kind ``unit``; a factor of a few is nobody's slip and stays without one. Gravity is
+that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.parameters import ParameterTable
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Sphere
+from hand_models.tile import Surface, surface_names
+from planner.question import Question, Stance
+from planner.result import Finding
+from planner.robots import Robot
+
+__all__ = ["unit_findings", "wrench_findings"]
+
+UNIT: Final = "unit"
+"""The kind of all these findings."""
+
+THOUSANDTH: Final = 1.0 / 300.0
+"""Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
+
+THOUSANDS: Final = 100.0
+"""How many times what is usual a number is taken for one in thousandths, such as g or N·mm."""
+
+ABOUT: Final = 2.5
+"""Factor that a body wrench in kN may be off the robot's weight: it may carry and accelerate."""
+
+NEAR: Final = 1.25
+"""The same of one in kgf, which is only a tenth of it."""
+
+UPRIGHT: Final = 0.94
+"""Cosine between a body wrench's force and up from which on it holds the robot's weight: 20°."""
+
+ONE_G: Final = 0.02
+"""How far the size of gravity may be from 1 to be one in g [m/s²]."""
+
+WIDE: Final = 20.0
+"""How many times the limbs' reach a hold may be wide, or the lever of a moment long."""
+
+FAR_OUT: Final = 2.0
+"""How many times the limbs' reach a centre of mass may be from the body's origin."""
+
+LONG: Final = 100.0
+"""How many palms a limb may be long."""
+
+SHORT: Final = 0.2
+"""How many at least."""
+
+LIGHT: Final = 0.2
+"""How much of one hand the links of a robot weigh at least."""
+
+STRONG: Final = 4.0
+"""How many times the strongest preset a tile may hold: a hand's pull-off is five times it."""
+
+WEAK: Final = 0.01
+"""What part of the weakest preset a tile holds at least."""
+
+MIGHTY: Final = 50.0
+"""How many times what the robot's weight turns at its limbs' reach a joint may bear."""
+
+FEEBLE: Final = 1e-3
+"""What part of that the strongest joint of a limb bears at least."""
+
+NONE: Final = 0.01
+"""What part of what tendons hold a tension is at least, unless it is none."""
+
+
+def unit_findings(question: Question) -> tuple[Finding, ...]:
+    """Return which numbers of a question look as if they were in another unit.
+
+    Parameters
+    ----------
+    question : Question
+        Its body wrench is left aside: see `wrench_findings`.
+    """
+    stance = question.stance
+    robot = tuple(_robot(stance.robot))
+    found = (
+        *_gravity(stance),
+        *robot,
+        *_surfaces(stance),
+        *_tensions(question),
+        *_caps(question),
+    )
+    # a robot that is odd itself is no measure of others
+    return found if robot else (*found, *_load(question), *_holds(stance), *_joints(question))
+
+
+def wrench_findings(question: Question) -> tuple[Finding, ...]:
+    """Return whether a body wrench that is given looks as if it were in another unit."""
+    stance, wrench = question.stance, question.body_wrench
+    if wrench is None or not question.load.own or any(_robot(stance.robot)):
+        return ()
+    return tuple(_wrench(stance, wrench))
+
+
+def _finding(field: str, message: str, value: float, unit: str) -> Finding:
+    return Finding(UNIT, field, message, value, unit)
+
+
+# What the body weighs -----------------------------------------------------------------------------
+
+
+def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
+    robot, field = stance.robot, "body_wrench"
+    gravity = float(np.linalg.norm(stance.gravity))
+    force, moment = (float(np.linalg.norm(part)) for part in wrench.reshape(2, 3))
+    weight, on_earth = robot.mass * gravity, robot.mass * _number("standard_gravity")
+    if force > THOUSANDS * on_earth:
+        message = f"a force of {force:.3g} N is {force / on_earth:.3g} times the robot's weight"
+        yield _finding(field, f"{message} on the Earth: is it in N?", force, "N")
+    elif weight and force:
+        up = float(-stance.gravity @ (stance.body.rotation @ wrench[:3])) / (gravity * force)
+        unit = _force_unit(force / weight) if up > UPRIGHT and force != 1.0 else None
+        if unit is not None:
+            message = f"it holds up {force:.3g} N, the robot weighs {weight:.4g} N"
+            yield _finding(field, f"{message}: is it in N, or in {unit}?", force, "N")
+    lever = max(force, on_earth)
+    if moment > WIDE * robot.reach * lever:
+        message = f"a moment of {moment:.3g} N·m is that of {lever:.4g} N at {moment / lever:.3g} m"
+        yield _finding(field, f"{message}: is it in N·m?", moment, "N·m")
+
+
+def _force_unit(part: float) -> str | None:
+    """Return the unit in which a force that is such a part of the weight would be the weight."""
+    for unit, newtons, off in (("kN", 1e3, ABOUT), ("kgf", _number("standard_gravity"), NEAR)):
+        if 1.0 / off <= part * newtons <= off:
+            return unit
+    return None
+
+
+def _load(question: Question) -> Iterator[Finding]:
+    load, robot = question.load, question.stance.robot
+    if load.mass is not None:
+        part = load.mass / robot.mass
+        if not THOUSANDTH < part < THOUSANDS:
+            message = (
+                f"{load.mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} "
+                "kg: is it in kg?"
+            )
+            yield _finding("load.mass", message, load.mass, "kg")
+    if load.com is not None:
+        away = math.hypot(*load.com)
+        if away > FAR_OUT * robot.reach:
+            message = (
+                f"it is {away:.3g} m from the body's origin, and limbs reach {robot.reach:.2g} m: "
+                "is it in m, in B?"
+            )
+            yield _finding("load.com", message, away, "m")
+    most = _number("strongest_gravity")
+    for name, arm, unit in (
+        ("acceleration", 1.0, "m/s²"),
+        ("angular_acceleration", robot.reach, "rad/s²"),
+    ):
+        size = math.hypot(*getattr(load, name))
+        if size * arm > most:
+            message = f"{size:.3g} {unit} is more than a robot is moved with: is it in {unit}?"
+            yield _finding(f"load.{name}", message, size, unit)
+
+
+def _gravity(stance: Stance) -> Iterator[Finding]:
+    size, most = float(np.linalg.norm(stance.gravity)), _number("strongest_gravity")
+    if abs(size - 1.0) <= ONE_G:
+        message = f"it is {size:.3g} m/s², as on no body that is climbed: is it in m/s², or in g?"
+        yield _finding("stance.gravity", message, size, "m/s²")
+    elif size > most:
+        message = f"{size:.4g} m/s² is more than on any planet: is it in m/s²?"
+        yield _finding("stance.gravity", message, size, "m/s²")
+
+
+def _robot(robot: Robot) -> Iterator[Finding]:
+    field, hand = "stance.robot", robot.hand
+    stone = _number("rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
+    links = robot.mass - len(robot.limbs) * hand.mass
+    if not SHORT * hand.palm_length <= robot.reach <= LONG * hand.palm_length:
+        message = (
+            f"the robot's limbs reach {robot.reach:.3g} m, and a palm is {hand.palm_length:.2g} m "
+            "long: are the lengths of its URDF in m?"
+        )
+        yield _finding(field, message, robot.reach, "m")
+    elif robot.mass > stone:
+        message = (
+            f"the robot weighs {robot.mass:.6g} kg, more than a ball of rock as far as its limbs "
+            f"reach, {robot.reach:.2g} m: are the masses of its URDF in kg?"
+        )
+        yield _finding(field, message, robot.mass, "kg")
+    elif links < LIGHT * hand.mass:
+        message = (
+            f"the robot's links weigh {links:.3g} kg together, one hand {hand.mass:.3g} kg: are "
+            "the masses of its URDF in kg?"
+        )
+        yield _finding(field, message, links, "kg")
+
+
+# What holds ---------------------------------------------------------------------------------------
+
+
+def _surfaces(stance: Stance) -> Iterator[Finding]:
+    weakest, strongest = _presets()
+    for i, hand in enumerate(stance.hands):
+        strength = hand.surface.shear_limit
+        if WEAK * weakest < strength < STRONG * strongest:
+            continue
+        slip = "of a tile, or of a whole hand" if strength > strongest else "in N"
+        message = (
+            f"{hand.limb}: a tile is taken to hold {strength:.4g} N in shear, the presets have "
+            f"{weakest:.3g} to {strongest:.3g} N: is it {slip}?"
+        )
+        yield _finding(f"stance.hands[{i}].surface.shear_limit", message, strength, "N")
+
+
+@cache
+def _presets() -> tuple[float, float]:
+    """Return what a tile holds in shear on the weakest and on the strongest preset [N]."""
+    strengths = [Surface.named(name).shear_limit for name in surface_names()]
+    return min(strengths), max(strengths)
+
+
+def _holds(stance: Stance) -> Iterator[Finding]:
+    most = WIDE * stance.robot.reach
+    for i, hand in enumerate(stance.hands):
+        name, size = _width(hand.hold)
+        if size > most:
+            message = (
+                f"{hand.limb}: the hold's {name} is {size:.3g} m, and limbs reach "
+                f"{stance.robot.reach:.2g} m: is it in m?"
+            )
+            yield _finding(f"stance.hands[{i}].hold.{name}", message, size, "m")
+
+
+def _width(hold: Hold) -> tuple[str, float]:
+    """Return the largest length of a hold of a plain shape, and its name; else nothing."""
+    if isinstance(hold, Cylinder | Sphere):
+        return "diameter", hold.diameter
+    if isinstance(hold, Ellipsoid):
+        return "semi_axes", max(hold.semi_axes)
+    return ("fillet_radius", hold.fillet_radius) if isinstance(hold, Edge) else ("", 0.0)
+
+
+# What is carried ----------------------------------------------------------------------------------
+
+
+def _tensions(question: Question) -> Iterator[Finding]:
+    stance = question.stance
+    most, closing = stance.robot.hand.maximum_tension, stance.robot.hand.closing_tension
+    cap = question.limits.tendon_tension
+    if cap is not None and cap < NONE * most:
+        message = f"{cap:.3g} N is next to nothing of the {most:.4g} N that a tendon holds"
+        yield _finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
+    given = [(f"present.{limb}", each) for limb, each in question.present.items()]
+    for i, hand in enumerate(stance.hands):
+        tension = hand.grasp.closing_tension
+        if hand.tendon_preload is not None:
+            given.append((f"stance.hands[{i}].tendon_preload", hand.tendon_preload))
+        if tension is not None and _force_unit(tension / closing) == "kgf":
+            message = (
+                f"{hand.limb}: it closes with {tension:.4g} N, hands do with {closing:.3g} N: is "
+                "it in N, or in kgf?"
+            )
+            field = f"stance.hands[{i}].grasp.closing_tension"
+            yield _finding(field, message, tension, "N")
+    for field, tensions in given:
+        largest = float(np.max(tensions))
+        if largest > 2.0 * most or 0.0 < largest < NONE * closing:
+            message = (
+                f"the largest is {largest:.4g} N, tendons hold {most:.4g} N and close with "
+                f"{closing:.3g} N: are they in N?"
+            )
+            yield _finding(field, message, largest, "N")
+
+
+def _caps(question: Question) -> Iterator[Finding]:
+    held = question.stance.robot.hand.structure.hand_load
+    for limb, cap in question.limits.per_hand.items():
+        given = cap.largest_force
+        ends = (
+            [given] if isinstance(given, float | int) else [end for pair in given for end in pair]
+        )
+        least = min(abs(end) for end in ends if end)
+        if least < THOUSANDTH * held:
+            message = (
+                f"{limb}: {least:.3g} N is next to nothing of the {held:.3g} N that a hand holds: "
+                "is it in N?"
+            )
+            yield _finding(f"limits.per_hand.{limb}.largest_force", message, least, "N")
+
+
+def _joints(question: Question) -> Iterator[Finding]:
+    stance, own = question.stance, question.limits.joint_torque
+    if stance.joints is None:
+        return
+    robot, told = stance.robot, set()
+    usual = robot.mass * _number("standard_gravity") * robot.reach
+    for limb, chain in robot.chains.items():
+        given = own.get(limb) if isinstance(own, Mapping) else own
+        most = _largest(chain.torque_limits if given is None else given, chain.sliding)
+        if most is None or FEEBLE * usual <= most <= MIGHTY * usual:
+            continue
+        field = "stance.robot"
+        if given is not None:
+            field = "limits.joint_torque" + (f".{limb}" if isinstance(own, Mapping) else "")
+        if field not in told:
+            told.add(field)
+            message = (
+                f"{limb}: its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
+                f"the Earth at its reach turns with {usual:.3g} N·m: is it in N·m?"
+            )
+            yield _finding(field, message, most, "N·m")
+
+
+def _largest(limits: float | Sequence[float] | Array, sliding: Iterable[bool]) -> float | None:
+    """Return the most that a joint which turns bears; None where none does."""
+    which = ~np.asarray(sliding)
+    values = np.broadcast_to(np.asarray(limits, dtype=float), which.shape)[which]
+    return float(values.max()) if len(values) else None
+
+
+@cache
+def _number(name: str) -> float:
+    text = resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8")
+    return ParameterTable.read(text, "scene.toml").positive("usual", name)
