@@ -58,6 +58,11 @@ class Load:
     angular_acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
     payloads: tuple[Payload, ...] = ()
 
+    @property
+    def own(self) -> bool:
+        """Whether the mass and its centre are the robot's own."""
+        return self.mass is None and self.com is None
+
     def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:
         """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
 

@@ -334,6 +334,42 @@ class Robot:
         centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))
         return self._from_root.apply(np.array(centre))
 
+    def com_reaching(self, hands: Mapping[str, Array]) -> Array:
+        """Estimate the centre of mass in B with hands at places, shape (3,) [m].
+
+        A limb that reaches for one has its own on the line from its shoulder to its hand, as far
+        along as at zero; which way it bends is left out. Other limbs are at zero.
+
+        Parameters
+        ----------
+        hands : mapping of str to ndarray, shape (3,)
+            H's origin in B, by limb [m].
+        """
+        moment = self.mass * self._com_at_zero
+        for limb, place in hands.items():
+            mass, share, com = self._limb_weights[limb]
+            shoulder = self.chains[limb].shoulder
+            moment = moment + mass * (shoulder + share * (place - shoulder) - com)
+        return np.asarray(moment / self.mass)
+
+    @cached_property
+    def _com_at_zero(self) -> Array:
+        return self.com_at({})
+
+    @cached_property
+    def _limb_weights(self) -> dict[str, tuple[float, float, Array]]:
+        """Return of each limb its mass, how far along its centre is at zero, and where, in B."""
+        model, data, found = self.model, self.data, {}
+        hands = self.hand_poses({})
+        pin.centerOfMass(model, data, self.configuration({}))
+        for limb, chain in self.chains.items():
+            mass = float(data.mass[chain.ids[0]])
+            com = self._from_root.apply(data.oMi[chain.ids[0]].act(data.com[chain.ids[0]]))
+            way = hands[limb].position - chain.shoulder
+            share = float((com - chain.shoulder) @ way / max(float(way @ way), 1e-12))
+            found[limb] = mass, share, com
+        return found
+
     @cached_property
     def capsules(self) -> Capsules:
         """What of it could be in the way; its hands are left out."""
