@@ -363,3 +363,16 @@ def test_caps_beside_them_are_kept(wall_with_joints):
     assert answer.verified
     for torque in answer.joint_torque.values():
         assert abs(torque[6]) < 1e-4
+
+
+@pytest.mark.parametrize("joint", [1, 6])
+def test_so_do_those_of_hands_whose_wrists_float(wall_with_joints, joint):
+    hands = tuple(replace(hand, wrist="floating") for hand in wall_with_joints.hands)
+    given = [200.0] * 7
+    given[joint] = 0.0
+    limits = Limits(joint_torque=dict.fromkeys(LIMBS_OF_WALL, tuple(given)))
+    answer = plan(Question(replace(wall_with_joints, hands=hands), limits=limits))
+    assert answer.status == "optimal"
+    assert answer.verified
+    for torque in answer.joint_torque.values():
+        assert abs(torque[joint]) < 1e-4
