@@ -274,7 +274,7 @@ def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
         DrawnLimb(
             limb,
             stance.body.apply(robot.link_chain(plan.joints, limb)),
-            None if shares is None else robot.chains[limb].coupling @ shares[limb],
+            None if shares is None else (robot.chains[limb].coupling != 0.0) @ shares[limb],
         )
         for limb in stance.robot.limbs
     )

@@ -116,11 +116,25 @@ def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, .
             key = (kind, *sorted(given))
             if key not in found or near.distance < found[key].distance:
                 found[key] = near
-    return tuple(_link_finding(*key[:2], near=near) for key, near in found.items())
+    return tuple(
+        _link_finding(*key[:2], near=near, holding=scene.limbs) for key, near in found.items()
+    )
 
 
-def _link_finding(kind: str, limb: str | None = None, *, near: _Near) -> Finding:
-    """Return what is said of a link; ``limb``: whose, where its joints were given."""
+def _link_finding(
+    kind: str, limb: str | None = None, *, near: _Near, holding: Sequence[str]
+) -> Finding:
+    """Return what is said of a link.
+
+    Parameters
+    ----------
+    kind : str
+    limb : str, optional
+        Whose it is, where its joints were given.
+    near : _Near
+    holding : sequence of str
+        Limbs with a hand, which their angles put where it holds.
+    """
     field = "stance.joints"
     slip = (
         "'solve' looks at the hands alone; give angles that keep clear, of a route in "
@@ -128,6 +142,8 @@ def _link_finding(kind: str, limb: str | None = None, *, near: _Near) -> Finding
     )
     if limb is not None:
         field, slip = f"stance.joints.{limb}", "are its angles in rad, from the body outward?"
+        if limb in holding:
+            slip = "its angles put the hand where it holds, others may keep the links clear, too"
     deep, assumed = -near.distance, near.first.assumed + near.second.assumed
     if deep <= assumed:
         # thinner links would be clear of each other

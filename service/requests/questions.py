@@ -53,10 +53,15 @@ Q = TypeVar("Q", bound=Query)
 
 
 Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
-Torque = Annotated[float, Meta(ge=0.0, le=1e6)]
+Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
+JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
 Torques = Annotated[
-    list[Torque],
-    Meta(min_length=1, max_length=64, description="of a limb's joints from the body outward [N·m]"),
+    list[JointTorque],
+    Meta(
+        min_length=1,
+        max_length=64,
+        description="of a limb's joints from the body outward, 0 of one without a motor [N·m]",
+    ),
 ]
 ForceBound = Annotated[float, Meta(ge=-1e6, le=1e6)]
 ForceRange = Annotated[
@@ -155,10 +160,7 @@ class Limits(Strict, frozen=True, kw_only=True):
     tendon_tension: Tension | None = None
     joint_torque: Annotated[
         Torque | dict[Name, Torque | Torques] | None,
-        Meta(
-            description="of all joints, or by limb, in place of the robot's own figures: at least "
-            "0.001, or 0 of a joint without a motor [N·m; N of a joint that slides]"
-        ),
+        Meta(description="of all joints, or by limb, in place of the robot's own figures [N·m]"),
     ] = None
     per_hand: Annotated[dict[Name, ForceCap], Meta(description="by limb")] = {}
     tension_change: Annotated[

@@ -51,7 +51,7 @@ Angles = Annotated[
     Meta(
         min_length=1,
         max_length=64,
-        description="of a limb's joints from the body outward [rad; m of joints that slide]",
+        description="of a limb's joints from the body outward; those that slide in m [rad]",
     ),
 ]
 Entries = Annotated[

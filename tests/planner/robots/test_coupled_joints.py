@@ -12,6 +12,8 @@ from planner.question import ForceCap, Limits, Load, Question
 from planner.robots import LinkTree, RobotFile, robot_of, solve_limbs
 from planner.solving import KnownStance, plan
 from planner.streaming import WrenchStream
+from service.answering.questions import question
+from service.commands.stances import read_request
 from tests.suite.helpers.robots import joint, limbs_toml, link, urdf
 from tests.suite.helpers.stances import on_wall
 from tests.suite.helpers.stances_with_joints import at_joints
@@ -363,3 +365,16 @@ def test_caps_beside_them_are_kept(wall_with_joints):
     assert answer.verified
     for torque in answer.joint_torque.values():
         assert abs(torque[6]) < 1e-4
+
+
+@pytest.mark.parametrize("joint", [1, 6])
+def test_so_do_those_of_hands_whose_wrists_float(joint):
+    stance = replace(question(read_request("wall-300-floating")).stance, joints="solve")
+    given = [200.0] * 7
+    given[joint] = 0.0
+    limits = Limits(joint_torque=dict.fromkeys(LIMBS_OF_WALL, tuple(given)))
+    answer = plan(Question(stance, limits=limits))
+    assert answer.status == "optimal"
+    assert answer.verified
+    for torque in answer.joint_torque.values():
+        assert abs(torque[joint]) < 1e-4

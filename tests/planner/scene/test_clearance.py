@@ -246,8 +246,11 @@ def test_it_is_not_where_it_is_known_or_where_angles_are_wrong_without_it(radius
     found = beside_a_wall(thin(radius), below)
     assert found
     # thicker links may have others near the same wall
-    worst = max(found, key=lambda each: each.value)
-    assert "are its angles in rad, from the body outward?" in worst.message
+    worst = [each for each in found if each.value > max(each.value for each in found) - 1e-9]
+    for each in worst:
+        holds = each.field == "stance.joints.front_right"
+        asked = "others may keep the links clear" if holds else "are its angles in rad, from the"
+        assert asked in each.message
 
 
 def test_links_that_are_as_thin_as_they_are_known_to_be_are_clear():

@@ -220,3 +220,13 @@ def test_rows_that_promise_less_force_than_there_is_are_found(monkeypatch):
 def test_a_wrong_effort_is_found(wrong):
     effort = honest()[0].effort * wrong
     assert any("effort is" in each for each in complaints(effort=effort))
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_a_torque_at_a_joint_without_a_motor_is_told(joint):
+    limits = [200.0] * 7
+    limits[joint] = 0.0
+    torque = honest()[0].joint_torque[LIMB][joint]
+    name = honest()[1].joints[LIMB].names[joint]
+    told = complaints(with_limits(joint_torque={LIMB: tuple(limits)}))
+    assert f"{LIMB}: joint {name} has no motor, and bears {torque:.6g} N·m" in told

@@ -79,7 +79,7 @@ def test_requests_and_replies_are_of_the_schema(asked: Callable[[], dict]) -> No
         (("load", "angular_acceleration"), [0.0, 0.0]),
         (("limits", "per_hand", "front_left", "largest_force"), [1.0, -5.0, None]),
         (("limits", "per_hand", "front_left", "frame"), "palm"),
-        (("limits", "joint_torque", "rear_left"), [0.0]),
+        (("limits", "joint_torque", "rear_left"), [-1.0]),
         (("present", "rear_left"), [-1.0, 0.0, 0.0, 0.0]),
         (("objective",), "fun"),
     ],

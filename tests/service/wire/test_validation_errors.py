@@ -179,9 +179,9 @@ INVALID = [
     (("limits",), {"joint_torque": 100.0}, "limits.joint_torque", "nothing of joints"),
     (
         ("limits",),
-        {"joint_torque": {"rear_left": 1.0, "front_left": [1.0, 0.0]}},
+        {"joint_torque": {"rear_left": 1.0, "front_left": [1.0, -1.0]}},
         "limits.joint_torque.front_left[1]",
-        "a number >= 0.001",
+        "a number >= 0.0",
     ),
     (
         ("limits",),
@@ -231,7 +231,7 @@ def test_a_bad_value_is_named_with_what_would_be_valid(
 
 OUT_OF_RANGE = [
     ((*FRONT, "hold", "diameter"), 300.0, "a number <= 100.0, in m"),
-    ((*FRONT, "grasp", "outer_rotation"), 180.0, "a number <= 3.14159, in rad"),
+    ((*FRONT, "grasp", "outer_rotation"), 180.0, "a number <= 3.14209, in rad"),
     ((*FRONT, "grasp", "closing_tension"), 0.0, "a number >= 0.001, in N"),
     ((*FRONT, "surface"), {"shear_limit": 9.0, "half_planes": 0}, "a whole number >= 1"),
     ((*FRONT, "wrench"), [None, None, 2e6, None, None, None], "a number <= 1000000.0, in N"),
@@ -240,7 +240,7 @@ OUT_OF_RANGE = [
     (("load", "mass"), 110300.0, "a number <= 100000.0, in kg"),
     (("load", "acceleration"), [0.0, 0.0, 9810.0], "a number <= 1000.0, in m/s²"),
     (("limits",), {"utilisation": 80.0}, "a number <= 1.0"),
-    (("limits",), {"joint_torque": {"nose": [5.0, 0.0]}}, "a number >= 0.001, in N·m"),
+    (("limits",), {"joint_torque": {"nose": [5.0, -1.0]}}, "a number >= 0.0, in N·m"),
     (("stance", "body", "orientation"), [0.0, 0.0, 0.0, 2e3], "a number <= 1000.0"),
     (("present",), {"nose": [1.0, 1.0, 1.0, -1.0]}, "a number >= 0.0, in N"),
 ]
