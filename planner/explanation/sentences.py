@@ -383,7 +383,7 @@ def _com_sentences(question: Question) -> tuple[str, ...]:
         return ()
     return (
         f"the joints are not known: the centre of mass is taken where the robot's file has it, and "
-        f"may be some {away:.2f} m from there with the hands where they are, which can change a "
+        f"may be some {away:.1f} m from there with the hands where they are, which can change a "
         "load factor by half; give stance.joints ('solve' finds them), or load.com",
     )
 

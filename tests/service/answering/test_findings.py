@@ -39,7 +39,7 @@ def test_findings_have_a_field_of_the_request_and_warnings_their_words(sound):
     reply = answered(asked)
     assert departures("PlanReply", reply) == []
     (found,) = reply["findings"]
-    assert reply["warnings"] == [found["message"]]
+    assert reply["warnings"][0] == found["message"]
     assert set(found) == {"kind", "field", "message", "value", "unit"}
     assert (found["kind"], found["unit"]) == ("limbs_crossed", "m")
     # the field leads to what it is about
