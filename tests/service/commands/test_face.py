@@ -40,7 +40,7 @@ def completed(*words: str) -> list[str]:
 
 def test_the_version_is_that_of_the_distribution(capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["--version"]) == DONE
-    assert capfd.readouterr().out == f"crux {version('crux')}\n"
+    assert capfd.readouterr().out == f"crux {version('crux-climb')}\n"
 
 
 @pytest.mark.parametrize("command", ["plan", "query", "wrench-space", "body-space", "stream"])
