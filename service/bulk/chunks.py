@@ -176,5 +176,10 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(
-        request, explain=explain, want=want, draws=[], detail="full" if explain else "hands"
+        request,
+        explain=explain,
+        want=want,
+        draws=[],
+        detail="full" if explain else "hands",
+        max_reply_bytes=None,
     )

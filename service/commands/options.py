@@ -81,8 +81,8 @@ def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> Pla
     ``whole``: whether a person reads the reply, who gets all of it.
     """
     want = dict.fromkeys([*request.want, *EXTRAS, *further])
-    detail = "full" if whole else request.detail
-    return msgspec.structs.replace(request, want=list(want), detail=detail)
+    more = {"detail": "full", "max_reply_bytes": None} if whole else {}
+    return msgspec.structs.replace(request, want=list(want), **more)
 
 
 def output_in(

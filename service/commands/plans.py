@@ -100,7 +100,7 @@ def plan(
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     request = with_extras(request, *extras, whole=not as_json)
-    if advice_folder is not None and request.detail != "full":
+    if advice_folder is not None and request.detail not in (None, "full"):
         raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
     robots = robots_of(robot)
     brief = not as_json and verbosity() < 0
@@ -113,7 +113,7 @@ def plan(
                 # --advice is looked for as long as it takes
                 with deadline.within(request.deadline or ADVICE_SECONDS):
                     answer = answering.with_advice(answer)
-            full = request.detail == "full" and not brief
+            full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
             draw_plan(answer, picture)

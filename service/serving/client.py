@@ -118,6 +118,9 @@ class CruxClient:
     def plan(self, request: PlanRequest) -> PlanReply | BriefPlanReply:
         """Return the service's plan; a `BriefPlanReply` where the request wants less detail.
 
+        So it is where the whole plan takes more than ``max_reply_bytes`` of a request that names no
+        detail.
+
         Raises
         ------
         ServiceError
@@ -127,27 +130,29 @@ class CruxClient:
         ServiceTimeout
             If nobody answers in time.
         """
-        if request.detail == "full":
-            return self._ask(PLAN, request, PlanReply)
-        return self._ask(PLAN, request, BriefPlanReply)
+        told = self._ask(PLAN, request)
+        if Format.is_labelled(str(told.encoding), BriefPlanReply):
+            return _read(told, BriefPlanReply)
+        return _read(told, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
-        return self._ask(WRENCH_SPACE, request, WrenchSpaceReply)
+        return _read(self._ask(WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Return what a stance can hold; raises what `plan` raises."""
-        return self._ask(BODY_SPACE, request, BodySpaceReply)
+        return _read(self._ask(BODY_SPACE, request), BodySpaceReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance for set-points; raises what `plan` raises."""
-        return self._ask(STREAM, request, StreamReply)
+        return _read(self._ask(STREAM, request), StreamReply)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Return a stream's set-points for a body wrench; raises what `plan` raises."""
-        return self._ask(SET_POINTS, request, SetPointsReply)
+        return _read(self._ask(SET_POINTS, request), SetPointsReply)
 
-    def _ask(self, name: str, request: Query, kind: type[R]) -> R:
+    def _ask(self, name: str, request: Query) -> zenoh.Sample:
+        """Return the reply that is no error; raise what `plan` raises."""
         key, waits = service_key(self.robot, name), self.timeout
         if waits is None:
             waits = max(TIMEOUT, (request.deadline or 0.0) / IN_TIME)
@@ -162,13 +167,13 @@ class CruxClient:
         if reply is None:
             raise NoServiceError(f"nobody answers at {key}")
         if reply.ok is not None:
-            return self._read(reply.ok.payload, reply.ok.encoding, kind)
+            return reply.ok
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
                 f"no answer at {key} within {waits:g} s; allow it longer (--timeout)"
             )
-        detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
+        detail = _read(reply.err, ErrorReply).error
         raise ServiceError(
             detail.kind,
             detail.message,
@@ -196,8 +201,9 @@ class CruxClient:
             error = error or reply
         return error
 
-    def _read(self, payload: zenoh.ZBytes, encoding: zenoh.Encoding, kind: type[R]) -> R:
-        try:
-            return Format.named(str(encoding)).decode(payload.to_bytes(), kind)
-        except (MalformedError, msgspec.ValidationError) as error:
-            raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None
+
+def _read(told: zenoh.Sample | zenoh.ReplyError, kind: type[R]) -> R:
+    try:
+        return Format.named(str(told.encoding)).decode(told.payload.to_bytes(), kind)
+    except (MalformedError, msgspec.ValidationError) as error:
+        raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None
