@@ -1,6 +1,7 @@
 from .advice import words_of as words_of
 from .body_spaces import print_body_space as print_body_space
 from .layout import console as console, table_of as table_of, unit_of as unit_of
+from .output_lock import write_alone as write_alone
 from .plans import (
     print_plan as print_plan,
     print_robust as print_robust,
