@@ -1,4 +1,4 @@
-from .advice_requests import advised as advised
+from .advice_requests import advised as advised, rewritten as rewritten
 from .answers import Planned as Planned
 from .body_space import explore as explore
 from .dispatch import (

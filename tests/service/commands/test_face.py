@@ -188,6 +188,14 @@ def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
+def test_a_terminal_shows_that_advice_is_looked_for(stance_file) -> None:
+    words = ["plan", stance_file(wall_request(HEAVY))]
+    assert "looking for what would hold" in on_a_terminal(words, stream="stderr")
+    assert on_a_terminal(["-q", *words], stream="stderr") == ""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
 def test_a_study_shows_how_far_it_is(tmp_path: Path) -> None:
     words = ["study", "fig06", "-o", str(tmp_path)]
     told = on_a_terminal(words, stream="stderr")
