@@ -41,7 +41,7 @@ class Asking:
             if told is not None:
                 reply: dict[str, Any] = json.loads(told.payload.to_bytes())
                 return reply
-        raise SystemExit("no service answers: is crux serve running there?")
+        raise SystemExit(f"no service answers at crux/{self.robot}/{name}: is crux serve there?")
 
 
 def main(endpoint: str, stance: Path) -> None:

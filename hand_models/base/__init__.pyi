@@ -5,6 +5,11 @@ from .bounded_store import (
     stored as stored,
     stores as stores,
 )
+from .distribution import (
+    DISTRIBUTION as DISTRIBUTION,
+    installed_version as installed_version,
+    to_install as to_install,
+)
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, to_install
 from hand_models.scans.scan import RawScan
 
 __all__ = ["is_esri", "read_esri", "read_geotiff", "read_numpy"]
@@ -78,7 +78,7 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
         from PIL import Image, UnidentifiedImageError
     except ImportError:
         raise InvalidInputError(
-            "reading GeoTIFF needs the package pillow: pip install 'crux[scans]'", field="file"
+            f"reading GeoTIFF needs the package pillow: {to_install('scans')}", field="file"
         ) from None
     try:
         image = Image.open(path, formats=["TIFF"])

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, to_install
 from hand_models.scans.scan import RawScan
 
 __all__ = ["read_columns", "read_pcd", "read_ply"]
@@ -30,7 +30,7 @@ def read_pcd(path: Path) -> RawScan:
         from pypcd4.pypcd4 import PointCloud
     except ImportError:
         raise InvalidInputError(
-            "reading PCD needs the package pypcd4: pip install 'crux[scans]'", field="file"
+            f"reading PCD needs the package pypcd4: {to_install('scans')}", field="file"
         ) from None
     cloud = PointCloud.from_path(path)
     absent = [axis for axis in AXES if axis not in cloud.fields]

@@ -1,8 +1,8 @@
-from .advice_requests import advised as advised
+from .advice_requests import advised as advised, rewritten as rewritten
+from .answers import Planned as Planned
 from .body_space import explore as explore
 from .dispatch import (
     SERVICES as SERVICES,
-    Planned as Planned,
     handle as handle,
     plan as plan,
     planned as planned,

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from msgspec import UNSET
 
-from planner import Plan
+from planner import Plan, Question
 from service import replies
-from service.answering.hand_answers import hand_reply, plain, told, wrench_set_reply
+from service.answering.hand_answers import (
+    hand_reply,
+    placed_poses,
+    plain,
+    told,
+    wrench_set_reply,
+)
+from service.requests import Detail
 
-__all__ = ["BRIEF", "brief_plan_reply", "cut_reason", "plan_reply"]
+__all__ = ["BRIEF", "Planned", "brief_plan_reply", "cut_reason", "plan_reply"]
 
 LONGEST: Final = 120
 """Bytes of a reason beside set-points, which have to be small whatever the reason."""
@@ -28,6 +35,38 @@ WHOLE: Final = (
     "time",
 )
 """Fields of a brief reply that are left out beside set-points."""
+
+
+class Planned(NamedTuple):
+    """A plan request as the planner understands it, its plan, and what goes back."""
+
+    question: Question
+    plan: Plan
+    reply: replies.PlanReply | replies.BriefPlanReply
+
+    @classmethod
+    def of(
+        cls,
+        question: Question,
+        answer: Plan,
+        identifier: str | None,
+        detail: Detail,
+        *,
+        model: bool,
+    ) -> Planned:
+        """Return a plan with a reply that tells so much of it; ``model`` as for `plan_reply`."""
+        reply: replies.PlanReply | replies.BriefPlanReply
+        if detail == "full":
+            reply = plan_reply(answer, identifier, model=model)
+        else:
+            reply = brief_plan_reply(answer, identifier, hands=detail == "hands")
+        if detail != "set_points":
+            reply.poses = placed_poses(question.stance)
+        return cls(question, answer, reply)
+
+    def in_detail(self, detail: Detail, *, model: bool = False) -> Planned:
+        """Return the plan with a reply that tells so much of it."""
+        return Planned.of(self.question, self.plan, self.reply.id, detail, model=model)
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:

@@ -9,16 +9,16 @@ from typing import Any, Final, NamedTuple
 from msgspec.structs import replace
 
 import planner
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError, InvalidInputError, LimitError
 from hand_models.parameters import ParameterTable
-from planner import DeadlineError, Plan, Question, deadline
-from service.answering.answers import brief_plan_reply, plan_reply
-from service.answering.hand_answers import placed_poses
+from planner import DeadlineError, deadline
+from service.answering.answers import Planned, plan_reply
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import ROBOTS, Robots, over_default
 from service.answering.questions import question
+from service.answering.reply_sizes import fitted
 from service.answering.streams import STREAMS, Streams
-from service.replies import BriefPlanReply, PlanReply, Reply
+from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
     PlanRequest,
@@ -42,11 +42,11 @@ from service.wire import (
     decode_request,
     encode_error,
     identifier,
+    most_error_bytes,
 )
 
 __all__ = [
     "SERVICES",
-    "Planned",
     "handle",
     "plan",
     "planned",
@@ -73,31 +73,17 @@ def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlan
     return planned(request, robots).reply
 
 
-class Planned(NamedTuple):
-    """A plan request as the planner understands it, its plan, and what goes back."""
-
-    question: Question
-    plan: Plan
-    reply: PlanReply | BriefPlanReply
-
-
 def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     """Answer a plan request, and keep what the reply leaves out; as `plan`."""
-    if request.detail != "full":
+    detail = request.detail or "full"
+    if detail != "full":
         # what is not told is not found
-        told = ["load_factor"] if request.detail == "hands" else []
+        told = ["load_factor"] if detail == "hands" else []
         wanted = [want for want in request.want if want in told]
         request = replace(request, want=wanted, draws=[])
     asked = question(request, robots)
     answer = planner.plan(asked)
-    reply: PlanReply | BriefPlanReply
-    if request.detail == "full":
-        reply = plan_reply(answer, request.id, model="model" in request.want)
-    else:
-        reply = brief_plan_reply(answer, request.id, hands=request.detail == "hands")
-    if request.detail != "set_points":
-        reply.poses = placed_poses(asked.stance)
-    return Planned(asked, answer, reply)
+    return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
 
 
 def with_advice(answer: Planned) -> Planned:
@@ -138,11 +124,11 @@ class _Service(NamedTuple):
     """What is asked at a key, and who answers, given the request, the robots and the streams."""
 
     request: type[Request]
-    answer: Callable[[Any, Robots, Streams], Reply]
+    answer: Callable[[Any, Robots, Streams], Reply | Planned]
 
 
 SERVICES: Final[dict[str, _Service]] = {
-    PLAN: _Service(PlanRequest, lambda asked, robots, _: plan(asked, robots)),
+    PLAN: _Service(PlanRequest, lambda asked, robots, _: planned(asked, robots)),
     WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
     BODY_SPACE: _Service(BodySpaceRequest, _body_space),
     STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
@@ -195,6 +181,11 @@ def handle(
         A reply, or a structured error; nothing is raised but a lack of memory.
     """
     form, kind = Format.JSON, None
+
+    def failed(error: CruxError, named: str | None = None) -> Answer:
+        name, most = identifier(payload, form, kind), most_error_bytes(payload, form, kind)
+        return encode_error(error, form, name, named, most)
+
     try:
         form = Format.named(encoding)
         service = BULK[key.rpartition("/")[2]]
@@ -209,18 +200,25 @@ def handle(
         within = request.deadline if isinstance(request, Query) else None
         with deadline.within(within, started=started):
             deadline.check("an answer was begun")
-            reply = service.answer(request, robots, streams)
+            found = service.answer(request, robots, streams)
+        try:
+            reply, told = fitted(request, found, form)
+        except LimitError:
+            if isinstance(found, StreamReply):
+                # nobody knows of it
+                streams.release(found.stream)
+            raise
         status: str = getattr(reply, "status", "done")
-        return Answer(form.encode(reply), form.label(reply), True, status)
+        return Answer(told, form.label(reply), True, status)
     except InvalidInputError as error:
-        told = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
-        return encode_error(error, form, identifier(payload, form, kind), told)
+        named = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
+        return failed(error, named)
     except DeadlineError as error:
-        return encode_error(error, form, identifier(payload, form, kind))
+        return failed(error)
     except MemoryError:
         # of a process, not of a question: who runs the process has to know
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
         excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
-        return encode_error(excuse, form, identifier(payload, form, kind), "internal")
+        return failed(excuse, "internal")

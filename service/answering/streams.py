@@ -8,6 +8,8 @@ import uuid
 from collections import OrderedDict
 from typing import Final
 
+from msgspec.structs import astuple, replace
+
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner import SetPoints, WrenchStream, deadline
 from service.answering.answers import BRIEF, cut_reason
@@ -18,7 +20,7 @@ from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamRe
 from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest, about_the_same
 from service.wire import Format
 
-__all__ = ["KEPT", "STREAMS", "Streams", "opened", "set_points_reply"]
+__all__ = ["KEPT", "STREAMS", "Streams", "brief_set_points", "opened", "set_points_reply"]
 
 FIRST: Final = "the plans about the first body wrench were there"
 """What a deadline may come before."""
@@ -113,9 +115,16 @@ class Streams:
                 field="stream",
             )
         points = stream.set_points(request.body_wrench)
-        reply = set_points_reply(request.stream, stream, points, start, request.detail)
+        reply = set_points_reply(request.stream, stream, points, start, request.detail or "full")
         reply.id = request.id
         return reply
+
+    def release(self, identifier: str) -> None:
+        """Let a stream go."""
+        with self._lock:
+            stream = self._kept.pop(identifier, None)
+        if stream is not None:
+            stream.close()
 
     def close(self) -> None:
         """Let all streams go."""
@@ -144,19 +153,29 @@ def set_points_reply(
     detail : {'set_points', 'hands', 'full'}, optional
         With the first, hands have their tensions alone; the other two are the same.
     """
-    brief = detail == "set_points"
     hands = None
     if points.tensions is not None:
         columns = (points.tensions, points.winch_angle, points.motor_torque, points.motor_current)
         rows = zip(stream.limbs, *plain((*columns, points.wrenches)), strict=True)
-        hands = [HandSetPoints(*row[: BRIEF if brief else None]) for row in rows]
-    return told(
+        hands = [HandSetPoints(*row) for row in rows]
+    reply = told(
         SetPointsReply,
         points,
         stream=identifier,
-        reason=cut_reason(points.reason) if brief and points.reason else points.reason,
         hands=hands,
         took=time.perf_counter() - start,
+    )
+    return brief_set_points(reply) if detail == "set_points" else reply
+
+
+def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
+    """Return set-points with the hands' tensions and winches alone, and a reason that is cut."""
+    return replace(
+        whole,
+        reason=cut_reason(whole.reason) if whole.reason else whole.reason,
+        hands=None
+        if whole.hands is None
+        else [HandSetPoints(*astuple(hand)[:BRIEF]) for hand in whole.hands],
     )
 
 

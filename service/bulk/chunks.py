@@ -10,13 +10,12 @@ import pickle
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 
-from hand_models.base import BoundedStore, CruxError
+from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
 from service.bulk.columns import row_of
 from service.requests import PlanRequest, RouteRequest
@@ -32,13 +31,13 @@ __all__ = [
     "decode_chunk",
     "encode_answers",
     "encode_chunk",
-    "own_version",
+    "own_versions",
 ]
 
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
 
-PACKAGES: Final = ("crux", "numpy", "scipy", "clarabel")
+PACKAGES: Final = (DISTRIBUTION, "numpy", "scipy", "clarabel")
 """On whose versions the last digits of answers hang."""
 
 Answerer = Callable[[bytes], Answer]
@@ -80,17 +79,9 @@ class Setting(NamedTuple):
     make: Callable[[], Answerer] | None = None
 
 
-def own_version(package: str = "crux") -> str | None:
-    """Return the version of a distribution; None where it is not installed."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
-
-
 def own_versions() -> dict[str, str | None]:
     """Return the versions of `PACKAGES`."""
-    return {name: own_version(name) for name in PACKAGES}
+    return {name: installed_version(name) for name in PACKAGES}
 
 
 def encode_chunk(payloads: list[bytes]) -> bytes:
@@ -185,5 +176,10 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(
-        request, explain=explain, want=want, draws=[], detail="full" if explain else "hands"
+        request,
+        explain=explain,
+        want=want,
+        draws=[],
+        detail="full" if explain else "hands",
+        max_reply_bytes=None,
     )

@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError, InvalidInputError, to_install
 from planner import Lost, cores
 from service.bulk.chunks import answer_chunk
 
@@ -100,7 +100,7 @@ class DaskPool:
             import distributed
         except ImportError:
             raise InvalidInputError(
-                "needs distributed, which is not installed: pip install 'crux[dask]'", field="dask"
+                f"needs distributed, which is not installed: {to_install('dask')}", field="dask"
             ) from None
         self._own = not isinstance(on, distributed.Client)
         if self._own and on != LOCAL:

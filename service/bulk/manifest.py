@@ -11,10 +11,9 @@ from typing import Any, Final
 
 import msgspec
 
-from hand_models.base import InvalidInputError, whole_file
+from hand_models.base import InvalidInputError, installed_version, whole_file
 from hand_models.parameters import ParameterTable
 from planner import RobotFile
-from service.bulk.chunks import own_version
 from service.bulk.lines import LineDigest
 
 __all__ = ["RESUME", "Manifest", "Part", "digest_of", "new_manifest"]
@@ -117,7 +116,9 @@ def new_manifest(
     """Return the manifest of a table that has no rows yet."""
     own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
     own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
-    return Manifest(own_version(), list(columns), explain, own_hand, own_robot, about=about or {})
+    return Manifest(
+        installed_version(), list(columns), explain, own_hand, own_robot, about=about or {}
+    )
 
 
 def digest_of(value: Any) -> str:

@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import msgspec
 
-from hand_models.base import InvalidInputError, whole_file
+from hand_models.base import InvalidInputError, to_install, whole_file
 from service.bulk.columns import INDEX, Column
 from service.bulk.lines import Asked, LineDigest
 from service.bulk.manifest import RESUME, Manifest, Part
@@ -375,6 +375,6 @@ def table_at(path: Path) -> type[Table] | None:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
         raise InvalidInputError(
-            "needs pyarrow, which is not installed: pip install 'crux[parquet]'", field="-o"
+            f"needs pyarrow, which is not installed: {to_install('parquet')}", field="-o"
         ) from None
     return ParquetTable

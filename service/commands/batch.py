@@ -34,6 +34,7 @@ from service.tables import (
     note,
     say,
     verbosity,
+    write_alone,
     writing,
 )
 from service.wire import REQUEST_KINDS, Answer
@@ -111,6 +112,7 @@ def batch(
         raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
     if file is not None:
         _check_output(file, requests, resume, kind)
+        write_alone(file)
     begun = perf_counter()
     with closing(Lines(requests)) as lines:
         if kind is None:

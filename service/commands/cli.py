@@ -18,6 +18,8 @@ from typing import Any, Final, NamedTuple
 
 import click
 
+from hand_models.base import DISTRIBUTION
+
 __all__ = ["COMMANDS", "crux", "run"]
 
 NAME: Final = "crux"
@@ -214,7 +216,7 @@ def _hint(error: click.ClickException) -> str:
 @click.group(
     cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False
 )
-@click.version_option(package_name=NAME, message="%(prog)s %(version)s")
+@click.version_option(package_name=DISTRIBUTION, message="%(prog)s %(version)s")
 def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 

@@ -25,7 +25,7 @@ from service.commands.options import (
     workers_option,
 )
 from service.processes import Interrupted
-from service.tables import progress, say, writing
+from service.tables import progress, say, write_alone, writing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -148,6 +148,7 @@ def holds(
     from service.tables import console
 
     Surface.named(surface)
+    write_alone(output)
     numbers = hand_table() if hand is None else own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
@@ -201,6 +202,8 @@ def holds(
         "trials": len(trials),
         "tried": len(outcomes),
         "refused": refused.total(),
+        "reasons": dict(refused.most_common()),
+        "refusals": _refusals(trials, outcomes),
         "warnings": list(mesh.oddities),
         "holds": [_entry(trial, each) for trial, each in found],
     }
@@ -217,7 +220,8 @@ def holds(
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:
-        say({**result, "holds": len(found), "file": str(output)})
+        told = {name: value for name, value in result.items() if name != "refusals"}
+        say({**told, "holds": len(found), "file": str(output)})
     else:
         _print(trials, found, refused, mesh.oddities, output, console())
 
@@ -252,6 +256,15 @@ def _reason(error: InvalidInputError) -> str:
     """Return why a hand cannot be, without its numbers."""
     words = str(error).split(":")[-1] if error.field is None else error.message
     return " ".join("…" if any(map(str.isdigit, word)) else word for word in words.split())
+
+
+def _refusals(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[dict[str, Any]]:
+    """Return the points where hands cannot be, and in how many trials there for which reason."""
+    found: dict[tuple[float, float, float], Counter[str]] = {}
+    for i, each in sorted(outcomes.items()):
+        if isinstance(each, InvalidInputError):
+            found.setdefault(trials[i].point, Counter())[_reason(each)] += 1
+    return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
 
 
 def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from service.commands.options import (
     robot_option,
     stance_argument,
     timeout_option,
+    wait_option,
     with_extras,
 )
 from service.commands.stances import read_request
@@ -175,6 +176,7 @@ def _leave(*_: object) -> None:
 @stance_argument
 @zenoh_options
 @timeout_option
+@wait_option
 @hand_option
 @robot_option
 @json_option
@@ -182,6 +184,7 @@ def query(
     stance: str,
     config: zenoh.Config,
     timeout: float | None,
+    wait: float | None,
     hand: ParameterTable | None,
     robot: RobotFile | None,
     as_json: bool,
@@ -194,7 +197,8 @@ def query(
 
     request = with_extras(asked(read_request(stance), hand, robot), whole=not as_json)
     start_zenoh_log()
-    with CruxClient(config, request.stance.robot or DEFAULT_ROBOT, timeout=timeout) as client:
+    name = request.stance.robot or DEFAULT_ROBOT
+    with CruxClient(config, name, timeout=timeout, wait=wait) as client:
         reply = client.plan(request)
     return show(reply, as_json)
 

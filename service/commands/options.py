@@ -39,6 +39,7 @@ __all__ = [
     "spread_option",
     "stance_argument",
     "timeout_option",
+    "wait_option",
     "with_extras",
     "workers_option",
 ]
@@ -81,8 +82,8 @@ def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> Pla
     ``whole``: whether a person reads the reply, who gets all of it.
     """
     want = dict.fromkeys([*request.want, *EXTRAS, *further])
-    detail = "full" if whole else request.detail
-    return msgspec.structs.replace(request, want=list(want), detail=detail)
+    more = {"detail": "full", "max_reply_bytes": None} if whole else {}
+    return msgspec.structs.replace(request, want=list(want), **more)
 
 
 def output_in(
@@ -229,6 +230,12 @@ timeout_option = click.option(
     "--timeout",
     type=FiniteRange(0.01, LONGEST),
     help=f"[s]; by default {TIMEOUT:g}, or what the deadline of the request takes.",
+)
+wait_option = click.option(
+    "--wait",
+    type=FiniteRange(0.0, LONGEST),
+    metavar="SECONDS",
+    help="Wait so long for a service that is not there yet.",
 )
 
 workers_option = click.option(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -21,7 +23,7 @@ from service.commands.options import (
     stance_argument,
     with_extras,
 )
-from service.commands.stances import read_with_files
+from service.commands.stances import Given, read_with_text
 from service.requests import Draw, PlanRequest, Want
 from service.tables import (
     EXIT_STATUS,
@@ -32,15 +34,19 @@ from service.tables import (
     tell_solver,
     verbosity,
     waiting,
+    working,
 )
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.answering import MeshFiles, Robots
+    from service.answering import Planned, Robots
     from service.replies import PlanReply
 
 __all__ = ["plan"]
+
+OVER: Final = ("overloaded", "infeasible")
+"""Statuses of what does not hold."""
 
 ADVICE_SECONDS: Final = 30.0
 """For advice that nobody asked for, where a request has no deadline."""
@@ -93,67 +99,104 @@ def plan(
     extras += ["spread"] if spread or draws else []
     extras += ["clearance"] if clearance else []
     extras += ["advice"] if advice_folder is not None else []
-    request, given = read_with_files(stance)
-    request = asked(request, hand, robot)
+    request, given = read_with_text(stance)
+    plain = request = asked(request, hand, robot)
     if draws:
         request = msgspec.structs.replace(request, draws=draws)
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     request = with_extras(request, *extras, whole=not as_json)
-    if advice_folder is not None and request.detail != "full":
+    if advice_folder is not None and request.detail not in (None, "full"):
         raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
     robots = robots_of(robot)
     brief = not as_json and verbosity() < 0
-    with waiting(f"planning {stance}", request) as tell:
+    wanted = "advice" in request.want
+    if not as_json:
+        # which a person reads later than the plan
+        request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
+    begun = perf_counter()
+    with waiting(f"planning {stance}", request):
         with deadline.within(request.deadline):
             answer = answering.planned(request, robots)
-            seeks = not (as_json or brief) and answer.reply.status in ("overloaded", "infeasible")
-            if seeks:
-                tell("looking for what would make it hold")
-                # --advice is looked for as long as it takes
-                with deadline.within(request.deadline or ADVICE_SECONDS):
-                    answer = answering.with_advice(answer)
-            full = request.detail == "full" and not brief
+            full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
             draw_plan(answer, picture)
+    if not as_json:
+        _print(answer, bare, brief)
+        if wanted or (not brief and answer.reply.status in OVER):
+            # --advice is looked for as long as it takes
+            seconds = None if wanted else ADVICE_SECONDS
+            started = None if request.deadline is None else begun
+            with deadline.within(request.deadline or seconds, started=started):
+                answer = _with_advice(answer, brief)
     written: list[Path] = []
     if advice_folder is not None:
         assert isinstance(answer.reply, PlanReply)  # of a whole request
-        written = _write_advice(request, answer.reply, advice_folder, given)
+        written = _write_advice(plain, answer.reply, advice_folder, given)
     if isinstance(answer.reply, BriefPlanReply):
         say(answer.reply)
     elif as_json:
         without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
         say(msgspec.to_builtins(answer.reply) | without)
     else:
-        from service.tables import console, print_plan, words_of
-
-        out = console()
-        print_plan(answer.reply, out, without_palm=bare, brief=brief)
-        tell_solver(answer.reply)
-        holding = answer.reply.status == "optimal"
-        for file, advice in zip(written, answer.reply.advice or (), strict=False):
-            told = words_of(advice, holding=holding)
-            out.print(f"{file}: {told}", markup=False, soft_wrap=True)
+        _print_files(written, answer.reply)
     return EXIT_STATUS.get(answer.reply.status, FAILED)
 
 
+def _print(answer: Planned, without_palm: PlanReply | None, brief: bool) -> None:
+    """Print a plan for a person, to be read at once."""
+    from service.replies import PlanReply
+    from service.tables import console, print_plan
+
+    assert isinstance(answer.reply, PlanReply)  # as a person is given
+    print_plan(answer.reply, console(), without_palm=without_palm, brief=brief)
+    tell_solver(answer.reply)
+    sys.stdout.flush()
+
+
+def _with_advice(answer: Planned, brief: bool) -> Planned:
+    """Look for what would make a stance hold, or hold more, and print that."""
+    from service import answering
+    from service.replies import PlanReply
+    from service.tables import console, print_advice
+
+    better = "hold" if answer.reply.status in OVER else "be better"
+    with working(f"looking for what would {better}"):
+        found = answering.with_advice(answer)
+    assert isinstance(found.reply, PlanReply)  # as a person is given
+    assert isinstance(answer.reply, PlanReply)
+    if not brief:
+        out = console()
+        for warning in found.reply.warnings[len(answer.reply.warnings) :]:
+            out.print(f"warning: {warning}", markup=False)
+        print_advice(found.reply, out)
+    return found
+
+
+def _print_files(files: list[Path], reply: PlanReply) -> None:
+    """Print which advice is in which file."""
+    from service.tables import console, words_of
+
+    out = console()
+    holding = reply.status == "optimal"
+    for file, advice in zip(files, reply.advice or (), strict=False):
+        told = words_of(advice, holding=holding)
+        out.print(f"{file}: {told}", markup=False, soft_wrap=True)
+
+
 def _write_advice(
-    request: PlanRequest,
-    reply: PlanReply,
-    folder: Path,
-    given: tuple[PlanRequest, MeshFiles] | None,
+    request: PlanRequest, reply: PlanReply, folder: Path, given: Given[PlanRequest]
 ) -> list[Path]:
     """Write each advice as a request whose plan gives what it promises, and none of another.
 
-    Scans stay in their files where the request was ``given`` with these. Returns their paths.
+    All but what it changes stays as it was ``given``, and scans in their files. Returns their
+    paths.
     """
     from service import answering
 
-    if given is not None:
-        before, files = given
-        request = files.named(request, before, folder)
+    if given.files is not None:
+        request = given.files.named(request, given.request, folder)
     written = []
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
@@ -161,9 +204,10 @@ def _write_advice(
             if old.stem.removeprefix("advice-").isdecimal():
                 old.unlink()
         for i, advice in enumerate(reply.advice or ()):
-            text = msgspec.json.format(msgspec.json.encode(answering.advised(request, advice)))
+            changed = answering.advised(request, advice)
+            text = answering.rewritten(given.text, given.request, changed)
             written.append(folder / f"advice-{i + 1}.json")
-            written[-1].write_bytes(text)
+            written[-1].write_bytes(msgspec.json.format(text))
     return written
 
 

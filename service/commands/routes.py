@@ -37,6 +37,7 @@ from service.tables import (
     progress,
     say,
     verbosity,
+    write_alone,
 )
 from service.wire import ROUTE, Answer, Format, encode_error
 
@@ -151,6 +152,9 @@ def _one(
     if unexplained:
         request = msgspec.structs.replace(request, explain=False)
     climb = answering.route(request, robots_of(robot))
+    with filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+    write_alone(folder / "route", folder)
     with progress(f"planning {climb.name}") as tell:
         result = evaluate(climb, workers, tell)
     with filling_folder():
@@ -236,6 +240,7 @@ def _many(
     routes = _Routes(sources, hand, robot)
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
+    write_alone(file)
     begun = perf_counter()
     with writing_answers(file):
         if kind is None:

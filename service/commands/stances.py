@@ -10,14 +10,14 @@ from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, NamedTuple, TypeVar
 
 import msgspec
 
 from hand_models.base import InvalidInputError
 from service.requests import PlanRequest, Request, RouteRequest
 
-__all__ = ["bundled", "limbs_of", "read_request", "read_route", "read_with_files"]
+__all__ = ["Given", "bundled", "limbs_of", "read_request", "read_route", "read_with_text"]
 
 LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
 """Of the bundled robot."""
@@ -26,6 +26,23 @@ R = TypeVar("R", bound=Request)
 
 if TYPE_CHECKING:
     from service.answering import MeshFiles
+
+
+class Given(NamedTuple, Generic[R]):
+    """A request as it was written.
+
+    Attributes
+    ----------
+    text : bytes
+    request : Request
+        What the text says, scans in the files that it names.
+    files : MeshFiles or None
+        Those files; None where they are bundled, and so may be gone.
+    """
+
+    text: bytes
+    request: R
+    files: MeshFiles | None
 
 
 def bundled(kind: type[Request] = PlanRequest) -> tuple[str, ...]:
@@ -47,14 +64,11 @@ def read_request(source: str) -> PlanRequest:
     InvalidInputError
         If there is none, or it is not a plan request.
     """
-    return read_with_files(source)[0]
+    return read_with_text(source)[0]
 
 
-def read_with_files(source: str) -> tuple[PlanRequest, tuple[PlanRequest, MeshFiles] | None]:
-    """Return what `read_request` does, and it as its file has it, with the files that it names.
-
-    The latter is None where it is from no file of the caller's.
-    """
+def read_with_text(source: str) -> tuple[PlanRequest, Given[PlanRequest]]:
+    """Return what `read_request` does, and how it was written."""
     return _read(source, PlanRequest, "STANCE", "stance")
 
 
@@ -83,27 +97,30 @@ def _folder(kind: type[Request]) -> Traversable:
     return folder / "routes" if kind is RouteRequest else folder
 
 
-def _read(
-    source: str, kind: type[R], field: str, noun: str
-) -> tuple[R, tuple[R, MeshFiles] | None]:
-    from service.answering import MeshFiles
-    from service.wire import decode_request
-
+def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R]]:
     if source == "-":
-        return MeshFiles(Path()).whole(decode_request(sys.stdin.buffer.read(), kind)), None
+        return _decoded(sys.stdin.buffer.read(), kind, Path())
     path = Path(source)
     if path.is_file() or path.is_fifo():
-        files = MeshFiles(path.parent)
         try:
-            asked = decode_request(_text(path), kind)
-            return files.whole(asked), (asked, files) if path.is_file() else None
+            return _decoded(_text(path), kind, path.parent)
         except OSError as error:
             raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
     if source in bundled(kind):
         with resources.as_file(_folder(kind)) as folder:
-            given = (folder / f"{source}.json").read_bytes()
-            return MeshFiles(Path(folder)).whole(decode_request(given, kind)), None
+            whole, given = _decoded((folder / f"{source}.json").read_bytes(), kind, Path(folder))
+            return whole, given._replace(files=None)
     raise InvalidInputError(
         f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
         field=field,
     )
+
+
+def _decoded(text: bytes, kind: type[R], folder: Path) -> tuple[R, Given[R]]:
+    """Return a request with its scans, and how it was written; its files are in a folder."""
+    from service.answering import MeshFiles
+    from service.wire import decode_request
+
+    files = MeshFiles(folder)
+    request = decode_request(text, kind)
+    return files.whole(request), Given(text, request, files)

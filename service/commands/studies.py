@@ -11,7 +11,7 @@ import click
 
 from hand_models.base import InvalidInputError
 from service.commands.options import beginning_so, folder_option, hand_option, json_option
-from service.tables import filling_folder, progress, say
+from service.tables import filling_folder, progress, say, write_alone
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -146,6 +146,9 @@ def study(
     chosen = chosen_study(name, **options)
     numbers = None if hand is None else own_hand(hand)
     line = None if as_json else f"study {name}: started; it may take minutes"
+    with filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+    write_alone(folder / "result.json", folder)
     with filling_folder(), progress(name, line=line) as tell:
         result, files = run_study(chosen, folder, tell, numbers)
     if as_json:

@@ -24,7 +24,16 @@ from service.commands.options import (
 from service.commands.stances import read_request
 from service.processes import Interrupted
 from service.sweeping import TOLERANCE
-from service.tables import BAD_INPUT, DONE, FAILED, filling_folder, note, say, verbosity
+from service.tables import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    filling_folder,
+    note,
+    say,
+    verbosity,
+    write_alone,
+)
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
@@ -131,6 +140,7 @@ def sweep(
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     files = {"table": folder / TABLE, "picture": folder / PICTURE}
+    write_alone(files["table"], folder)
     with writing_answers(files["table"]):
         columns = [each.name for each in columns_of(design)]
         begun = new_manifest(columns, False, hand, robot, about(request, design, seed or 0))

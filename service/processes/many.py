@@ -99,7 +99,7 @@ class Planners:
             self._pool.__exit__()
             raise
         with _no_collection():
-            return [_decoded(*each) for each in zip(answers, requests, strict=True)]
+            return [_decoded(answer) for answer in answers]
 
 
 def plan_many(
@@ -174,9 +174,9 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _decoded(answer: Answer, request: PlanRequest) -> PlanReply | BriefPlanReply | ErrorReply:
+def _decoded(answer: Answer) -> PlanReply | BriefPlanReply | ErrorReply:
     if not answer.good:
         return FORM.decode(answer.payload, ErrorReply)
-    if getattr(request, "detail", "full") == "full":
-        return FORM.decode(answer.payload, PlanReply)
-    return FORM.decode(answer.payload, BriefPlanReply)
+    if FORM.is_labelled(answer.encoding, BriefPlanReply):
+        return FORM.decode(answer.payload, BriefPlanReply)
+    return FORM.decode(answer.payload, PlanReply)

@@ -31,6 +31,7 @@ from .questions import (
 )
 from .request import (
     DEFAULT_DEADLINE as DEFAULT_DEADLINE,
+    LEAST_REPLY_BYTES as LEAST_REPLY_BYTES,
     LONGEST_DEADLINE as LONGEST_DEADLINE,
     Detail as Detail,
     Identifier as Identifier,
@@ -38,6 +39,7 @@ from .request import (
     Name as Name,
     Pose as Pose,
     Query as Query,
+    ReplyBytes as ReplyBytes,
     Request as Request,
     Wrench as Wrench,
 )

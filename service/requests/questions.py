@@ -218,7 +218,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         Meta(description="tensions of the tendons now, by limb: is the straight way safe? [N]"),
     ] = {}
     confidence: Later = None
-    detail: Detail = "full"
+    detail: Detail | None = None
     want: Annotated[
         list[Want],
         Meta(
@@ -297,7 +297,7 @@ class SetPointsRequest(Query, frozen=True, kw_only=True):
 
     stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
     body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
-    detail: Detail = "full"
+    detail: Detail | None = None
 
 
 class Move(Hand, frozen=True, kw_only=True):

@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 
 __all__ = [
     "DEFAULT_DEADLINE",
+    "LEAST_REPLY_BYTES",
     "LONGEST_DEADLINE",
     "Acceleration",
     "AccelerationEntry",
@@ -24,6 +25,7 @@ __all__ = [
     "Pose",
     "Position",
     "Query",
+    "ReplyBytes",
     "Request",
     "Strict",
     "Tension",
@@ -63,12 +65,17 @@ DEFAULT_DEADLINE: Final = 10.0
 LONGEST_DEADLINE: Final = 600.0
 """[s]"""
 
+LEAST_REPLY_BYTES: Final = 1000
+"""Into which every error fits, its texts cut where they must be, and set-points in MessagePack."""
+
+ReplyBytes = Annotated[int, Meta(ge=LEAST_REPLY_BYTES, le=2**31)]
 Duration = Annotated[float, Meta(gt=0.0, le=LONGEST_DEADLINE, description="[s]")]
 Detail = Annotated[
     Literal["set_points", "hands", "full"],
     Meta(
         description="how much the reply tells: what tendons are to do, in little room; also what "
-        "the hands carry; or all that is known"
+        "the hands carry; or all that is known. By default all; where max_reply_bytes is given, as "
+        "much as fits"
     ),
 ]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
@@ -101,5 +108,12 @@ class Query(Request, frozen=True, kw_only=True):
             description="how long the answer may take, from its question's arrival at the service "
             "on, waiting included: then the best plan that is verified is the answer, or that "
             "there is none yet [s]"
+        ),
+    ] = None
+    max_reply_bytes: Annotated[
+        ReplyBytes | None,
+        Meta(
+            description="that the caller takes, of the reply's payload. A reply of more is not "
+            "sent, but an error of kind limit that names what would fit"
         ),
     ] = None

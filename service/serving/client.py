@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 import time
 from queue import SimpleQueue
 from typing import Final, Self, TypeVar
@@ -31,8 +32,9 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
-from service.serving.config import TIMEOUT, open_session
+from service.serving.config import TIMEOUT, open_session, patient
 from service.wire import (
+    ALIVE,
     BODY_SPACE,
     CLIENTS,
     DEFAULT_ROBOT,
@@ -55,6 +57,8 @@ R = TypeVar("R", bound=Reply)
 IN_TIME: Final = 0.9
 """Part of a client's time in which a question without a deadline is to be answered."""
 
+START_ONE: Final = "start one with `crux serve` where this session reaches it"
+
 SECOND_TRY_AFTER: Final = 0.3
 """Pause before an empty answer is believed: a service that has just come back needs it [s]."""
 
@@ -72,11 +76,14 @@ class CruxClient:
         By default 10 s, and longer for a question whose own deadline is.
     form : Format, optional
         How messages travel.
+    wait : float, optional
+        How long a service is waited for, from now on [s]; by default it has to be there when it is
+        asked.
 
     Raises
     ------
     NoServiceError
-        If no session can be opened.
+        If no session can be opened, or no service comes in that time.
     """
 
     def __init__(
@@ -86,13 +93,15 @@ class CruxClient:
         *,
         timeout: float | None = None,
         form: Format = Format.MSGPACK,
+        wait: float | None = None,
     ) -> None:
+        begun = time.monotonic()
         self.robot = robot
         self.timeout = timeout
         self.form = form
         self._owned: zenoh.Session | None = None
         if isinstance(where, zenoh.Config):
-            self._session = self._owned = open_session(where)
+            self._session = self._owned = self._opened(where, wait)
         else:
             self._session = where
         # by these a service gives each client its turn, and knows who has gone
@@ -100,6 +109,39 @@ class CruxClient:
         self._source = self._session.declare_querier(service_key(robot, PLAN))
         here = service_key(robot, f"{CLIENTS}/{self._session.info.zid()}")
         self._here = self._session.liveliness().declare_token(here)
+        if wait is not None:
+            try:
+                self._await(wait, begun)
+            except BaseException:
+                self.close()
+                raise
+
+    def _opened(self, config: zenoh.Config, wait: float | None) -> zenoh.Session:
+        if wait is None:
+            return open_session(config)
+        try:
+            return open_session(patient(config, wait))
+        except NoServiceError as error:
+            raise self._not_come(wait, f" ({error})") from None
+
+    def _await(self, wait: float, begun: float) -> None:
+        """Wait for the service's token, which is there when it answers."""
+        there = threading.Event()
+
+        def seen(sample: zenoh.Sample) -> None:
+            if sample.kind == zenoh.SampleKind.PUT:
+                there.set()
+
+        key, taken = service_key(self.robot, ALIVE), Callback(seen, indirect=False)
+        tokens = self._session.liveliness().declare_subscriber(key, taken, history=True)
+        try:
+            if not there.wait(max(wait - (time.monotonic() - begun), 0.0)):
+                raise self._not_come(wait)
+        finally:
+            tokens.undeclare()
+
+    def _not_come(self, wait: float, why: str = "") -> NoServiceError:
+        return NoServiceError(f"no service of {self.robot} within {wait:g} s{why}; {START_ONE}")
 
     def __enter__(self) -> Self:
         return self
@@ -118,6 +160,9 @@ class CruxClient:
     def plan(self, request: PlanRequest) -> PlanReply | BriefPlanReply:
         """Return the service's plan; a `BriefPlanReply` where the request wants less detail.
 
+        So it is where the whole plan takes more than ``max_reply_bytes`` of a request that names no
+        detail.
+
         Raises
         ------
         ServiceError
@@ -127,27 +172,29 @@ class CruxClient:
         ServiceTimeout
             If nobody answers in time.
         """
-        if request.detail == "full":
-            return self._ask(PLAN, request, PlanReply)
-        return self._ask(PLAN, request, BriefPlanReply)
+        told = self._ask(PLAN, request)
+        if Format.is_labelled(str(told.encoding), BriefPlanReply):
+            return _read(told, BriefPlanReply)
+        return _read(told, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
-        return self._ask(WRENCH_SPACE, request, WrenchSpaceReply)
+        return _read(self._ask(WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Return what a stance can hold; raises what `plan` raises."""
-        return self._ask(BODY_SPACE, request, BodySpaceReply)
+        return _read(self._ask(BODY_SPACE, request), BodySpaceReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance for set-points; raises what `plan` raises."""
-        return self._ask(STREAM, request, StreamReply)
+        return _read(self._ask(STREAM, request), StreamReply)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Return a stream's set-points for a body wrench; raises what `plan` raises."""
-        return self._ask(SET_POINTS, request, SetPointsReply)
+        return _read(self._ask(SET_POINTS, request), SetPointsReply)
 
-    def _ask(self, name: str, request: Query, kind: type[R]) -> R:
+    def _ask(self, name: str, request: Query) -> zenoh.Sample:
+        """Return the reply that is no error; raise what `plan` raises."""
         key, waits = service_key(self.robot, name), self.timeout
         if waits is None:
             waits = max(TIMEOUT, (request.deadline or 0.0) / IN_TIME)
@@ -160,15 +207,17 @@ class CruxClient:
             time.sleep(SECOND_TRY_AFTER)
             reply = self._get(key, request, waits)
         if reply is None:
-            raise NoServiceError(f"nobody answers at {key}")
+            raise NoServiceError(
+                f"no service answers at {key}; {START_ONE}, or wait for it (--wait)"
+            )
         if reply.ok is not None:
-            return self._read(reply.ok.payload, reply.ok.encoding, kind)
+            return reply.ok
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
                 f"no answer at {key} within {waits:g} s; allow it longer (--timeout)"
             )
-        detail = self._read(reply.err.payload, reply.err.encoding, ErrorReply).error
+        detail = _read(reply.err, ErrorReply).error
         raise ServiceError(
             detail.kind,
             detail.message,
@@ -196,8 +245,9 @@ class CruxClient:
             error = error or reply
         return error
 
-    def _read(self, payload: zenoh.ZBytes, encoding: zenoh.Encoding, kind: type[R]) -> R:
-        try:
-            return Format.named(str(encoding)).decode(payload.to_bytes(), kind)
-        except (MalformedError, msgspec.ValidationError) as error:
-            raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None
+
+def _read(told: zenoh.Sample | zenoh.ReplyError, kind: type[R]) -> R:
+    try:
+        return Format.named(str(told.encoding)).decode(told.payload.to_bytes(), kind)
+    except (MalformedError, msgspec.ValidationError) as error:
+        raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None

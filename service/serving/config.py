@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import re
 import socket
@@ -30,6 +31,7 @@ __all__ = [
     "exposed",
     "listening",
     "open_session",
+    "patient",
     "start_zenoh_log",
     "zenoh_config",
     "zenoh_options",
@@ -52,6 +54,9 @@ ROUTER_PORT: Final = 7447
 
 PORTS: Final = {"tcp": socket.SOCK_STREAM, "tls": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
 """Protocols with ports, and how one is probed."""
+
+RETRIES: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+"""How often it is tried to connect to who is waited for."""
 
 EXAMPLE: Final = "tcp/127.0.0.1:7447"
 """Of an endpoint."""
@@ -115,6 +120,25 @@ def zenoh_config(
             )
         _insert(config, key, value, "--cfg")
     return config
+
+
+def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
+    """Return a configuration as it is, but that a session looks so long for whom it connects to.
+
+    Parameters
+    ----------
+    config : zenoh.Config
+    seconds : float
+        [s]
+    """
+    copy = zenoh.Config.from_json5(str(config))
+    if msgspec.json.decode(copy.get_json("connect/retry")) is None:
+        copy.insert_json5("connect/retry", _json(RETRIES))
+    if msgspec.json.decode(copy.get_json("mode")) == "client":
+        # others go on looking while they are open
+        for key in ("connect/timeout_ms", "scouting/timeout"):
+            copy.insert_json5(key, _json(math.ceil(1e3 * seconds)))
+    return copy
 
 
 def open_session(config: zenoh.Config) -> zenoh.Session:

@@ -356,7 +356,7 @@ class Dispatcher:
         return how, left
 
     def _refuse(self, question: Question, error: CruxError) -> None:
-        self._reply(question, encode_error(error, question.form, question.id))
+        self._reply(question, question.refusal(error))
 
     def _reply(self, question: Question, answer: Answer) -> None:
         question.replied, question.payload = True, b""

@@ -8,11 +8,20 @@ from typing import Any, Final
 import msgspec
 import zenoh
 
-from hand_models.base import LimitError
+from hand_models.base import CruxError, LimitError
 from service.answering import SERVICES
 from service.processes import Job
-from service.requests import LONGEST_DEADLINE
-from service.wire import BODY_SPACE, WRENCH_SPACE, Format, MalformedError, check_size
+from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE
+from service.wire import (
+    BODY_SPACE,
+    LARGEST_ERROR,
+    WRENCH_SPACE,
+    Answer,
+    Format,
+    MalformedError,
+    check_size,
+    encode_error,
+)
 
 __all__ = ["LARGE", "Question", "client_of", "take"]
 
@@ -34,6 +43,7 @@ class _Head(msgspec.Struct):
 
     id: msgspec.Raw = msgspec.Raw()
     deadline: msgspec.Raw = msgspec.Raw()
+    max_reply_bytes: msgspec.Raw = msgspec.Raw()
     want: msgspec.Raw = msgspec.Raw()
     stance: msgspec.Raw = msgspec.Raw()
 
@@ -57,6 +67,8 @@ class Question:
     seconds : float
         Its deadline [s].
     id : str or None
+    most : int
+        Bytes that an error reply may take.
     stance : int or None
         A hash of its stance, where it could be read.
     dear : bool
@@ -79,6 +91,7 @@ class Question:
     encoding: str
     seconds: float
     id: str | None = None
+    most: int = LARGEST_ERROR
     stance: int | None = None
     dear: bool = False
     rehearsed: bool = False
@@ -98,6 +111,10 @@ class Question:
             return Format.named(self.encoding)
         except MalformedError:
             return Format.JSON
+
+    def refusal(self, error: CruxError) -> Answer:
+        """Return an error as its answer."""
+        return encode_error(error, self.form, self.id, most=self.most)
 
     def job(self, now: float, rehearsal: bool) -> Job:
         """Return it for a process."""
@@ -165,6 +182,9 @@ def _read(question: Question) -> None:
     many = isinstance(want, list) and any(each in want for each in DEAR)
     unread = len(bytes(head.want)) > SMALL
     question.dear = question.dear or many or unread
+    most = _value(head.max_reply_bytes, question.form)
+    if isinstance(most, int) and most >= LEAST_REPLY_BYTES:
+        question.most = min(most, LARGEST_ERROR)
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 
 

@@ -6,7 +6,6 @@ import logging
 import time
 from collections import Counter as Counts
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final, NamedTuple
 
 from prometheus_client import (
@@ -20,6 +19,7 @@ from prometheus_client import (
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from hand_models.base import installed_version
 from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.serving.question import Question
 from service.wire import Answer, Format
@@ -62,7 +62,7 @@ class Watch:
     """
 
     def __init__(self, robot: str, state: Callable[[], State]) -> None:
-        self._robot, self._version, self._state = robot, _version(), state
+        self._robot, self._version, self._state = robot, installed_version(), state
         self._started = time.time()
         self._failure: LastFailure | None = None
         self._replied = 0
@@ -198,10 +198,3 @@ class _Now(Collector):
             if each.resident is not None:
                 memory.add_metric([str(each.pid), each.purpose], each.resident)
         yield memory
-
-
-def _version() -> str | None:
-    try:
-        return version("crux")
-    except PackageNotFoundError:
-        return None

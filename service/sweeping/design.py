@@ -86,7 +86,13 @@ class Design:
         if not variations:
             raise InvalidInputError("something must vary", field="variations")
         asked = msgspec.structs.replace(
-            request, detail="hands", want=["load_factor"], draws=[], explain=False, id=None
+            request,
+            detail="hands",
+            want=["load_factor"],
+            draws=[],
+            explain=False,
+            id=None,
+            max_reply_bytes=None,
         )
         paths = Paths(msgspec.json.decode(msgspec.json.encode(asked)))
         targets = tuple(paths.target(each.path) for each in variations)

@@ -28,7 +28,7 @@ EVERY: Final = "*"
 """All entries of a list or an object."""
 
 FIXED: Final = frozenset(
-    {"v", "id", "deadline", "confidence", "detail", "want", "draws", "explain"}
+    {"v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want", "draws", "explain"}
 )
 """Fields of a request that are no part of what is asked about."""
 

@@ -1,6 +1,7 @@
-from .advice import words_of as words_of
+from .advice import print_advice as print_advice, words_of as words_of
 from .body_spaces import print_body_space as print_body_space
 from .layout import console as console, table_of as table_of, unit_of as unit_of
+from .output_lock import write_alone as write_alone
 from .plans import (
     print_plan as print_plan,
     print_robust as print_robust,
@@ -26,5 +27,6 @@ from .terminal import (
     tell_solver as tell_solver,
     verbosity as verbosity,
     waiting as waiting,
+    working as working,
     writing as writing,
 )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import islice
 from typing import Final
 
 from rich.console import Console
 
 from planner import Advice
+from service.replies import PlanReply
 
 __all__ = ["print_advice", "words_of"]
 
@@ -22,7 +22,10 @@ def words_of(advice: Advice, *, holding: bool = False) -> str:
     return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
 
 
-def print_advice(told: Iterable[Advice], out: Console, *, holding: bool = False) -> None:
-    """Print what would make a stance hold, or be better where it is ``holding`` already."""
-    for advice in islice(told, MOST):
+def print_advice(reply: PlanReply, out: Console) -> None:
+    """Print what would make a plan's stance hold, or be better, where that was looked for."""
+    holding = reply.status == "optimal"
+    for advice in islice(reply.advice or (), MOST):
         out.print(words_of(advice, holding=holding), markup=False)
+    if reply.advice == [] and "advice" not in reply.unfinished:
+        out.print("of all changes that were tried none would help")

@@ -29,7 +29,6 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
-from service.tables.advice import print_advice
 from service.tables.clearances import print_clearance
 from service.tables.layout import in_colour, short, show, table_of, unit_of
 from service.tables.spreads import robust_sentence, spread_sentence, within
@@ -64,7 +63,7 @@ def print_plan(
     without_palm: PlanReply | None = None,
     brief: bool = False,
 ) -> None:
-    """Print a plan.
+    """Print a plan, but for the advice.
 
     Parameters
     ----------
@@ -96,9 +95,6 @@ def print_plan(
         out.print(robust_sentence(reply.robust), markup=False)
     if isinstance(reply.clearance, Clearance):
         print_clearance(reply.clearance, out)
-    print_advice(reply.advice or (), out, holding=reply.status == "optimal")
-    if reply.advice == [] and "advice" not in reply.unfinished:
-        out.print("of all changes that were tried none would help")
     if reply.hands is not None:
         show(
             "wrench on the rock, in H [N, N·m], and the palm's part",

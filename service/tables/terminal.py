@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -36,6 +36,7 @@ __all__ = [
     "tell_solver",
     "verbosity",
     "waiting",
+    "working",
     "writing",
 ]
 
@@ -81,12 +82,15 @@ def say(result: object) -> None:
 def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
     """Write a plan, and return its exit status; what is brief is not for a person."""
     from service.replies import BriefPlanReply
+    from service.tables.advice import print_advice
     from service.tables.plans import print_plan
 
     if as_json or isinstance(reply, BriefPlanReply):
         say(reply)
     else:
         print_plan(reply, console(), brief=verbosity() < 0)
+        if verbosity() >= 0:
+            print_advice(reply, console())
         tell_solver(reply)
     return EXIT_STATUS.get(reply.status, FAILED)
 
@@ -188,21 +192,16 @@ def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
         yield lambda done, total, words: bar.update(task, completed=done, total=total, words=words)
 
 
+def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:
+    """Show what takes a while, as plans with floating wrists do."""
+    floats = any(hand.wrist == "floating" for hand in request.stance.hands)
+    return working(title) if floats else nullcontext()
+
+
 @contextmanager
-def waiting(title: str, request: PlanRequest) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal's standard error what takes a while; yields what tells of something else.
-
-    From the beginning that is hands with floating wrists.
-    """
-    with ExitStack() as lines:
-
-        def tell(title: str) -> None:
-            if verbosity() >= 0:
-                screen = console(stderr=True)
-                if screen.is_terminal:
-                    lines.close()
-                    lines.enter_context(screen.status(title))
-
-        if any(hand.wrist == "floating" for hand in request.stance.hands):
-            tell(title)
-        yield tell
+def working(title: str) -> Iterator[None]:
+    """Show on a terminal's standard error what is done meanwhile, unless less is to be said."""
+    screen = console(stderr=True)
+    shown = screen.is_terminal and verbosity() >= 0
+    with screen.status(title) if shown else nullcontext():
+        yield

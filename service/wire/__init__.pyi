@@ -7,6 +7,7 @@ from .codec import (
     encode_error as encode_error,
     identifier as identifier,
     most_bytes as most_bytes,
+    most_error_bytes as most_error_bytes,
 )
 from .errors import (
     REQUEST_KINDS as REQUEST_KINDS,

@@ -13,7 +13,7 @@ import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import Identifier, SetPointsRequest, StreamRequest
+from service.requests import Identifier, ReplyBytes, SetPointsRequest, StreamRequest
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import validation_error
@@ -28,6 +28,7 @@ __all__ = [
     "encode_error",
     "identifier",
     "most_bytes",
+    "most_error_bytes",
 ]
 
 T = TypeVar("T")
@@ -54,6 +55,9 @@ LARGEST_ERROR: Final = 4096
 
 PARTS: Final = {"id": 1540, "field": 600, "message": 1600}
 """Bytes of its texts as they are written; an ``id`` that a request may have is never more."""
+
+BARE: Final = 200
+"""Bytes of an error reply beside these texts, at most."""
 
 ALIASES: Final = {
     "": "application/json",
@@ -101,7 +105,12 @@ class Format(Enum):
 
     def label(self, message: msgspec.Struct) -> str:
         """Return the encoding of a message with its schema, as in ``…/json;crux.PlanReply@1``."""
-        return f"{self.value};crux.{type(message).__name__}@1"
+        return f"{self.value};{_schema_name(type(message))}"
+
+    @staticmethod
+    def is_labelled(encoding: str, kind: type[msgspec.Struct]) -> bool:
+        """Return whether an encoding names the schema of a kind of message."""
+        return encoding.partition(";")[2] == _schema_name(kind)
 
     def encode(self, message: object) -> bytes:
         """Return a message as bytes."""
@@ -129,6 +138,10 @@ class Format(Enum):
             raise MalformedError(f"not {self.name.lower()}: {error}") from None
         except RecursionError:
             raise MalformedError("nested too deeply") from None
+
+
+def _schema_name(kind: type[msgspec.Struct]) -> str:
+    return f"crux.{kind.__name__}@1"
 
 
 class Answer(NamedTuple):
@@ -254,25 +267,46 @@ class _Named(msgspec.Struct):
     id: Identifier | None = None
 
 
+class _Bounded(msgspec.Struct):
+    max_reply_bytes: ReplyBytes | None = None
+
+
 def identifier(payload: bytes, form: Format, kind: type | None = None) -> str | None:
     """Return a request's ``id``, whatever else is wrong with it; None where it cannot be read.
 
     Nor is it read where the payload is too large for the kind of request.
     """
+    read = _part(payload, form, kind, _Named)
+    return None if read is None else read.id
+
+
+def most_error_bytes(payload: bytes, form: Format, kind: type | None = None) -> int:
+    """Return how many bytes an error reply to a request may take; parameters as `identifier`."""
+    read = _part(payload, form, kind, _Bounded)
+    most = None if read is None else read.max_reply_bytes
+    return LARGEST_ERROR if most is None else min(most, LARGEST_ERROR)
+
+
+def _part(payload: bytes, form: Format, kind: type | None, part: type[T]) -> T | None:
     if len(payload) > (LARGEST_REQUEST if kind is None else most_bytes(kind)):
         return None
     try:
-        return form.decode(payload, _Named).id
+        return form.decode(payload, part)
     except (MalformedError, msgspec.ValidationError):
         return None
 
 
 def encode_error(
-    error: CruxError, form: Format, name: str | None = None, kind: str | None = None
+    error: CruxError,
+    form: Format,
+    name: str | None = None,
+    kind: str | None = None,
+    most: int = LARGEST_ERROR,
 ) -> Answer:
     """Return an error reply as an answer.
 
-    Texts are cut where there would be more than `LARGEST_ERROR` bytes of it.
+    Texts are cut where there would be more than `LARGEST_ERROR` bytes of it, or more than the
+    caller takes.
 
     Parameters
     ----------
@@ -282,17 +316,32 @@ def encode_error(
         The request's ``id``.
     kind : str, optional
         What the caller is told; by default the error's own.
+    most : int, optional
+        Bytes that it may take, at least `service.requests.LEAST_REPLY_BYTES`.
     """
     told = error.kind if kind is None else kind
+    reply = _error_reply(error, form, name, told, PARTS)
+    payload = form.encode(reply)
+    if len(payload) > most:
+        share = (most - BARE) / sum(PARTS.values())
+        parts = {part: int(share * size) for part, size in PARTS.items()}
+        reply = _error_reply(error, form, name, told, parts)
+        payload = form.encode(reply)
+    return Answer(payload, form.label(reply), False, told)
+
+
+def _error_reply(
+    error: CruxError, form: Format, name: str | None, told: str, parts: Mapping[str, int]
+) -> ErrorReply:
+    """Return an error as a reply whose texts take so many bytes at most."""
     detail = ErrorDetail(
         told,
-        None if error.field is None else _cut(error.field, PARTS["field"], form),
-        _cut(error.message, PARTS["message"], form),
+        None if error.field is None else _cut(error.field, parts["field"], form),
+        _cut(error.message, parts["message"], form),
     )
     if isinstance(error, BusyError):
         detail.retry_after = error.retry_after
-    reply = ErrorReply(id=None if name is None else _cut(name, PARTS["id"], form), error=detail)
-    return Answer(form.encode(reply), form.label(reply), False, told)
+    return ErrorReply(id=None if name is None else _cut(name, parts["id"], form), error=detail)
 
 
 def _cut(text: str, most: int, form: Format) -> str:

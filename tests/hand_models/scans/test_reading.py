@@ -240,7 +240,7 @@ def test_a_missing_package_is_named_with_what_installs_it(module, name, tmp_path
     else:
         write_geotiff(tmp_path / name, heights(), CELL)
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(InvalidInputError, match=r"pip install 'crux\[scans\]'"):
+    with pytest.raises(InvalidInputError, match=r"pip install -e '\.\[scans\]'"):
         read_scan(tmp_path / name)
 
 

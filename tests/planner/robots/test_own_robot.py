@@ -333,7 +333,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
         named = plan_request(put(wall_request(), ("stance", "robot"), "robosimian"))
         with pytest.raises(ServiceError, match="unknown robot 'robosimian'; known are arms"):
             arms.plan(named)
-        with pytest.raises(NoServiceError, match="nobody answers at crux/loris/plan"):
+        with pytest.raises(NoServiceError, match="no service answers at crux/loris/plan"):
             CruxClient(alone, "loris", timeout=PATIENCE).plan(request)
 
 

@@ -167,7 +167,7 @@ def test_no_place_to_work_at_is_told():
 
 
 def test_another_version_is_not_answered():
-    for name in ("crux", "numpy", "scipy", "clarabel"):
+    for name in ("crux-climb", "numpy", "scipy", "clarabel"):
         setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
         with pytest.raises(CruxError) as caught:
             answer_chunk(setting, encode_chunk([]))

@@ -240,8 +240,8 @@ def test_a_full_disk_leaves_whole_rows(lines, tmp_path, capfd):
 @pytest.mark.parametrize(
     ("module", "more", "words"),
     [
-        ("pyarrow", ["-o", "FOLDER/table.parquet"], "pip install 'crux[parquet]'"),
-        ("distributed", ["--dask", "local"], "pip install 'crux[dask]'"),
+        ("pyarrow", ["-o", "FOLDER/table.parquet"], "pip install -e '.[parquet]'"),
+        ("distributed", ["--dask", "local"], "pip install -e '.[dask]'"),
     ],
 )
 def test_what_is_not_installed_is_told_in_one_line(

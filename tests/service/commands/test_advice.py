@@ -82,6 +82,59 @@ def test_a_stance_may_be_gone_while_advice_is_sought(
     assert capfd.readouterr().err == ""
 
 
+def test_the_plan_is_printed_before_advice_is_looked_for(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked, told = answering.with_advice, []
+
+    def looks(answer: answering.Planned) -> answering.Planned:
+        told.append(capfd.readouterr())
+        return looked(answer)
+
+    monkeypatch.setattr(answering, "with_advice", looks)
+    path = stance_file(wall_request(HEAVY))
+    for number, more in enumerate(
+        ([], ["--advice", str(tmp_path)], ["-q", "--advice", str(tmp_path)])
+    ):
+        assert run(["plan", path, *more]) == OVERLOADED
+        assert len(told) == number + 1
+        out, err = told[-1]
+        assert out.startswith("OVERLOADED ")
+        assert err == ""
+        assert ("tension N" in out) == ("-q" not in more)
+        assert "would h" not in out
+        assert "would h" in capfd.readouterr().out
+
+
+def test_json_is_one_line_with_the_advice_in_it(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = stance_file(wall_request(HEAVY))
+    assert run(["plan", path, "--json", "--advice", str(tmp_path)]) == OVERLOADED
+    assert result(capfd)["advice"]
+    assert run(["plan", path, "--json"]) == OVERLOADED
+    assert "advice" not in result(capfd)
+
+
+def test_a_file_of_advice_is_the_stance_but_for_its_changes(
+    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given = wall_request(HEAVY)
+    given = dict(reversed(given.items())) | {"limits": {"utilisation": 1}}
+    given["stance"] = dict(reversed(given["stance"].items()))
+    path = stance_file(given)
+    run(["plan", path, "--json", "--robust", "--advice", str(tmp_path / "advised")])
+    found = result(capfd)["advice"]
+    assert len(found) > 3
+    for i, advice in enumerate(found):
+        text = (tmp_path / "advised" / f"advice-{i + 1}.json").read_text("utf-8")
+        written = json.loads(text)
+        assert [*written] == [*given, *([] if "load" in given else ["load"])][: len(written)]
+        assert '"utilisation": 1\n' in text
+        changed = {name.split(".")[0].split("[")[0] for name in advice["changes"]}
+        assert {part for part in written if written[part] != given.get(part)} <= changed
+
+
 def test_who_asks_for_less_waits_for_no_advice(
     stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,7 +40,7 @@ def completed(*words: str) -> list[str]:
 
 def test_the_version_is_that_of_the_distribution(capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["--version"]) == DONE
-    assert capfd.readouterr().out == f"crux {version('crux')}\n"
+    assert capfd.readouterr().out == f"crux {version('crux-climb')}\n"
 
 
 @pytest.mark.parametrize("command", ["plan", "query", "wrench-space", "body-space", "stream"])
@@ -184,6 +184,14 @@ def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
     )
     assert piped.stdout.startswith("OPTIMAL ")
     assert "\x1b" not in piped.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
+def test_a_terminal_shows_that_advice_is_looked_for(stance_file) -> None:
+    words = ["plan", stance_file(wall_request(HEAVY))]
+    assert "looking for what would hold" in on_a_terminal(words, stream="stderr")
+    assert on_a_terminal(["-q", *words], stream="stderr") == ""
 
 
 @pytest.mark.slow

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 import signal
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import trimesh
 
-from hand_models.base import CruxError
+from hand_models.base import CruxError, InvalidInputError
+from hand_models.fixed_wrist import AT_BORDER, grid_of_trials, try_holds
+from hand_models.hand import spiny_hand
+from hand_models.parameters import hand_table
+from hand_models.rock import Mesh, read_mesh
+from hand_models.tile import Surface
 from service import processes
 from service.commands.cli import run
 from service.processes import Interrupted
@@ -47,11 +53,50 @@ def test_holds_are_written_sorted_told_and_drawn(
     assert "x, y, z mm" in out
     assert out.splitlines()[-1] == f"{output} (in m, rad, N)"
     assert len(held) + told["refused"] <= 16
+    check_refusals(told)
     reaches = [hold["support"]["-fz"] for hold in held]
     assert reaches == sorted(reaches, reverse=True)
     first, *others = held
     assert first["worst"]["-fz"] <= first["tenth"]["-fz"]
     assert all(hold["worst"] is None for hold in others)
+
+
+def check_refusals(told: dict) -> None:
+    """Every refused trial is counted once, at its point and under its reason."""
+    by_reason: Counter[str] = Counter()
+    for refusal in told["refusals"]:
+        by_reason.update(refusal["reasons"])
+    assert by_reason == told["reasons"]
+    assert by_reason.total() == told["refused"]
+    points = [tuple(refusal["point"]) for refusal in told["refusals"]]
+    assert len({*points}) == len(points)
+
+
+def test_the_file_says_why_hands_cannot_be_at_places(rock: Path, tmp_path: Path) -> None:
+    """At the rim of a wall fingers reach over its border; each trial is tried again."""
+    output = tmp_path / "holds.json"
+    options = [*COARSE, "--robust", "0", "--workers", "1"]
+    assert run(["holds", str(rock), "-o", str(output), *options]) == DONE
+    told = json.loads(output.read_text(encoding="utf-8"))
+    check_refusals(told)
+    assert 0 < told["reasons"][AT_BORDER] < told["trials"] == told["tried"]
+    held = {tuple(hold["place"]["point"]) for hold in told["holds"]}
+    mesh = Mesh(*read_mesh(rock), hand_table(), anywhere=True)
+    radius = 0.5 * hand_table().scalar("palm", "length")
+    trials = grid_of_trials(mesh, 0.15, 1, (0.0,), radius=radius)
+    assert len(trials) == told["trials"]
+    at_point = Counter(trial.point for trial in trials)
+    for refusal in told["refusals"]:
+        point = tuple(refusal["point"])
+        refused = sum(refusal["reasons"].values())
+        assert 0 < refused <= at_point[point]
+        assert refused < at_point[point] or point not in held
+    # each refused trial alone is refused with the reason that is told of its point
+    tried = try_holds(spiny_hand(), mesh, Surface.named("rock"), trials)
+    for trial, outcome in zip(trials, tried, strict=True):
+        if isinstance(outcome, InvalidInputError):
+            (there,) = [r for r in told["refusals"] if tuple(r["point"]) == trial.point]
+            assert any(outcome.message.startswith(why.split("…")[0]) for why in there["reasons"])
 
 
 def test_a_plan_is_made_with_a_hold_that_was_proposed(

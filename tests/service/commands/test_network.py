@@ -12,8 +12,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import zenoh
 
+from service import CruxClient, NoServiceError
 from service.commands.cli import run
+from service.commands.stances import read_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import (
     BAD_INPUT,
@@ -24,12 +27,13 @@ from tests.suite.helpers.commands import (
     process,
 )
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.processes import begun
 from tests.suite.helpers.requests import (
     HEAVY,
     put,
     wall_request,
 )
-from tests.suite.helpers.served import Served, free_endpoint
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +115,61 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
     )
     assert (asked.returncode, asked.stdout) == (FAILED, b"")
     assert b"DEBUG" in asked.stderr
-    assert asked.stderr.splitlines()[-1] == b"crux: nobody answers at crux/robosimian/plan"
+    told = asked.stderr.splitlines()[-1]
+    assert told.startswith(
+        b"crux: no service answers at crux/robosimian/plan; start one with `crux"
+    )
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_a_query_waits_for_a_service_that_is_not_there_yet(mode: str, stance_file) -> None:
+    endpoint = free_endpoint()
+    flags = ["-m", mode, "-e", endpoint, "--no-multicast-scouting", "--wait", str(PATIENCE)]
+    asked = begun("query", stance_file(wall_request()), *flags, "--json")
+    server = Served(endpoint, "--workers", "1")
+    try:
+        out, err = asked.communicate(timeout=PATIENCE)
+    finally:
+        server.process.kill()
+        server.process.communicate()
+    assert (asked.returncode, err) == (DONE, b"")
+    assert json.loads(out)["status"] == "optimal"
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_a_service_that_does_not_come_is_waited_for_no_longer(
+    mode: str, stance_file, capfd: pytest.CaptureFixture[str]
+) -> None:
+    flags = ["-m", mode, "-e", free_endpoint(), "--no-multicast-scouting", "--wait", "0.3"]
+    assert run(["query", stance_file(wall_request()), *flags]) == FAILED
+    told = complaint(capfd)
+    assert told.startswith("crux: no service of robosimian within 0.3 s")
+    assert "start one with `crux serve`" in told
+
+
+@pytest.mark.parametrize("wait", ["-1", "nan", "soon", "1e7"])
+def test_how_long_is_waited_is_a_number_of_seconds(
+    wait: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["query", "wall-300", "--wait", wait]) == BAD_INPUT
+    assert "--wait" in complaint(capfd)
+
+
+def test_a_client_of_another_robot_s_service_waits_in_vain(served: Served) -> None:
+    with zenoh.open(client_config(served.endpoint)) as session:
+        with pytest.raises(NoServiceError, match=r"no service of loris within 0\.2 s; start one"):
+            CruxClient(session, "loris", wait=0.2)
+        assert not session.is_closed()
+        with CruxClient(session, wait=PATIENCE) as client:
+            assert client.plan(read_request("wall-300")).status == "optimal"
+
+
+def test_a_configuration_stays_as_it_was() -> None:
+    config = client_config(free_endpoint())
+    before = str(config)
+    with pytest.raises(NoServiceError, match=r"within 0\.1 s"):
+        CruxClient(config, wait=0.1)
+    assert str(config) == before
 
 
 VALID = "valid is such as tcp/127.0.0.1:7447"

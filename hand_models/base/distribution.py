@@ -1,0 +1,24 @@
+"""The name that this distribution has where packages are installed, and its version."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final
+
+__all__ = ["DISTRIBUTION", "installed_version", "to_install"]
+
+DISTRIBUTION: Final = "crux-climb"
+"""The name ``crux`` belongs to another project on PyPI."""
+
+
+def installed_version(package: str = DISTRIBUTION) -> str | None:
+    """Return the version of a distribution; None where it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def to_install(extra: str) -> str:
+    """Return in words how an extra of this distribution is installed."""
+    return f"in a checkout of {DISTRIBUTION}, pip install -e '.[{extra}]'"

@@ -1,0 +1,106 @@
+"""Replies of no more bytes than the caller takes: of less detail, or an error that has sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+from msgspec import NODEFAULT, UNSET
+from msgspec.structs import fields, replace
+
+from hand_models.base import LimitError
+from service.answering.answers import Planned
+from service.answering.streams import brief_set_points
+from service.replies import PlanReply, Reply, SetPointsReply
+from service.requests import Detail, Query, Request
+from service.wire import Format
+
+__all__ = ["fitted"]
+
+DETAILS: Final[tuple[Detail, ...]] = ("full", "hands", "set_points")
+"""From the most to the least."""
+
+WANTED: Final = ("spread", "advice", "robust", "clearance", "prices", "vertices", "half_spaces")
+"""Fields of replies that a ``want`` of the same name brings."""
+
+ALONG: Final = "along"
+"""A field that a request's ``directions`` bring."""
+
+
+def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
+    """Return a reply of no more bytes than the request allows, and its bytes.
+
+    Where the request does not say how much detail it wants, the most that fits is taken.
+
+    Parameters
+    ----------
+    request : Request
+    found : Reply or Planned
+        The answer as the request asks for it.
+    form : Format
+
+    Raises
+    ------
+    LimitError
+        If it does not fit; the message has the sizes of what may be asked for instead.
+    """
+    reply = found.reply if isinstance(found, Planned) else found
+    payload = form.encode(reply)
+    most = request.max_reply_bytes if isinstance(request, Query) else None
+    if most is None or len(payload) <= most:
+        return reply, payload
+    sizes = {}
+    given: Detail | None = getattr(request, "detail", None)
+    for detail, smaller in _with_less_detail(found, given or DETAILS[0]):
+        part = form.encode(smaller)
+        if given is None and len(part) <= most:
+            return smaller, part
+        sizes[f"with detail {detail}"] = len(part)
+    modelled = isinstance(reply, PlanReply) and "model" in getattr(request, "want", ())
+    bare = found.in_detail("full").reply if modelled and isinstance(found, Planned) else reply
+    sizes |= {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
+    raise _too_large(len(payload), most, sizes)
+
+
+def _with_less_detail(found: Reply | Planned, given: Detail) -> Iterator[tuple[Detail, Reply]]:
+    """Yield the replies of less detail than is given, from the most to the least."""
+    if isinstance(found, Planned):
+        for detail in DETAILS[DETAILS.index(given) + 1 :]:
+            yield detail, found.in_detail(detail).reply
+    elif isinstance(found, SetPointsReply) and given != DETAILS[-1]:
+        yield DETAILS[-1], brief_set_points(found)
+
+
+def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
+    """Yield the reply without each of what was asked for in addition, and without all of it.
+
+    ``bare``: the reply without the model, or itself where there is none in it.
+    """
+    blank: dict[str, Any] = {
+        field.name: None if field.default is NODEFAULT else field.default
+        for field in fields(reply)
+        if field.name in (*WANTED, ALONG)
+    }
+    there = [name for name in blank if getattr(reply, name) not in (None, UNSET)]
+    if bare is not reply:
+        yield "without model in want", bare
+    for name in there:
+        words = "without directions" if name == ALONG else f"without {name} in want"
+        yield words, replace(reply, **{name: blank[name]})
+    if len(there) + (bare is not reply) > 1:
+        yield "without all of these", replace(bare, **{name: blank[name] for name in there})
+
+
+def _too_large(size: int, most: int, sizes: dict[str, int]) -> LimitError:
+    told = f"the reply takes {size} bytes, and no more than {most} are allowed"
+    if sizes:
+        others = ", ".join(f"{taken} {words}" for words, taken in sizes.items())
+        told += f"; it takes {others}"
+    if not any(taken <= most for taken in sizes.values()):
+        told += f"; allow {_next(min([size, *sizes.values()]))}"
+    return LimitError(told, field="max_reply_bytes")
+
+
+def _next(size: int) -> int:
+    """Return a round number of bytes that also takes the same reply with other times in it."""
+    return (size // 100 + 1) * 100

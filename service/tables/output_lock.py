@@ -1,0 +1,99 @@
+"""A lock on what a command writes: two runs on one output would mix their answers."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+import click
+
+from hand_models.base import InvalidInputError
+from service.tables.terminal import remark, writing
+
+__all__ = ["write_alone"]
+
+HELD: Final = (errno.EACCES, errno.EAGAIN)
+"""What the system says where another process has the lock."""
+
+NO_LOCKS: Final = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+"""What it says where the file system has no locks."""
+
+
+def write_alone(file: Path, output: Path | None = None) -> None:
+    """Keep other runs from an output until the command that is running ends, or its process does.
+
+    Parameters
+    ----------
+    file : Path
+        A file that is written; the lock is beside it, ``.NAME.lock``.
+    output : Path, optional
+        The output as it was given; by default the file.
+
+    Raises
+    ------
+    InvalidInputError
+        If another process has the lock, or it cannot be written.
+    """
+    click.get_current_context().with_resource(_alone_at(file, output or file))
+
+
+@contextmanager
+def _alone_at(file: Path, output: Path) -> Iterator[None]:
+    target = file.resolve()
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        # a pipe or a device
+        yield
+        return
+    path = target.with_name(f".{target.name}.lock")
+    with writing(output, "-o"):
+        lock = _locked(path, output)
+    try:
+        yield
+    finally:
+        if lock is not None:
+            with suppress(OSError):
+                path.unlink()
+            os.close(lock)
+
+
+def _locked(path: Path, output: Path) -> int | None:
+    """Return the descriptor of a lock file that is locked; None where there are no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        remark(f"this system has no locks: no other run may write {output} now")
+        return None
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(lock)
+            if error.errno in HELD:
+                raise _held(path, output) from None
+            if error.errno not in NO_LOCKS:
+                raise
+            remark(f"{path}: the file system has no locks; no other run may write {output} now")
+            return None
+        # who had it before may have removed the file since it was opened
+        if path.exists() and os.path.samestat(os.fstat(lock), path.stat()):
+            os.ftruncate(lock, 0)
+            os.write(lock, f"{os.getpid()}\n".encode())
+            return lock
+        os.close(lock)
+
+
+def _held(path: Path, output: Path) -> InvalidInputError:
+    """Return the error about an output that another process writes."""
+    who = ""
+    with suppress(OSError, ValueError):
+        who = f" (process {int(path.read_text('ascii'))})"
+    return InvalidInputError(
+        f"{output}: another run{who} is writing there; wait until it has ended, or give another "
+        "output",
+        field="-o",
+    )
