@@ -57,6 +57,7 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.v": [{}],
     "PlanRequest.id": [{"id": "x"}],
     "PlanRequest.deadline": [{"deadline": 100.0}],
+    "PlanRequest.max_reply_bytes": [{"max_reply_bytes": 1_000_000}],
     "PlanRequest.stance": [{}],
     "PlanRequest.body_wrench": [{"body_wrench": [700.0, 20.0, -30.0, 5.0, 210.0, -8.0]}],
     "PlanRequest.load": [{"load": {}}],
