@@ -70,6 +70,10 @@ CLIENT_READS: Final = 1_000_000
 what cannot be given up, such as a declaration, the link is closed. In it a link of 1 Mbit/s takes a
 batch. Zenoh's own 5 s hold up what others need."""
 
+REPLY_LEAVES: Final = 5_000_000
+"""How long all further parts of a large reply wait for its client in sum [µs]. Beyond the 2 to 4 MB
+that the system takes at once, a link of 10 Mbit/s takes 6 MB in it."""
+
 QUEUES: Final = "transport/link/tx/queue/congestion_control"
 
 OWN: Final[dict[str, object]] = {
@@ -84,7 +88,7 @@ OWN: Final[dict[str, object]] = {
         }
     ],
     f"{QUEUES}/drop/wait_before_drop": CLIENT_READS,
-    f"{QUEUES}/drop/max_wait_before_drop_fragments": CLIENT_READS,
+    f"{QUEUES}/drop/max_wait_before_drop_fragments": REPLY_LEAVES,
     f"{QUEUES}/block/wait_before_close": CLIENT_READS,
 }
 """Settings that are not zenoh's own, where a file does not say otherwise."""

@@ -41,9 +41,9 @@ AVERAGED: Final = 20
 COME_AGAIN: Final = (0.05, 10.0)
 """Least and longest time after which a client is told to come again [s]."""
 
-MAILS: Final = 2.5
-"""How long the end waits for replies that are on their way [s]: somewhat longer than zenoh waits
-for a client that does not read (`service.serving.config`)."""
+MAILS: Final = 1.0
+"""How long the end waits for replies that are on their way [s]; clients that do not read keep some
+from leaving."""
 
 
 class Sender(StrEnum):

@@ -73,9 +73,15 @@ def test_the_rest_grows_while_no_process_can_be_started(
         found.end()
 
 
+class Part(SimpleNamespace):
+    """Stands for a process or one of its lanes; equal to itself alone."""
+
+    __eq__, __hash__ = object.__eq__, object.__hash__
+
+
 def station(*, ready: bool) -> Any:
-    made = SimpleNamespace(ready=ready)
-    made.lanes = tuple(SimpleNamespace(station=made, number=i) for i in range(2))
+    made = Part(ready=ready)
+    made.lanes = tuple(Part(station=made, number=i) for i in range(2))
     made.process = SimpleNamespace(is_alive=lambda: True)
     return made
 
