@@ -197,9 +197,11 @@ the message too, such as `application/msgpack;crux.PlanReply@1`. An error comes 
 reply (`reply_err`), in the same format: see [errors](errors.md).
 
 Send `source_info` (the identifier of a querier or publisher of yours, and a number that counts your
-questions): by it the service gives each client its turn. Declare the liveliness token
-`crux/<robot>/clients/<zid>`, with your session's zenoh identifier, and what you asked is dropped
-when you go, also behind a router. Both may be left out.
+questions): by it the service gives each client its turn where it is linked to the service. Behind a
+router, or so that nobody else can ask in your name, send a secret of 16 random bytes as attachment,
+too, and declare a queryable at `crux/<robot>/clients/<zid>`, with your session's zenoh identifier,
+that replies with the secret's SHA-256. With a liveliness token of the same key, what you asked is
+dropped when you go. All may be left out.
 
 The service itself holds the liveliness token `crux/<robot>/alive`.
 

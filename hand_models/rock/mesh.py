@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose
+from hand_models.base import Array, Indices, InvalidInputError, Pose, go_on
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.smoothing import OutlinedHold
@@ -124,7 +124,10 @@ class Mesh(OutlinedHold):
         welded = weld(given)
         if not len(welded.faces):
             raise InvalidInputError("no triangle has an area", field="faces")
-        self.triangles = without_spikes(wound_alike(welded), table.scalar("scan", "spike_ratio"))
+        wound = wound_alike(welded)
+        go_on()
+        self.triangles = without_spikes(wound, table.scalar("scan", "spike_ratio"))
+        go_on()
         self.nbytes = sum(part.nbytes for part in self.triangles)
         if not anywhere:
             self.check_place()

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.base import Array, Indices, InvalidInputError, go_on
 
 __all__ = [
     "TriangleCells",
@@ -29,6 +29,10 @@ __all__ = [
     "without_spikes",
     "wound_alike",
 ]
+
+COINCIDE: Final = 1e-8
+"""Vertices on the same multiple of this along each axis are one [m]: far below what any scan
+resolves, and above the rounding of coordinates of 10⁴ m."""
 
 SIDE: Final = 0.03
 """Of a cell of triangles; what is found does not depend on it [m]."""
@@ -66,14 +70,46 @@ def weld(triangles: Triangles) -> Triangles:
     """Return triangles that share vertices where these coincide, without those of no area."""
     import trimesh
 
-    mesh = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
-    mesh.merge_vertices()
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    mesh = trimesh.Trimesh(*_merged(triangles), process=False)
+    go_on()
+    solid = mesh.nondegenerate_faces()
+    go_on()
+    mesh.update_faces(solid & mesh.unique_faces())
     mesh.remove_unreferenced_vertices()
+    go_on()
     # columns of faces one after the other: cuts go through them one by one
     return Triangles(
         np.array(mesh.vertices, dtype=float), np.asfortranarray(mesh.faces, dtype=np.intp)
     )
+
+
+def _merged(triangles: Triangles) -> Triangles:
+    """Return triangles with one vertex, the first, in place of those that coincide.
+
+    Sorted by one coordinate after another, so that no step takes long.
+    """
+    vertices, faces = triangles
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    named = np.flatnonzero(used)
+    go_on()
+    cells = np.round(vertices[named] / COINCIDE).astype(np.int64)
+    order = np.arange(len(named))
+    for column in cells.T:
+        go_on()
+        order = order[np.argsort(column[order], kind="stable")]
+    go_on()
+    begins = np.append(True, (np.diff(cells[order], axis=0) != 0).any(axis=1))
+    # of each group the vertex that comes first: sorting has left equals in their order
+    first = order[begins]
+    kept = np.zeros(len(named), dtype=bool)
+    kept[first] = True
+    place = np.empty(len(named), dtype=np.intp)
+    place[order] = (np.cumsum(kept) - 1)[first][np.cumsum(begins) - 1]
+    go_on()
+    numbers = np.zeros(len(vertices), dtype=np.intp)
+    numbers[named] = place
+    return Triangles(vertices[named[kept]], numbers[faces])
 
 
 def wound_alike(triangles: Triangles) -> Triangles:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Indices, LimitError
+from hand_models.base import Array, Indices, LimitError, go_on
 from hand_models.wrench_spaces.half_spaces import Facets
 from hand_models.wrench_spaces.polytopes import distinct
 
@@ -66,6 +66,7 @@ def clipped(
     beyond = vertices @ cuts.normals.T > cuts.offsets
     # those that take most away first: what is gone need not be cut again
     for k in np.argsort(-beyond.sum(axis=0)):
+        go_on()
         normal, offset = cuts.normals[k], cuts.offsets[k]
         height = vertices @ normal - offset
         inside, outside = np.flatnonzero(height < -slack), np.flatnonzero(height > slack)
@@ -101,6 +102,7 @@ def _edges(
         return starts, ends
     one, other = lies[starts], lies[ends]
     shared = (one @ other.T).tocoo()
+    go_on()
     enough = shared.data >= r - 1
     if (pairs := int(enough.sum())) > most_pairs:
         raise LimitError(
@@ -116,11 +118,10 @@ def _edges(
 def _incidence(points: Array, faces: Facets, slack: float) -> scipy.sparse.csr_array:
     """Return which points (rows) lie on which facets (columns), as ones."""
     chunk = max(1, 2_000_000 // len(faces.offsets))
-    parts = [
-        scipy.sparse.csr_array(
-            (points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack).astype(float)
-        )
-        for k in range(0, max(len(points), 1), chunk)
-    ]
+    parts = []
+    for k in range(0, max(len(points), 1), chunk):
+        go_on()
+        on = points[k : k + chunk] @ faces.normals.T >= faces.offsets - slack
+        parts.append(scipy.sparse.csr_array(on.astype(float)))
     lies: scipy.sparse.csr_array = scipy.sparse.vstack(parts, format="csr")
     return lies

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Indices, SolverError
+from hand_models.base import Array, Indices, SolverError, go_on
 from hand_models.wrench_spaces.linear_programs import linear_program
 
 __all__ = ["TOLERANCE", "Polytope", "distinct", "hull", "hull_facets", "polytope"]
@@ -84,6 +84,7 @@ def polytope(A: Array, b: Array) -> Polytope:
     ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
     if ball is None or ball[-1] <= TOLERANCE:
         raise SolverError(f"a block of {d} columns has no interior")
+    go_on()
     cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
 
@@ -102,6 +103,7 @@ def _corners(A: Array, b: Array) -> Array:
     found = []
     first, second = _meeting(A, b, loosened)
     for start in range(0, len(first), max(1, CHUNK // len(b))):
+        go_on()
         one, two = (each[start : start + max(1, CHUNK // len(b))] for each in (first, second))
         det = A[one, 0] * A[two, 1] - A[one, 1] * A[two, 0]
         points = np.column_stack(
@@ -143,6 +145,7 @@ def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
     ends = np.empty((2, d))
     for j in range(d):
         for k, sign in enumerate((1.0, -1.0)):
+            go_on()
             found = linear_program(
                 sign * np.eye(d)[j], A, b / unit, f"a block of {d} columns", tolerance=TIGHT
             )
@@ -157,6 +160,7 @@ def _irredundant(A: Array, b: Array) -> Indices:
     # the others hold in the whole box, and a little beyond
     rows = list(np.flatnonzero(np.abs(A).sum(axis=1) >= b - BEYOND))
     for row in list(rows):
+        go_on()
         others = [k for k in rows if k != row]
         result = scipy.optimize.linprog(
             -A[row],
@@ -195,6 +199,7 @@ def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
     failed = ""
     # not merged where they are wide (Q12), which costs vertices and makes facets that are none
     for tried in (options, JOGGLED):
+        go_on()
         try:
             return scipy.spatial.ConvexHull(points, qhull_options=tried)
         except scipy.spatial.QhullError as error:
@@ -229,10 +234,10 @@ def _planes(points: Array, found: scipy.spatial.ConvexHull) -> Array:
     normals[inside] *= -1.0
     offsets[inside] *= -1.0
     spans = sizes[:, -1] > SLIVER * sizes[:, 0]
-    chunk = max(1, CHUNK // len(points))
-    reach = [
-        np.max(normals[k : k + chunk] @ points.T, axis=1) for k in range(0, len(normals), chunk)
-    ]
+    chunk, reach = max(1, CHUNK // len(points)), []
+    for k in range(0, len(normals), chunk):
+        go_on()
+        reach.append(np.max(normals[k : k + chunk] @ points.T, axis=1))
     beyond = np.concatenate(reach) - offsets
     spans &= beyond <= TOLERANCE * np.abs(points).max()
     return np.column_stack([normals, -offsets])[spans]

@@ -2,7 +2,8 @@
 
 A clock reaches every solver that is started. It is that of the thread's context, so that nothing on
 the way has to hand it on. Solvers ask it at each of their iterations, searches before each of their
-steps, hands while they close. A budget is a count of programs, the same on every machine.
+steps, hands while they close, sets while they are listed, meshes while they are welded. A budget is
+a count of programs, the same on every machine.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
 
 
 def _mind_hands() -> None:
-    check("the hands were closed on their holds")
+    check("the hands were closed on their holds and their wrench spaces known")
 
 
 def seconds() -> float | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 import time
 import uuid
-from collections import OrderedDict
-from typing import Final
+from collections import Counter, OrderedDict
+from typing import Final, NamedTuple
 
 from msgspec.structs import astuple, replace
 
@@ -26,7 +26,15 @@ FIRST: Final = "the plans about the first body wrench were there"
 """What a deadline may come before."""
 
 KEPT: Final = 16
-"""Streams that a service keeps; then the one that was asked for longest ago goes."""
+"""Streams that a service keeps; then, of the client that has most, the one that was asked for
+longest ago goes."""
+
+
+class _Kept(NamedTuple):
+    """A stream, and the client that has declared it."""
+
+    stream: WrenchStream
+    owner: str
 
 
 def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
@@ -53,11 +61,24 @@ def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
 
 
 class Streams:
-    """Streams by their identifiers. Safe to use from several threads."""
+    """Streams by their identifiers. Safe to use from several threads.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._kept: OrderedDict[str, WrenchStream] = OrderedDict()
+    Parameters
+    ----------
+    owner : str, optional
+        The client that declares.
+    among : Streams, optional
+        Of which these are those that a client sees: all, but what it declares is its own.
+    """
+
+    def __init__(self, owner: str = "", among: Streams | None = None) -> None:
+        self._owner = owner
+        self._lock: threading.Lock = threading.Lock() if among is None else among._lock
+        self._kept: OrderedDict[str, _Kept] = OrderedDict() if among is None else among._kept
+
+    def of(self, owner: str) -> Streams:
+        """Return the same streams for a client."""
+        return Streams(owner, self)
 
     def declare(self, request: StreamRequest, robots: Robots = ROBOTS) -> StreamReply:
         """Answer a declaration; parameters and errors as of `opened`."""
@@ -86,11 +107,18 @@ class Streams:
             stream.close()
             raise
         with self._lock:
-            self._kept[identifier] = stream
-            gone = [self._kept.popitem(last=False)[1] for _ in range(len(self._kept) - KEPT)]
-        for old in gone:
-            old.close()
+            self._kept[identifier] = _Kept(stream, self._owner)
+            gone = self._taken_out() if len(self._kept) > KEPT else None
+        if gone is not None:
+            gone.close()
         return reply
+
+    def _taken_out(self) -> WrenchStream:
+        """Take out the oldest stream of the client that has most."""
+        counts = Counter(each.owner for each in self._kept.values())
+        most = max(counts.values())
+        oldest = next(name for name, each in self._kept.items() if counts[each.owner] == most)
+        return self._kept.pop(oldest).stream
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -105,15 +133,16 @@ class Streams:
         """
         start = time.perf_counter()
         with self._lock:
-            stream = self._kept.get(request.stream)
-            if stream is not None:
+            kept = self._kept.get(request.stream)
+            if kept is not None:
                 self._kept.move_to_end(request.stream)
-        if stream is None:
+        if kept is None:
             raise InvalidInputError(
                 f"no stream {request.stream!r}: declare one; the last {KEPT} that were used are "
                 "kept",
                 field="stream",
             )
+        stream = kept.stream
         points = stream.set_points(request.body_wrench)
         reply = set_points_reply(request.stream, stream, points, start, request.detail or "full")
         reply.id = request.id
@@ -129,9 +158,10 @@ class Streams:
     def close(self) -> None:
         """Let all streams go."""
         with self._lock:
-            gone, self._kept = self._kept, OrderedDict()
-        for stream in gone.values():
-            stream.close()
+            gone = list(self._kept.values())
+            self._kept.clear()
+        for kept in gone:
+            kept.stream.close()
 
 
 def set_points_reply(

@@ -43,6 +43,8 @@ class Job(NamedTuple):
         The service's own deadline, from where it came [s].
     rehearsal : bool
         Whether what is declared is let go again.
+    client : str
+        Who asks: streams are shared out by it.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Job(NamedTuple):
     waited: float = 0.0
     seconds: float | None = None
     rehearsal: bool = False
+    client: str = ""
 
 
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
@@ -72,9 +75,9 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     streams = Streams()
 
     def answer(job: Job) -> Answer:
-        start = time.perf_counter()
+        start, begun = time.perf_counter(), time.thread_time()
         arrived = start - job.waited
-        own = closing(Streams()) if job.rehearsal else nullcontext(streams)
+        own = closing(Streams()) if job.rehearsal else nullcontext(streams.of(job.client))
         with own as asked, deadline.within(job.seconds, started=arrived):
             found = handle(
                 job.name,
@@ -85,6 +88,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
                 started=arrived,
                 streams=asked,
             )
-        return found._replace(seconds=time.perf_counter() - start)
+        cost = time.thread_time() - begun
+        return found._replace(seconds=time.perf_counter() - start, cost=cost)
 
     return answer

@@ -66,10 +66,13 @@ class ErrorReply(Reply, kw_only=True):
 
 
 class ProcessHealth(Struct, kw_only=True):
-    """One of a service's processes; ``resident``: its memory [bytes], where the system tells it."""
+    """One of a service's processes; ``resident``: its memory [bytes], where the system tells it.
+
+    ``purpose``: a ``spare`` one stands ready to take the place of one that ends.
+    """
 
     pid: int | None
-    purpose: Literal["questions", "streams"]
+    purpose: Literal["questions", "streams", "spare"]
     state: Literal["starting", "idle", "working"]
     resident: int | None
 

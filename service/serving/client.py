@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import secrets
 import threading
 import time
 from queue import SimpleQueue
@@ -33,6 +34,7 @@ from service.requests import (
     WrenchSpaceRequest,
 )
 from service.serving.config import TIMEOUT, open_session, patient
+from service.serving.names import digest
 from service.wire import (
     ALIVE,
     BODY_SPACE,
@@ -47,6 +49,7 @@ from service.wire import (
     NoServiceError,
     ServiceError,
     ServiceTimeout,
+    check_size,
     service_key,
 )
 
@@ -58,6 +61,9 @@ IN_TIME: Final = 0.9
 """Part of a client's time in which a question without a deadline is to be answered."""
 
 START_ONE: Final = "start one with `crux serve` where this session reaches it"
+
+SECRET: Final = 16
+"""Bytes of what a client's queries carry to prove whose they are."""
 
 SECOND_TRY_AFTER: Final = 0.3
 """Pause before an empty answer is believed: a service that has just come back needs it [s]."""
@@ -109,6 +115,15 @@ class CruxClient:
         self._source = self._session.declare_querier(service_key(robot, PLAN))
         here = service_key(robot, f"{CLIENTS}/{self._session.info.zid()}")
         self._here = self._session.liveliness().declare_token(here)
+        # and by this that nobody else asks in its name
+        self._secret = secrets.token_bytes(SECRET)
+        proof = digest(self._secret)
+
+        def prove(query: zenoh.Query) -> None:
+            with query:
+                query.reply(here, proof)
+
+        self._proof = self._session.declare_queryable(here, Callback(prove, indirect=False))
         if wait is not None:
             try:
                 self._await(wait, begun)
@@ -153,6 +168,7 @@ class CruxClient:
         """Close the session, if it is the client's own."""
         if not self._session.is_closed():
             self._here.undeclare()
+            self._proof.undeclare()
             self._source.undeclare()
         if self._owned is not None:
             self._owned.close()
@@ -171,6 +187,8 @@ class CruxClient:
             If nobody answers.
         ServiceTimeout
             If nobody answers in time.
+        LimitError
+            If the request has too many bytes.
         """
         told = self._ask(PLAN, request)
         if Format.is_labelled(str(told.encoding), BriefPlanReply):
@@ -227,15 +245,19 @@ class CruxClient:
 
     def _get(self, key: str, request: Query, timeout: float) -> zenoh.Reply | None:
         """Return the first reply that is no error, else the first error, or None without any."""
+        payload = self.form.encode(request)
+        # what is larger, a service does not take in, and so cannot answer
+        check_size(len(payload), type(request))
         replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
         self._session.get(
             key,
             Callback(replies.put, lambda: replies.put(None), indirect=False),
-            payload=self.form.encode(request),
+            payload=payload,
             encoding=self.form.label(request),
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout,
             source_info=zenoh.SourceInfo(self._source.id, next(self._asked)),
+            attachment=self._secret,
         )
         error = None
         while (reply := replies.get()) is not None:

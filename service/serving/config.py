@@ -7,13 +7,15 @@ import math
 import os
 import re
 import socket
+import struct
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from ipaddress import ip_address
 from pathlib import Path
+from socket import AF_INET, AF_INET6
 from typing import Any, Final
 
 import click
@@ -21,7 +23,7 @@ import msgspec
 import zenoh
 
 from hand_models.base import InvalidInputError
-from service.wire import NoServiceError
+from service.wire import LARGEST_REQUEST, NoServiceError
 
 __all__ = [
     "MODES",
@@ -64,6 +66,43 @@ EXAMPLE: Final = "tcp/127.0.0.1:7447"
 SHOWN: Final = 60
 """Characters of what was given that are repeated."""
 
+LARGEST_MESSAGE: Final = LARGEST_REQUEST + 2**20
+"""Bytes of a message that is taken in: a request, what it is sent with, and some to spare. Zenoh's
+own limit is 1 GiB, of which a session keeps every byte."""
+
+CLIENT_READS: Final = 1_000_000
+"""How long a message waits for a client that takes nothing [µs]; then a reply is given up, and for
+what cannot be given up, such as a declaration, the link is closed. In it a link of 1 Mbit/s takes a
+batch. Zenoh's own 5 s hold up what others need."""
+
+REPLY_LEAVES: Final = 5_000_000
+"""How long all further parts of a large reply wait for its client in sum [µs]. Beyond the 2 to 4 MB
+that the system takes at once, a link of 10 Mbit/s takes 6 MB in it."""
+
+QUEUES: Final = "transport/link/tx/queue/congestion_control"
+
+OWN: Final[dict[str, object]] = {
+    "transport/link/rx/max_message_size": LARGEST_MESSAGE,
+    # a reply is sent as its query came, which is the client's choice; this makes it ours
+    "qos/network": [
+        {
+            "messages": ["query"],
+            "key_exprs": ["**/crux/**"],
+            "flows": ["ingress"],
+            "overwrite": {"congestion_control": "drop"},
+        }
+    ],
+    f"{QUEUES}/drop/wait_before_drop": CLIENT_READS,
+    f"{QUEUES}/drop/max_wait_before_drop_fragments": REPLY_LEAVES,
+    f"{QUEUES}/block/wait_before_close": CLIENT_READS,
+}
+"""Settings that are not zenoh's own, where a file does not say otherwise."""
+
+DESCRIPTORS: Final = "/dev/fd"
+"""Has the numbers of this process's open files."""
+
+NO_LINGER: Final = struct.pack("ii", 0, 0)
+
 STANDARD_OUTPUT: Final = 1
 STANDARD_ERROR: Final = 2
 """File descriptors."""
@@ -97,7 +136,10 @@ def zenoh_config(
     InvalidInputError
         If zenoh does not accept a part of it.
     """
-    config = _read(file)
+    config, plain = _read(file), zenoh.Config()
+    for key, own in OWN.items():
+        if config.get_json(key) == plain.get_json(key):
+            _insert(config, key, _json(own), key)
     # queries through shared memory can be dropped unseen (zenoh issue 2628)
     _insert(config, "transport/shared_memory/enabled", "false", "shared_memory")
     if mode is not None:
@@ -180,6 +222,25 @@ def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
             logging.shutdown()
             sys.stdout.flush()
             os._exit(0)
+
+
+def close_at_once() -> None:
+    """Let every TCP connection of this process be closed without waiting for its other end.
+
+    Zenoh lets closing wait for 10 s (`SO_LINGER`) until what is left has been taken, in a thread
+    and under locks that all its links need (zenoh issues 1101 and 2718). Without that the system
+    goes on sending what is left, and nobody waits.
+    """
+    for name in os.listdir(DESCRIPTORS):
+        with suppress(OSError):
+            # what is no socket is refused here
+            link = socket.socket(fileno=int(name))
+            try:
+                if link.type == socket.SOCK_STREAM and link.family in (AF_INET, AF_INET6):
+                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGER)
+            finally:
+                # it stays open: it is another's
+                link.detach()
 
 
 def listening(config: zenoh.Config) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from multiprocessing.connection import Connection
-from typing import Final
+from typing import Final, Literal
 
 from planner import OUT_OF_MEMORY, Lane, Make, Station, resident
 from service.processes import Job
@@ -43,7 +43,7 @@ SET_POINTS_LANE: Final = 0
 
 
 class Crew:
-    """Processes that answer questions, and one that has the streams.
+    """Processes that answer questions, one that has the streams, and one to take a place at once.
 
     Parameters
     ----------
@@ -63,6 +63,8 @@ class Crew:
         When processes are started again, on the clock of `time.perf_counter`.
     stillborn : int
         Processes in a row that could not be started, or died before they were ready.
+    start : float
+        How long the last process took to be ready [s]; zero before there is any.
     """
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
@@ -70,37 +72,68 @@ class Crew:
         self.work: dict[Lane[Job, Answer], Question | None] = {}
         self.rests_until = 0.0
         self.stillborn = 0
+        self.start = 0.0
         self._streams: Station[Job, Answer] | None = None
+        self._spare: Station[Job, Answer] | None = None
+        self._starting: dict[Station[Job, Answer], float] = {}
 
     @property
     def stations(self) -> list[Station[Job, Answer]]:
         """The processes."""
-        return list(dict.fromkeys(lane.station for lane in self.work))
+        at_work = dict.fromkeys(lane.station for lane in self.work)
+        return [*at_work] if self._spare is None else [*at_work, self._spare]
 
     @property
     def pipes(self) -> dict[Connection, Lane[Job, Answer]]:
-        """The lanes, by their pipes."""
-        return {lane.pipe: lane for lane in self.work}
+        """The lanes of all processes, by their pipes."""
+        return {lane.pipe: lane for station in self.stations for lane in station.lanes}
 
     @property
     def up(self) -> bool:
         """Whether questions of all kinds can be answered."""
-        ready = [station for station in self.stations if station.ready]
-        return self._streams in ready and len(ready) > 1
+        return self._streams is not None and self._streams.ready and bool(self._answering())
+
+    def _answering(self) -> list[Station[Job, Answer]]:
+        """Return the processes that answer questions and are ready."""
+        at_work = dict.fromkeys(lane.station for lane in self.work)
+        return [each for each in at_work if each.ready and each is not self._streams]
 
     def hire(self) -> None:
-        """Start the processes that are missing; rest where the system refuses one."""
-        if time.perf_counter() < self.rests_until:
-            return
+        """Fill places that are empty: with the one that is ready for that, or a new process.
+
+        Where the system refuses one, none is started for a while.
+        """
         try:
-            if self._streams is None:
-                self._streams = self._station(STREAMS_LANES)
-                self.work |= dict.fromkeys(self._streams.lanes)
-            for _ in range(1 + self.workers - len(self.stations)):
-                self.work |= dict.fromkeys(self._station(1).lanes)
+            if self._streams is None and (station := self._next()):
+                self._streams = station
+                self.work |= dict.fromkeys(station.lanes)
+            has = len({lane.station for lane in self.work if not self.has_streams(lane)})
+            for _ in range(self.workers - has):
+                if station := self._next():
+                    self.work[station.lanes[0]] = None
+            if self._spare is None and self.up and len(self._answering()) == self.workers:
+                self._spare = self._started()
         except OSError as error:
             rest = self._rest()
             log.warning("no process can be started, again in %g s: %s", rest, error)
+
+    def _next(self) -> Station[Job, Answer] | None:
+        """Return a process for an empty place; None while none is to be started."""
+        spare, self._spare = self._spare, None
+        return spare or self._started()
+
+    def _started(self) -> Station[Job, Answer] | None:
+        if time.perf_counter() < self.rests_until:
+            return None
+        # any process may come to have the streams; what ends the service is for it to answer
+        station = Station(self._make, STREAMS_LANES, self._memory, stays=True)
+        self._starting[station] = time.perf_counter()
+        return station
+
+    def came_up(self, station: Station[Job, Answer]) -> None:
+        """Take note of how long a process took to be ready, if it has just become so."""
+        if station.ready and (begun := self._starting.pop(station, None)) is not None:
+            self.start = time.perf_counter() - begun
 
     def _rest(self) -> float:
         """Start none for a while, longer each time, and return how long [s]."""
@@ -108,10 +141,6 @@ class Crew:
         self.rests_until = time.perf_counter() + rest
         self.stillborn += 1
         return rest
-
-    def _station(self, lanes: int) -> Station[Job, Answer]:
-        # what ends the service is for it to answer
-        return Station(self._make, lanes, self._memory, stays=True)
 
     def has_streams(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane is of the process that has the streams."""
@@ -130,10 +159,11 @@ class Crew:
             if asked is None and lane.ready and lane.station.process.is_alive()
         ]
 
-    def dear(self) -> int:
-        """Return how many processes that answer questions have one that may take long."""
+    def takes_dear(self) -> bool:
+        """Whether a question that may take long leaves a process that is ready to the others."""
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
-        return sum(each is not None and each.dear for each in asked)
+        dear = sum(each is not None and each.dear for each in asked)
+        return dear < (1 if self.workers == 1 else len(self._answering()) - 1)
 
     def ends(self, lane: Lane[Job, Answer]) -> tuple[float, float]:
         """Return when the question that a lane works on, and then its process, are given up."""
@@ -159,9 +189,12 @@ class Crew:
         left : list of Question
             That it had, and nobody has replied to.
         """
-        asked = [self.work.pop(lane) for lane in station.lanes]
+        asked = [self.work.pop(lane, None) for lane in station.lanes]
+        self._starting.pop(station, None)
         if station is self._streams:
             self._streams = None
+        if station is self._spare:
+            self._spare = None
         if station.ready:
             self.stillborn = 0
         else:
@@ -178,15 +211,21 @@ class Crew:
         for station in self.stations:
             station.kill()
         self.work.clear()
+        self._streams = self._spare = None
+
+    def _purpose(self, station: Station[Job, Answer]) -> Literal["questions", "streams", "spare"]:
+        if station is self._streams:
+            return "streams"
+        return "spare" if station is self._spare else "questions"
 
     def states(self) -> list[ProcessHealth]:
         """Return what each process does."""
         found = []
         for station in self.stations:
-            busy = any(self.work[lane] is not None for lane in station.lanes)
+            busy = any(self.work.get(lane) is not None for lane in station.lanes)
             state = ProcessHealth(
                 pid=station.process.pid,
-                purpose="streams" if station is self._streams else "questions",
+                purpose=self._purpose(station),
                 state="starting" if not station.ready else "working" if busy else "idle",
                 resident=resident(station.process.pid),
             )

@@ -1,9 +1,9 @@
 """Which question is answered when, and by which process: one thread, which never waits for any.
 
 Questions wait by their kind: set-points; those about known stances, which are short; others; and
-those that may take long, which leave one process to the others. One more process has the streams
-and a lane for what is short, so that nothing delays these. What is over its deadline ends, with its
-process if it must be.
+those that may take long, which leave one process to the others. In each queue, who has had least of
+the processes' time is next. One more process has the streams and a lane for what is short, so that
+nothing delays these. What is over its deadline ends, with its process if it must be.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from planner import DeadlineError, Lane, Station
 from service.processes import Job
 from service.serving.costs import Costs
 from service.serving.crew import Crew
-from service.serving.mail import Mail, reply_to
+from service.serving.mail import Replies, Sender, reply_to
+from service.serving.names import Names
 from service.serving.question import Question, client_of, take
+from service.serving.shares import Shares
 from service.serving.waiting import Kind, Waiting
 from service.serving.watch import State, Watch
 from service.wire import (
     PLAN,
-    SET_POINTS,
     STREAM,
     Answer,
-    BusyError,
     Format,
     LostError,
     encode_error,
@@ -54,32 +54,14 @@ STOPS: Final = 2.0
 QUIET: Final = 0.2
 """How long no question may have come at the end: those on their way are to be told [s]."""
 
-MAILS: Final = 0.5
-"""And for replies that are on their way [s]."""
-
-FIRST_GUESS: Final = 0.05
-"""How long questions take, before any has been answered [s]."""
-
-AVERAGED: Final = 20
-"""About how many questions the mean time is of."""
-
 TOLD_IN: Final = 1.0
 """How long another thread waits to be told what the service does [s]."""
-
-UNNAMED: Final = 8
-"""Clients without a name as which those without a name are replied to."""
-
-OPERATORS: Final = "operators"
-"""One more, as which those are who ask how the service is."""
 
 AWAKE: Final = 0.1
 """How often who waits for the start is awake [s]."""
 
 AT_ONCE: Final = 32
 """Of what has come, how much is taken in before processes are looked at again."""
-
-COME_AGAIN: Final = (0.05, 10.0)
-"""Least and longest time after which a client is told to come again [s]."""
 
 
 class Dispatcher:
@@ -93,6 +75,8 @@ class Dispatcher:
         The deadline of a question that names none [s].
     robot : str
         Whose service it is.
+    inquire : callable, optional
+        Asks the session of a name for its digest, which `proven` is given.
 
     Attributes
     ----------
@@ -100,14 +84,19 @@ class Dispatcher:
         Is told what happens.
     """
 
-    def __init__(self, crew: Crew, seconds: float, robot: str) -> None:
-        self._crew, self._seconds = crew, seconds
+    def __init__(
+        self,
+        crew: Crew,
+        seconds: float,
+        robot: str,
+        inquire: Callable[[str], None] | None = None,
+    ) -> None:
+        self._crew, self._seconds, self._inquire = crew, seconds, inquire
         self.watch = Watch(robot, self._state)
-        self._mail = Mail()
+        self._replies = Replies(self.watch)
         self._costs = Costs()
-        self._waiting = Waiting()
-        self._mean = FIRST_GUESS
-        self._unnamed = 0
+        self._names, self._shares = Names(), Shares()
+        self._waiting = Waiting(self._shares)
         self._started = threading.Event()
         self._stops_at: float | None = None
         self._quiet_from = 0.0
@@ -140,11 +129,29 @@ class Dispatcher:
 
     def look(self, told: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
         """Take an operator's query; returns at once."""
-        self._mail.send(client_of(query) or OPERATORS, partial(reply_to, query, key, told))
+        client = client_of(query)
+        known = client if client in self._names.linked else Sender.OPERATORS
+        self._replies.later(known, partial(reply_to, query, key, told))
 
-    def gone(self, client: str) -> None:
-        """Say that a client has gone: what it asked is not answered unless it is in work."""
-        self._post(partial(self._drop, client))
+    def linked(self, client: str) -> None:
+        """Say that a session has a link to the service's own."""
+        self._post(partial(self._names.linked.add, client))
+
+    def proven(self, client: str, proof: bytes) -> None:
+        """Hand in the digest that the session of a name has told itself."""
+        self._post(partial(self._prove, client, proof))
+
+    def gone(self, client: str, *, token: bool = False) -> None:
+        """Say that a client has gone: what it asked is not answered unless it is in work.
+
+        Parameters
+        ----------
+        client : str
+        token : bool, optional
+            Whether its liveliness token says so, and not its link. That is believed only of who has
+            proven its name, and has no link.
+        """
+        self._post(partial(self._drop, client, token))
 
     def stop(self) -> None:
         """Refuse what waits and what still comes, and wait a little for what is in work."""
@@ -155,7 +162,7 @@ class Dispatcher:
         """Refuse what has come since the stop, and wait a little for replies on their way."""
         while not self._inbox.empty():
             self._take_in()
-        self._mail.close(MAILS)
+        self._replies.close()
 
     def _post(self, event: Callable[[], None]) -> None:
         """Let the dispatcher's own thread do something; all that follows is in it."""
@@ -189,7 +196,8 @@ class Dispatcher:
         for pipe in ready:
             if (
                 pipe is not self._woken
-                and (lane := pipes[cast(Connection, pipe)]) in self._crew.work
+                # not of a process that another lane has told of meanwhile
+                and (lane := pipes[cast(Connection, pipe)]).station in self._crew.stations
             ):
                 self._take_back(lane)
         if self._woken in ready:
@@ -224,7 +232,8 @@ class Dispatcher:
                 told, ends = self._crew.ends(lane)
                 times.append(ends if asked.replied else told)
         ending = self._stops_at
-        own = [self._crew.rests_until] if ending is None else [ending, self._quiet_from]
+        held = now + self._waiting.held()
+        own = [self._crew.rests_until, held] if ending is None else [ending, self._quiet_from]
         times += [each for each in own if each > now]
         least = min(times)
         return None if least == math.inf else max(least - now, 0.0)
@@ -237,43 +246,40 @@ class Dispatcher:
         except Exception:
             log.exception("a query at %s cannot be read", key)
             unread = CruxError("the service could not read the query; its log says why")
-            self._send(query, key, "", encode_error(unread, Format.JSON, kind="internal"))
+            answer = encode_error(unread, Format.JSON, kind="internal")
+            self._replies.later(Sender.UNREAD, partial(reply_to, query, key, lambda: answer))
             return
         if self._stops_at is not None:
-            self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+            self._replies.ending(question)
             self._quiet_from = time.perf_counter() + QUIET
             return
         if question.fault is not None:
-            self._refuse(question, question.fault)
+            self._replies.refuse(question, question.fault)
             return
-        kind = self._kind(question)
-        if self._waiting.has_room(kind, question):
-            self._waiting.put(kind, question)
-            return
-        low, high = COME_AGAIN
-        ahead = self._mean * len(self._waiting) / self._crew.workers
-        again = round(min(max(ahead, low), high), 3)
-        busy = f"the service has too many questions; ask again in {again:g} s"
-        self._refuse(question, BusyError(busy, again))
+        question.place = self._names.place(question.client, question.secret)
+        if self._inquire and self._names.is_to_prove(question.client, question.secret):
+            self._replies.later(Sender.INQUIRIES, partial(self._inquire, question.client))
+        self._shares.asks(question.place)
+        self._put(self._costs.kind(question), question)
 
-    def _kind(self, question: Question) -> Kind:
-        if question.name == SET_POINTS:
-            return Kind.SET_POINTS
-        if question.dear:
-            return Kind.DEAR
-        if question.name == PLAN and self._costs.is_short(question.stance):
-            return Kind.SHORT
-        if self._costs.is_cheap(question.stance):
-            return Kind.OTHER
-        return Kind.DEAR if self._costs.is_dear(question.client) else Kind.OTHER
+    def _put(self, kind: Kind, question: Question) -> None:
+        """Let a question wait, or the one be told to come again that has no room then."""
+        if refused := self._waiting.put(kind, question):
+            self._replies.busy(refused, len(self._waiting) / self._crew.workers)
+
+    def _prove(self, client: str, proof: bytes) -> None:
+        self._names.proven(client, proof)
+        for kind, question in self._waiting.take_out(lambda each: each.client == client):
+            question.place = self._names.place(client, question.secret)
+            self._put(kind, question)
 
     def _deal(self) -> None:
         """Give lanes that have nothing to do the questions whose turn it is."""
         idle = self._crew.idle()
         others = [lane for lane in idle if not self._crew.has_streams(lane)]
-        most = max(1, self._crew.workers - 1)
-        while others and (question := self._waiting.next(dear=self._crew.dear() < most)):
-            knowing = [lane for lane in others if self._knows(lane, question)]
+        while others and (question := self._waiting.next(dear=self._crew.takes_dear())):
+            knows, stance = self._costs.knows, question.stance
+            knowing = [lane for lane in others if knows(lane.station, stance)]
             lane = (knowing or others)[0]
             others.remove(lane)
             self._give(lane, question)
@@ -285,19 +291,21 @@ class Dispatcher:
             if question := self._waiting.take(*kinds):
                 self._give(lane, question)
 
-    def _knows(self, lane: Lane[Job, Answer], question: Question) -> bool:
-        return self._costs.knows(lane.station, question.stance)
-
     def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
         lane.give(question.job(question.begun, rehearsal), len(question.payload))
 
-    def _drop(self, client: str) -> None:
-        for question in self._waiting.remove(lambda each: each.client == client):
-            self.watch.told(question, "gone", 0.0)
-            self._mail.send(client, question.query.drop)
+    def _drop(self, client: str, token: bool) -> None:
+        names = self._names
+        if token and (client in names.linked or not names.has_proof(client)):
+            return
+        names.gone(client)
+        self._shares.gone(client)
+        gone = LostError("its client has gone, as its link or its liveliness token says")
+        for question in self._waiting.remove(lambda each: each.place == client):
+            self._replies.refuse(question, gone, "gone")
 
     # answers -------------------------------------------------------------------------------------
 
@@ -310,21 +318,26 @@ class Dispatcher:
                 rest = "the streams are lost with it; declare them again"
             how, left = self._dismiss(lane.station)
             for question in left:
-                self._refuse(question, LostError(f"the process that worked on it {how}; {rest}"))
+                self._shares.ended_process(question.place, time.perf_counter() - question.begun)
+                lost = LostError(f"the process that worked on it {how}; {rest}")
+                self._replies.refuse(question, lost)
             return
         if done is None:
+            self._crew.came_up(lane.station)
+            self._shares.start = self._crew.start or self._shares.start
             return
         asked = self._crew.work[lane]
         self._crew.work[lane] = None
         assert asked is not None
-        self._mean += (done.seconds - self._mean) / AVERAGED
         stance = asked.stance if asked.name == PLAN else None
-        self._costs.took(asked.client, stance, lane.station, done.seconds)
+        cost = done.cost or done.seconds
+        self._shares.charge(asked.place, cost)
+        self._costs.took(asked.place, stance, lane.station, cost)
         if asked.name == STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
-            self._waiting.put(Kind.DECLARED, asked)
+            self._put(Kind.DECLARED, asked)
         elif not asked.replied:
-            self._reply(asked, done)
+            self._replies.reply(asked, done)
         if self._crew.has_grown(lane):
             self._dismiss(lane.station, "had grown too large")
 
@@ -332,7 +345,7 @@ class Dispatcher:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.overdue(now):
-            self._refuse(question, DeadlineError(question.seconds, "it was its turn"))
+            self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
         for lane, asked in list(self._crew.work.items()):
             if asked is None or lane not in self._crew.work:
                 continue
@@ -341,9 +354,10 @@ class Dispatcher:
                 continue
             if not asked.replied:
                 missing = "there was an answer, and its work was broken off"
-                self._refuse(asked, DeadlineError(asked.seconds, missing))
+                self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
-                self._costs.took(asked.client, None, None, now - asked.begun)
+                self._costs.took(asked.place, None, None, now - asked.begun)
+                self._shares.ended_process(asked.place, now - asked.begun)
                 self._dismiss(lane.station, "did not stop at a deadline")
 
     def _dismiss(
@@ -354,20 +368,6 @@ class Dispatcher:
         self._costs.lost(station)
         self.watch.ended(station.process.pid, why or how)
         return how, left
-
-    def _refuse(self, question: Question, error: CruxError) -> None:
-        self._reply(question, question.refusal(error))
-
-    def _reply(self, question: Question, answer: Answer) -> None:
-        question.replied, question.payload = True, b""
-        self.watch.told(question, answer.status, answer.seconds)
-        self._send(question.query, question.key, question.client, answer)
-
-    def _send(self, query: zenoh.Query, key: str, client: str, answer: Answer) -> None:
-        if not client:
-            self._unnamed = (self._unnamed + 1) % UNNAMED
-        send = partial(reply_to, query, key, lambda: answer)
-        self._mail.send(client or str(self._unnamed), send)
 
     def _state(self) -> State:
         """Return what the service does, to whatever thread."""
@@ -386,7 +386,7 @@ class Dispatcher:
         now = time.perf_counter()
         self._stops_at, self._quiet_from = now + STOPS, now + QUIET
         for question in self._waiting.remove(lambda _: True):
-            self._refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+            self._replies.ending(question)
 
     def _ended(self) -> bool:
         if self._stops_at is None:
@@ -394,6 +394,7 @@ class Dispatcher:
         left, now = self._crew.left(), time.perf_counter()
         if (left or now < self._quiet_from) and now < self._stops_at:
             return False
+        lost = LostError("the service ended before there was an answer")
         for question in left:
-            self._refuse(question, LostError("the service ended before there was an answer"))
+            self._replies.refuse(question, lost)
         return True

@@ -10,19 +10,51 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable
+from enum import StrEnum
+from functools import partial
 from queue import SimpleQueue
 from typing import Final
 
 import zenoh
 
-from service.wire import Answer
+from hand_models.base import CruxError
+from service.serving.question import Question
+from service.serving.watch import Watch
+from service.wire import Answer, BusyError
 
-__all__ = ["Mail", "reply_to"]
+__all__ = ["Mail", "Replies", "Sender", "reply_to"]
 
 log = logging.getLogger(__name__)
 
 SENDERS: Final = 32
 """Clients that can be waited for at a time."""
+
+UNNAMED: Final = 8
+"""Clients as which those are replied to whom nothing tells apart."""
+
+FIRST_GUESS: Final = 0.05
+"""How long questions take, before any has been answered [s]."""
+
+AVERAGED: Final = 20
+"""About how many questions the mean time is of."""
+
+COME_AGAIN: Final = (0.05, 10.0)
+"""Least and longest time after which a client is told to come again [s]."""
+
+MAILS: Final = 1.0
+"""How long the end waits for replies that are on their way [s]; clients that do not read keep some
+from leaving."""
+
+
+class Sender(StrEnum):
+    """Stands for a client where what is sent is for none that is known."""
+
+    OPERATORS = "operators"
+    """Who asks how the service is, without a link to it."""
+    UNREAD = "unread"
+    """Whose query could not be read."""
+    INQUIRIES = "inquiries"
+    """Sessions that are asked to prove their names."""
 
 
 class Mail:
@@ -77,3 +109,52 @@ def reply_to(query: zenoh.Query, key: str, told: Callable[[], Answer]) -> None:
             query.reply(key, answer.payload, encoding=answer.encoding)
         else:
             query.reply_err(answer.payload, encoding=answer.encoding)
+
+
+class Replies:
+    """Replies to questions, each of which gets one, and what a watch is told of them.
+
+    Parameters
+    ----------
+    watch : Watch
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._mail = Mail()
+        self._unnamed = 0
+        self._mean = FIRST_GUESS
+
+    def later(self, client: str, work: Callable[[], None]) -> None:
+        """Let work that may wait for a client be done, after what was handed in for it before."""
+        self._mail.send(client, work)
+
+    def refuse(self, question: Question, error: CruxError, status: str | None = None) -> None:
+        """Reply with an error; the status is its kind, unless another is given."""
+        answer = question.refusal(error)
+        self.reply(question, answer if status is None else answer._replace(status=status))
+
+    def busy(self, question: Question, ahead: float) -> None:
+        """Tell a question to come again that has no room; ``ahead``: for each process so many."""
+        low, high = COME_AGAIN
+        again = round(min(max(self._mean * ahead, low), high), 3)
+        busy = f"the service has too many questions; ask again in {again:g} s"
+        self.refuse(question, BusyError(busy, again))
+
+    def ending(self, question: Question) -> None:
+        """Tell a question that the service is ending."""
+        self.refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+
+    def reply(self, question: Question, answer: Answer) -> None:
+        """Reply with an answer."""
+        if answer.seconds > 0.0:
+            self._mean += (answer.seconds - self._mean) / AVERAGED
+        question.replied, question.payload = True, b""
+        self._watch.told(question, answer.status, answer.seconds)
+        self._unnamed = (self._unnamed + 1) % UNNAMED
+        send = partial(reply_to, question.query, question.key, lambda: answer)
+        self._mail.send(question.place or str(self._unnamed), send)
+
+    def close(self) -> None:
+        """Wait a little for replies that are on their way."""
+        self._mail.close(MAILS)

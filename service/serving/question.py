@@ -34,6 +34,9 @@ LARGE: Final = 2**18
 DEAR: Final = ("robust", "spread", "advice")
 """Extras that take many plans."""
 
+ATTACHED: Final = 2**12
+"""Bytes of a query's attachment, which is held as long as the query."""
+
 SMALL: Final = 2**12
 """Bytes of a field that is read of it; what is longer is left to a process, too."""
 
@@ -59,7 +62,11 @@ class Question:
     key, name : str
         Of the service; the name is its last part.
     client : str
-        Its session's identifier; empty for clients that do not tell it.
+        Its session's identifier, as it says; empty for clients that do not.
+    place : str
+        Whose share of the processes it takes, as far as that is known.
+    secret : bytes
+        By which a client proves its identifier; empty without one.
     arrived : float
         On the clock of `time.perf_counter`.
     payload : bytes
@@ -76,7 +83,7 @@ class Question:
     rehearsed : bool
         Whether it declares a stream that another process has found to be possible.
     fault : LimitError or None
-        If it has too many bytes, which are not taken then.
+        If it has too many bytes, or its attachment; they are not taken then.
     replied : bool
     begun : float
         When a process was given it, on the same clock; negative before.
@@ -98,6 +105,8 @@ class Question:
     fault: LimitError | None = None
     replied: bool = False
     begun: float = -1.0
+    place: str = ""
+    secret: bytes = b""
 
     @property
     def deadline(self) -> float:
@@ -119,7 +128,8 @@ class Question:
     def job(self, now: float, rehearsal: bool) -> Job:
         """Return it for a process."""
         waited = now - self.arrived
-        return Job(self.name, self.payload, self.encoding, waited, self.seconds, rehearsal)
+        encoding, seconds = self.encoding, self.seconds
+        return Job(self.name, self.payload, encoding, waited, seconds, rehearsal, self.place)
 
 
 def client_of(query: zenoh.Query) -> str:
@@ -139,15 +149,23 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
     longest : float
         The deadline of one that names none [s].
     """
-    given = query.payload
-    fault, payload = None, b""
+    given, attached = query.payload, query.attachment
+    fault, payload, secret = None, b"", b""
     name = key.rpartition("/")[2]
-    if given is not None:
-        try:
+    try:
+        if attached is not None:
+            if len(attached) > ATTACHED:
+                raise LimitError(
+                    f"the query's attachment has {len(attached)} bytes; {ATTACHED} at most, send "
+                    "what is asked as its payload",
+                    field="attachment",
+                )
+            secret = attached.to_bytes()
+        if given is not None:
             check_size(len(given), SERVICES[name].request)
             payload = given.to_bytes()
-        except LimitError as error:
-            fault = error
+    except LimitError as error:
+        fault = error
     question = Question(
         query=query,
         key=key,
@@ -159,6 +177,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
         seconds=longest,
         dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > LARGE,
         fault=fault,
+        secret=secret,
     )
     if len(payload) <= READ:
         _read(question)

@@ -19,6 +19,7 @@ from planner import Make, RobotFile, cores
 from service.answering import SERVICES, robots_of
 from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
+from service.serving.config import close_at_once
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, Answer, service_key
@@ -98,7 +99,8 @@ class PlanService:
         self._alive = service_key(self.robot, ALIVE)
         self._session = session
         made = make or partial(answering, robot, hand)
-        self._dispatcher = Dispatcher(Crew(made, count, memory), seconds, self.robot)
+        crew = Crew(made, count, memory)
+        self._dispatcher = Dispatcher(crew, seconds, self.robot, self._inquire)
         self._watch = self._dispatcher.watch
         self._open = ExitStack()
 
@@ -128,11 +130,12 @@ class PlanService:
         health, metrics = self.operators
         for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
             self._declare(key, partial(self._dispatcher.look, told))
-        links = Callback(self._transport, indirect=False)
-        self._until_the_end(self._session.info.declare_transport_events_listener(links))
-        liveliness, clients = self._session.liveliness(), service_key(self.robot, f"{CLIENTS}/*")
-        seen = Callback(self._client, indirect=False)
-        self._until_the_end(liveliness.declare_subscriber(clients, seen))
+        # clients in this process need no link
+        self._dispatcher.linked(str(self._session.info.zid()))
+        links, info = Callback(self._transport, indirect=False), self._session.info
+        self._until_the_end(info.declare_transport_events_listener(links, history=True))
+        liveliness = self._session.liveliness()
+        self._until_the_end(liveliness.declare_subscriber(self._client_key("*"), self._client))
         self._open.callback(self._dispatcher.stop)
         self._until_the_end(liveliness.declare_token(self._alive))
         return self
@@ -154,10 +157,40 @@ class PlanService:
         taker = Callback(callback, indirect=False)
         self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
 
+    def _client_key(self, name: str) -> str:
+        return service_key(self.robot, f"{CLIENTS}/{name}")
+
     def _transport(self, event: zenoh.TransportEvent) -> None:
+        name = str(event.transport.zid)
         if event.kind == zenoh.SampleKind.DELETE:
-            self._dispatcher.gone(str(event.transport.zid))
+            self._dispatcher.gone(name)
+        else:
+            close_at_once()
+            self._dispatcher.linked(name)
 
     def _client(self, sample: zenoh.Sample) -> None:
-        if sample.kind == zenoh.SampleKind.DELETE:
-            self._dispatcher.gone(str(sample.key_expr).rpartition("/")[2])
+        """See a client's token come or go, in a thread that may wait."""
+        if sample.kind != zenoh.SampleKind.DELETE:
+            return
+        name = str(sample.key_expr).rpartition("/")[2]
+        # the one that has gone may be another session's of the same key
+        left = self._session.liveliness().get(self._client_key(name), timeout=SEARCH)
+        if not any(reply.ok is not None for reply in left):
+            self._dispatcher.gone(name, token=True)
+
+    def _inquire(self, name: str) -> None:
+        """Ask the session of a name for the digest of its secret; only its own reply counts."""
+
+        def told(reply: zenoh.Reply) -> None:
+            replier = reply.replier_id
+            if reply.ok is not None and replier is not None and str(replier.zid) == name:
+                self._dispatcher.proven(name, reply.ok.payload.to_bytes())
+
+        self._session.get(
+            self._client_key(name),
+            Callback(told, indirect=False),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            congestion_control=zenoh.CongestionControl.DROP,
+            timeout=SEARCH,
+        )

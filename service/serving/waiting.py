@@ -10,6 +10,7 @@ from itertools import chain
 from typing import Final
 
 from service.serving.question import LARGE, Question
+from service.serving.shares import Shares
 
 __all__ = ["FairQueue", "Kind", "Waiting"]
 
@@ -17,13 +18,14 @@ EACH: Final = 32
 """Questions of one client that wait in a queue; further ones are told to come again."""
 
 ALL: Final = 256
-"""Questions of all clients that wait in a queue."""
+"""Questions of all clients that wait in a queue; beyond it the place that has most loses its last
+one."""
 
 HELD: Final = 2**28
 """Bytes of all large questions that wait."""
 
 SHARE: Final = 2**26
-"""Bytes of those of one client, unless it is one question."""
+"""Bytes of those of one place, unless it is one question."""
 
 
 class Kind(Enum):
@@ -41,48 +43,103 @@ class Kind(Enum):
 
 
 class FairQueue:
-    """Questions by client: first in, first out among a client's, and clients in turn."""
+    """Questions by place, and there by client: first in, first out among a client's.
 
-    def __init__(self) -> None:
-        self._of: dict[str, deque[Question]] = {}
+    The place that has had least of the processes' time is next, and there clients have their turns.
+
+    Parameters
+    ----------
+    shares : Shares
+    holds : bool
+        Whether places wait that have ended a process.
+    """
+
+    def __init__(self, shares: Shares, *, holds: bool) -> None:
+        self._shares, self._holds = shares, holds
+        self._at: dict[str, dict[str, deque[Question]]] = {}
 
     def __iter__(self) -> Iterator[Question]:
-        return chain.from_iterable(self._of.values())
+        return chain.from_iterable(self._all(place) for place in self._at)
 
     def __len__(self) -> int:
-        return sum(map(len, self._of.values()))
+        return sum(self._size(place) for place in self._at)
 
-    def has_room(self, client: str) -> bool:
-        """Whether one more question of a client may wait."""
-        return len(self) < ALL and len(self._of.get(client, ())) < EACH
+    def _all(self, place: str) -> Iterator[Question]:
+        return chain.from_iterable(self._at[place].values())
 
-    def put(self, question: Question) -> None:
-        """Let a question wait."""
-        self._of.setdefault(question.client, deque()).append(question)
+    def _size(self, place: str) -> int:
+        return sum(map(len, self._at.get(place, {}).values()))
 
-    def take(self) -> Question:
-        """Return the next question; the client whose it is comes last from then on."""
-        client = next(iter(self._of))
-        questions = self._of.pop(client)
+    def put(self, question: Question) -> Question | None:
+        """Let a question wait; return the one that has no room then: this one, or another's."""
+        own = self._at.get(question.place, {}).get(question.client, ())
+        if len(own) >= EACH:
+            return question
+        gone = None
+        if len(self) >= ALL:
+            most = max(self._at, key=self._size)
+            if self._size(most) <= self._size(question.place) + 1:
+                return question
+            gone = max(self._at[most].values(), key=len)[-1]
+            self.remove(lambda each: each is gone)
+        clients = self._at.setdefault(question.place, {})
+        clients.setdefault(question.client, deque()).append(question)
+        return gone
+
+    def take(self) -> Question | None:
+        """Return the next question, if there is one that need not wait.
+
+        Its place and its client come last among equals from then on.
+        """
+        places = [place for place in self._at if not self._waits(place)]
+        place = self._shares.next(places)
+        if place is None:
+            return None
+        clients = self._at.pop(place)
+        client = next(iter(clients))
+        questions = clients.pop(client)
         question = questions.popleft()
         if questions:
-            self._of[client] = questions
+            clients[client] = questions
+        if clients:
+            self._at[place] = clients
         return question
 
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
         gone = [question for question in self if unwanted(question)]
         for question in gone:
-            self._of[question.client].remove(question)
-        self._of = {client: questions for client, questions in self._of.items() if questions}
+            clients = self._at[question.place]
+            clients[question.client].remove(question)
+            if not clients[question.client]:
+                del clients[question.client]
+            if not clients:
+                del self._at[question.place]
         return gone
+
+    def held(self) -> float:
+        """Return how long it is until a place that has to wait is next [s]; infinity without."""
+        waits = map(self._waits, self._at)
+        return min((each for each in waits if each > 0.0), default=math.inf)
+
+    def _waits(self, place: str) -> float:
+        return self._shares.waits(place) if self._holds else 0.0
 
 
 class Waiting:
-    """All questions that wait."""
+    """All questions that wait.
 
-    def __init__(self) -> None:
-        self._queues = {kind: FairQueue() for kind in Kind}
+    Parameters
+    ----------
+    shares : Shares
+    """
+
+    def __init__(self, shares: Shares) -> None:
+        self._queues = {
+            # set-points end no process, and others are not to end with one
+            kind: FairQueue(shares, holds=kind is not Kind.SET_POINTS)
+            for kind in Kind
+        }
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
 
     def __iter__(self) -> Iterator[Question]:
@@ -95,10 +152,6 @@ class Waiting:
         """Return how many there are, by kind."""
         return {kind.value: len(queue) for kind, queue in self._queues.items()}
 
-    def has_room(self, kind: Kind, question: Question) -> bool:
-        """Whether a question may wait, too."""
-        return self._fits(question) and self._queues[kind].has_room(question.client)
-
     def _fits(self, question: Question) -> bool:
         """Whether there is room for a large question: what is small is no matter of bytes."""
         size = len(question.payload)
@@ -107,19 +160,19 @@ class Waiting:
         held: Counter[str] = Counter()
         for each in self:
             if len(each.payload) > LARGE:
-                held[each.client] += len(each.payload)
-        own = held[question.client]
+                held[each.place] += len(each.payload)
+        own = held[question.place]
         return not held or ((not own or own + size <= SHARE) and held.total() + size <= HELD)
 
-    def put(self, kind: Kind, question: Question) -> None:
-        """Let a question wait."""
-        self._queues[kind].put(question)
+    def put(self, kind: Kind, question: Question) -> Question | None:
+        """Let a question wait; return the one that has no room then, if any."""
+        return self._queues[kind].put(question) if self._fits(question) else question
 
     def take(self, *kinds: Kind) -> Question | None:
         """Return the next question of the first of some kinds that has one."""
         for kind in kinds:
-            if self._queues[kind]:
-                return self._queues[kind].take()
+            if (question := self._queues[kind].take()) is not None:
+                return question
         return None
 
     def next(self, *, dear: bool) -> Question | None:
@@ -144,6 +197,16 @@ class Waiting:
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
         return [each for queue in self._queues.values() for each in queue.remove(unwanted)]
+
+    def take_out(self, wanted: Callable[[Question], bool]) -> list[tuple[Kind, Question]]:
+        """Take some questions out of their queues; return them with these."""
+        return [
+            (kind, each) for kind, queue in self._queues.items() for each in queue.remove(wanted)
+        ]
+
+    def held(self) -> float:
+        """Return how long it is until a place that has to wait is next [s]; infinity without."""
+        return min(queue.held() for queue in self._queues.values())
 
     def first_deadline(self) -> float:
         """Return when the first question's time is over; infinity where none waits."""

@@ -1,5 +1,6 @@
 from .codec import (
     LARGEST_ERROR as LARGEST_ERROR,
+    LARGEST_REQUEST as LARGEST_REQUEST,
     Answer as Answer,
     Format as Format,
     check_size as check_size,

@@ -158,6 +158,8 @@ class Answer(NamedTuple):
         Of a reply that has one; the kind of an error.
     seconds : float
         How long the work took [s].
+    cost : float
+        Processor time of it [s], which other programs on the machine do not change.
     """
 
     payload: bytes
@@ -165,6 +167,7 @@ class Answer(NamedTuple):
     good: bool = True
     status: str = "done"
     seconds: float = 0.0
+    cost: float = 0.0
 
 
 def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) -> T:

@@ -37,6 +37,7 @@ from tests.load.asking import (
     spoilt,
 )
 from tests.load.bulk import bulk
+from tests.load.others import greedy, starve, starved, unread
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.served import Served, free_endpoint
 
@@ -399,7 +400,8 @@ def memory(first: int, last: int, seed: int) -> None:
         console.print(f"{name}: {info.kept} of {info.most} kept, {info.hits:,} hits")
 
 
-main.add_command(bulk)
+for command in (bulk, starve, starved, greedy, unread):
+    main.add_command(command)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -70,6 +71,53 @@ def test_the_rest_grows_while_no_process_can_be_started(
         assert len(found.stations) == 2
     finally:
         found.end()
+
+
+class Part(SimpleNamespace):
+    """Stands for a process or one of its lanes; equal to itself alone."""
+
+    __eq__, __hash__ = object.__eq__, object.__hash__
+
+
+def station(*, ready: bool) -> Any:
+    made = Part(ready=ready)
+    made.lanes = tuple(Part(station=made, number=i) for i in range(2))
+    made.process = SimpleNamespace(is_alive=lambda: True)
+    return made
+
+
+def crew_of(workers: int, ready: int, dear: int) -> Crew:
+    """A crew in which some processes are ready, and some of these have what may take long."""
+    found = Crew(obedient, workers, MEMORY)
+    for i in range(workers):
+        question = SimpleNamespace(dear=True) if i < dear else None
+        found.work[station(ready=i < ready).lanes[0]] = question  # type: ignore[assignment]
+    found._streams = station(ready=True)
+    found.work |= dict.fromkeys(found._streams.lanes)  # type: ignore[union-attr, arg-type]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("workers", "ready", "dear", "takes"),
+    [
+        (1, 1, 0, True),
+        (1, 1, 1, False),
+        (2, 2, 0, True),
+        (2, 2, 1, False),
+        # the only one that is ready is left to the others
+        (2, 1, 0, False),
+        (3, 2, 0, True),
+        (3, 2, 1, False),
+        (3, 3, 1, True),
+        (3, 1, 0, False),
+        (8, 5, 3, True),
+        (8, 5, 4, False),
+    ],
+)
+def test_only_processes_that_are_ready_count(
+    workers: int, ready: int, dear: int, takes: bool
+) -> None:
+    assert crew_of(workers, ready, dear).takes_dear() == takes
 
 
 def test_a_service_for_which_no_process_can_be_started_says_so(

@@ -79,10 +79,13 @@ class Site:
         self.folder = Path(self._open.enter_context(TemporaryDirectory()))
         self.numbers = itertools.count()
         self.endpoint = free_endpoint()
-        config = zenoh_config(mode="peer", listen=[self.endpoint], multicast=False)
-        session = self._open.enter_context(open_session(config))
+        session = self._open.enter_context(open_session(self.config()))
         self.service = PlanService(session, make=obedient, **settings)  # type: ignore[arg-type]
         self._open.enter_context(self.service)
+
+    def config(self) -> zenoh.Config:
+        """Of the service's own session."""
+        return zenoh_config(mode="peer", listen=[self.endpoint], multicast=False)
 
     def client(self, *, named: bool = True) -> Client:
         session = self._open.enter_context(zenoh.open(client_config(self.endpoint)))
@@ -130,7 +133,9 @@ def all_working(site: Site, client: Client) -> Iterator[None]:
 
 
 def all_up(health: dict) -> bool:
-    return "starting" not in states(health) + states(health, "streams")
+    """Whether all processes are ready, the spare one, too."""
+    all_states = [p["state"] for p in health["processes"]]
+    return "starting" not in all_states and len(states(health, "spare")) == 1
 
 
 def all_new(old: set[int], health: dict) -> bool:
@@ -207,7 +212,7 @@ def test_a_process_that_stands_still_takes_nothing_and_stops_nobody(
     for pid in before:
         os.kill(pid, signal.SIGSTOP)
     large = client.send({"echo": "x" * 3_000_000, "deadline": 1.0})
-    assert len(site.health(client)["processes"]) == 3
+    assert len(site.health(client)["processes"]) == 4
     assert kind(result(large)) == "deadline"
     assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
     for pid in before:
@@ -247,6 +252,22 @@ def test_processes_that_are_killed_are_replaced_whatever_they_do(
         site.wait_until(client, gone)
         assert "pid" in client.ask({"echo": 1})
         assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
+
+
+@pytest.mark.parametrize("purpose", ["questions", "streams", "spare"])
+def test_a_process_that_stands_ready_takes_the_place_of_one_that_ends(
+    site: Site, client: Client, purpose: str
+) -> None:
+    before = {p["pid"]: p["purpose"] for p in site.wait_until(client, all_up)["processes"]}
+    (spare,) = (pid for pid, does in before.items() if does == "spare")
+    killed = next(pid for pid, does in before.items() if does == purpose)
+    os.kill(killed, signal.SIGKILL)
+    health = site.wait_until(client, lambda health: all_new({killed}, health) and all_up(health))
+    after = {p["pid"]: p["purpose"] for p in health["processes"]}
+    assert sorted(after.values()) == sorted(before.values())
+    assert after.get(spare) == (None if purpose == "spare" else purpose)
+    assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
+    assert "pid" in client.ask({"echo": 1})
 
 
 @pytest.mark.slow

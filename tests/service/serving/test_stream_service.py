@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
 import msgspec
@@ -133,17 +133,7 @@ def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
 
     def opened(request: StreamRequest, robots: object) -> SimpleNamespace:
         number = next(count)
-        return SimpleNamespace(
-            question=SimpleNamespace(stance=SimpleNamespace(hands=())),
-            first=np.array(WRENCH),
-            limbs=(),
-            columns=(),
-            interpolates=None,
-            set_points=lambda wrench: SetPoints(
-                "failed", np.array(wrench), verified=False, reason="none"
-            ),
-            close=lambda: closed.append(number),
-        )
+        return stand_in(lambda: closed.append(number))
 
     monkeypatch.setattr(streams, "opened", opened)
     names = [known.declare(declaration()).stream for _ in range(KEPT)]
@@ -157,6 +147,59 @@ def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
     assert answered(SET_POINTS, request | {"stream": names[0]}, known)["good"]
     known.close()
     assert sorted(closed) == list(range(KEPT + 2))
+
+
+@pytest.mark.parametrize("counts", [(1, 40), (2, 40), (8, 40), (1, 1, 40), (3, 4, 4, 40)])
+def test_who_declares_many_streams_puts_out_his_own(
+    known: Streams, monkeypatch: pytest.MonkeyPatch, counts: tuple[int, ...]
+) -> None:
+    monkeypatch.setattr(streams, "opened", lambda *_: stand_in())
+    owners = [known.of(str(i)) for i in range(len(counts))]
+    names = [
+        [owner.declare(declaration()).stream for _ in range(count)]
+        for owner, count in zip(owners, counts, strict=True)
+    ]
+    assert len(known) == KEPT
+    *few, many = names
+    for mine in few:
+        # whoever asks
+        assert all(kept(known, name) for name in mine)
+    left = KEPT - sum(counts[:-1])
+    assert [kept(known, name) for name in many] == [False] * (counts[-1] - left) + [True] * left
+    known.close()
+    assert len(known) == 0
+
+
+def test_a_client_with_more_than_its_share_gives_room_to_others(
+    known: Streams, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(streams, "opened", lambda *_: stand_in())
+    first, second = known.of("first"), known.of("second")
+    names = [first.declare(declaration()).stream for _ in range(KEPT)]
+    for _ in range(KEPT):
+        second.declare(declaration())
+    half = KEPT // 2
+    assert [kept(known, name) for name in names] == [False] * half + [True] * half
+
+
+def stand_in(close: Callable[[], None] = lambda: None) -> SimpleNamespace:
+    """A stream that has nothing to say."""
+    wrench = np.array(WRENCH)
+    return SimpleNamespace(
+        first=wrench,
+        limbs=(),
+        columns=(),
+        interpolates=None,
+        question=SimpleNamespace(stance=SimpleNamespace(hands=())),
+        set_points=lambda _: SetPoints("failed", wrench, verified=False, reason="none"),
+        close=close,
+    )
+
+
+def kept(known: Streams, name: str) -> bool:
+    """Whether a stream is still there."""
+    request = {"v": 1, "stream": name, "body_wrench": WRENCH}
+    return bool(answered(SET_POINTS, request, known)["good"])
 
 
 def test_messages_are_of_the_schema(known: Streams) -> None:

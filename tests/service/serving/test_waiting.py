@@ -13,39 +13,262 @@ import pytest
 
 from planner.processes import Lane, Station
 from planner.processes.stations import PART, _send_parts
+from service.serving.costs import LAST, Costs
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.question import LARGE, Question, take
-from service.serving.waiting import HELD, SHARE, Kind, Waiting
+from service.serving.names import SHARED, Names, digest
+from service.serving.question import ATTACHED, LARGE, Question, take
+from service.serving.shares import ACTIVE, PAYS, Shares
+from service.serving.waiting import ALL, EACH, HELD, SHARE, FairQueue, Kind, Waiting
 from tests.suite.helpers.checkout import ROOT
 
 
-def question(client: str = "a", size: int = 10, seconds: float = 60.0) -> Question:
-    now, payload = time.perf_counter(), bytes(size)
-    return Question(SimpleNamespace(), "key", "plan", client, now, payload, "", seconds)  # type: ignore[arg-type]
+def question(
+    place: str = "a", size: int = 10, seconds: float = 60.0, client: str | None = None
+) -> Question:
+    now, payload, query = time.perf_counter(), bytes(size), SimpleNamespace()
+    name = place if client is None else client
+    return Question(query, "key", "plan", name, now, payload, "", seconds, place=place)  # type: ignore[arg-type]
 
 
 # Room ---------------------------------------------------------------------------------------------
 
 
 def test_large_questions_of_one_client_leave_room_for_all_others():
-    waiting = Waiting()
-    waiting.put(Kind.OTHER, question("greedy", SHARE))
-    assert not waiting.has_room(Kind.OTHER, question("greedy", LARGE + 1))
-    assert waiting.has_room(Kind.OTHER, question("greedy", LARGE))
-    for client in "bcd":
-        waiting.put(Kind.OTHER, question(client, SHARE))
+    waiting = Waiting(Shares())
+
+    def has_room(asked: Question, kind: Kind = Kind.OTHER) -> bool:
+        return waiting.put(kind, asked) is None
+
+    assert has_room(question("greedy", SHARE))
+    # by place, whatever the names
+    assert not has_room(question("greedy", LARGE + 1, client="other name"))
+    assert all(has_room(question(client, SHARE)) for client in "bcd")
     assert HELD == 4 * SHARE
-    assert not waiting.has_room(Kind.OTHER, question("e", LARGE + 1))
-    assert waiting.has_room(Kind.SET_POINTS, question("e"))
+    assert not has_room(question("e", LARGE + 1))
+    assert has_room(question("e"), Kind.SET_POINTS)
     gone = waiting.take(Kind.OTHER)
     assert gone is not None
     assert gone.client == "greedy"
-    assert waiting.has_room(Kind.OTHER, question("greedy", SHARE))
+    assert has_room(question("greedy", SHARE))
+    assert has_room(question("greedy", LARGE))
 
 
 def test_one_question_fits_however_large_it_is():
-    assert Waiting().has_room(Kind.OTHER, question("a", HELD + 1))
+    assert Waiting(Shares()).put(Kind.OTHER, question("a", HELD + 1)) is None
+
+
+@pytest.mark.parametrize("names", [9, 20, 100])
+def test_however_many_names_one_place_takes_it_leaves_room_to_others(names: int):
+    queue = FairQueue(Shares(), holds=True)
+    refused = []
+    for i in range(names):
+        refused += [queue.put(question("crowd", client=str(i))) for _ in range(EACH)]
+    assert len(queue) == ALL
+    # each has room, and the newest of those who have most go
+    for client in "abcdefgh":
+        gone = [queue.put(question(client)) for _ in range(EACH)]
+        most = [each for each in gone if each is not None and each.place == client]
+        assert len(queue) == ALL
+        assert len(gone) - len(most) >= ALL // 9 - 1
+    places = [each.place for each in queue]
+    assert min(places.count(place) for place in set(places)) >= ALL // 9 - 1
+
+
+def test_a_client_has_so_many_questions_and_no_more():
+    queue = FairQueue(Shares(), holds=True)
+    assert all(queue.put(question("a")) is None for _ in range(EACH))
+    last = question("a")
+    assert queue.put(last) is last
+    assert queue.put(question("b")) is None
+
+
+# Turns --------------------------------------------------------------------------------------------
+
+
+def served(queue: FairQueue, shares: Shares, costs: dict[str, float], count: int) -> list[str]:
+    """Places in the order in which they are next, where each has always one more question."""
+    found = []
+    for place in costs:
+        shares.asks(place)
+        queue.put(question(place))
+    for _ in range(count):
+        asked = queue.take()
+        assert asked is not None
+        shares.charge(asked.place, costs[asked.place])
+        shares.asks(asked.place)
+        queue.put(question(asked.place))
+        found.append(asked.place)
+    return found
+
+
+@pytest.mark.parametrize("ratio", [1, 2, 3, 5, 10, 50])
+def test_places_have_equal_time_and_not_equal_turns(ratio: int):
+    shares = Shares()
+    queue = FairQueue(shares, holds=True)
+    found = served(queue, shares, {"short": 0.01, "long": 0.01 * ratio}, 20 * (ratio + 1))
+    assert abs(found.count("long") - 20) <= 1
+
+
+def test_time_that_nobody_asked_for_is_not_saved_up():
+    shares = Shares()
+    queue = FairQueue(shares, holds=True)
+    served(queue, shares, {"a": 0.1, "b": 0.1}, 100)
+    for place in [place for place in "ab" for _ in range(30)]:
+        queue.put(question(place))
+    found = served(queue, shares, {"new": 0.1, "a": 0.1, "b": 0.1}, 30)
+    assert abs(found.count("new") - 10) <= 1
+
+
+def test_names_of_one_place_have_their_turns():
+    queue = FairQueue(Shares(), holds=True)
+    for _ in range(3):
+        for name in "xyz":
+            queue.put(question("", client=name))
+    assert [queue.take().client for _ in range(9)] == list("xyz" * 3)  # type: ignore[union-attr]
+
+
+class Clock(SimpleNamespace):
+    """Stands for `time`."""
+
+    now = 1000.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+def test_who_ends_a_process_pays_for_the_next_one(monkeypatch: pytest.MonkeyPatch):
+    clock = Clock()
+    monkeypatch.setattr("service.serving.shares.time", clock)
+    shares = Shares()
+    shares.start = 2.0
+    queue, set_points = FairQueue(shares, holds=True), FairQueue(shares, holds=False)
+    shares.asks("killer")
+    shares.ended_process("killer", 0.5)
+    # alone, nobody is kept waiting for anybody
+    assert queue.put(question("killer")) is None
+    assert queue.take() is not None
+    shares.asks("polite")
+    shares.ended_process("killer", 0.5)
+    queue.put(question("killer"))
+    set_points.put(question("killer"))
+    assert queue.take() is None
+    assert queue.held() == PAYS * 2.0
+    # what ends no process is not held up by one that has ended
+    assert set_points.take() is not None
+    queue.put(question("polite"))
+    assert queue.take().place == "polite"  # type: ignore[union-attr]
+    clock.now += PAYS * 2.0
+    queue.put(question("polite"))
+    # and has less time for what it has cost
+    assert queue.take().place == "polite"  # type: ignore[union-attr]
+    assert queue.take().place == "killer"  # type: ignore[union-attr]
+
+
+def test_who_ends_processes_does_not_wait_for_who_asks_no_more(monkeypatch: pytest.MonkeyPatch):
+    clock = Clock()
+    monkeypatch.setattr("service.serving.shares.time", clock)
+    shares = Shares()
+    shares.start = 100.0
+    shares.asks("killer")
+    shares.asks("polite")
+    shares.ended_process("killer", 0.5)
+    assert shares.waits("killer") == ACTIVE
+    clock.now += ACTIVE
+    assert shares.waits("killer") == 0.0
+    shares.ended_process("killer", 0.5)
+    shares.asks("polite")
+    assert shares.waits("killer") == ACTIVE
+    shares.gone("polite")
+    assert shares.waits("killer") == 0.0
+
+
+# Costs --------------------------------------------------------------------------------------------
+
+
+def test_one_costly_question_changes_no_lane_and_cheap_ones_win_it_back():
+    costs = Costs()
+    for _ in range(5):
+        costs.took("a", None, None, 0.01)
+    costs.took("a", None, None, 100.0)
+    assert not costs.is_dear("a")
+    for _ in range(30):
+        costs.took("a", None, None, 1.0)
+    assert costs.is_dear("a")
+    for i in range(LAST):
+        assert costs.is_dear("a") == (i <= LAST // 2)
+        costs.took("a", None, None, 0.01)
+
+
+def test_a_known_stance_has_its_lane_back():
+    costs, process = Costs(), object()
+    costs.took("a", 1, process, 0.1)
+    for _ in range(9):
+        costs.took("a", 1, process, 0.01)
+    assert costs.is_short(1)
+    # some answers of a moment in which all took long
+    for _ in range(5):
+        costs.took("a", 1, process, 2.0)
+        assert costs.is_short(1)
+    for _ in range(10):
+        costs.took("a", 1, process, 2.0)
+    assert not costs.is_short(1)
+    for _ in range(LAST // 2 + 1):
+        costs.took("a", 1, process, 0.01)
+    assert costs.is_short(1)
+
+
+def test_a_stance_that_was_dear_where_it_was_new_has_the_lane_once_it_is_not():
+    costs, processes = Costs(), [object() for _ in range(3)]
+    costs.took("a", 1, processes[0], 5.0)
+    costs.took("a", 1, processes[0], 0.01)
+    assert not costs.is_short(1)
+    costs.took("a", 1, processes[1], 0.1)
+    assert costs.is_short(1)
+    # what a process knew is gone with it
+    costs.lost(processes[0])
+    assert not costs.knows(processes[0], 1)
+    assert costs.knows(processes[1], 1)
+
+
+# Names --------------------------------------------------------------------------------------------
+
+
+def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
+    names = Names()
+    names.linked.add("victim")
+    assert names.place("victim", b"") == "victim"
+    for made_up in ("x", "y", "", "victim "):
+        assert names.place(made_up, b"") == SHARED
+    assert names.is_to_prove("victim", b"secret")
+    # not again at once
+    assert not names.is_to_prove("victim", b"secret")
+    assert not names.is_to_prove("victim", b"another")
+    names.proven("victim", digest(b"secret"))
+    assert names.place("victim", b"secret") == "victim"
+    for forged in (b"", b"secre", b"secret ", digest(b"secret")):
+        assert names.place("victim", forged) == SHARED
+    # a second client of that session
+    names.proven("victim", digest(b"mine"))
+    assert names.place("victim", b"mine") == "victim"
+    # behind a router
+    names.proven("far", digest(b"far"))
+    assert names.has_proof("far")
+    assert names.place("far", b"far") == "far"
+    names.gone("victim")
+    assert names.place("victim", b"secret") == SHARED
+
+
+def test_nothing_grows_with_names_that_are_made_up():
+    names, shares = Names(), Shares()
+    for i in range(10_000):
+        names.is_to_prove(str(i), b"x")
+        names.proven(str(i), b"x")
+        names.proven("one", str(i).encode())
+        shares.asks(str(i))
+    sizes = [len(names._proofs), len(names._asked), len(shares._spent), len(shares._asked)]
+    assert max(sizes) < 5000
+    assert len(names._proofs["one"]) < 100
 
 
 # Lanes --------------------------------------------------------------------------------------------
@@ -109,8 +332,13 @@ class Payload(bytes):
         return bytes(self)
 
 
-def taken_of(payload: bytes, encoding: str) -> Question:
-    query = SimpleNamespace(payload=Payload(payload), encoding=encoding, source_info=None)
+def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> Question:
+    query = SimpleNamespace(
+        payload=Payload(payload),
+        encoding=encoding,
+        source_info=None,
+        attachment=None if attached is None else Payload(attached),
+    )
     return take(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
 
 
@@ -136,6 +364,16 @@ def test_a_head_with_what_is_no_number_is_left_to_a_process(payload: bytes, enco
     taken = taken_of(payload, encoding)
     assert (taken.id, taken.seconds, taken.dear) == (None, 10.0, False)
     assert taken.payload == payload
+
+
+def test_an_attachment_counts_too():
+    taken = taken_of(b"{}", "application/json", b"x" * ATTACHED)
+    assert (taken.fault, len(taken.secret), taken.payload) == (None, ATTACHED, b"{}")
+    refused = taken_of(b"{}", "application/json", b"x" * (ATTACHED + 1))
+    assert refused.fault is not None
+    assert refused.fault.field == "attachment"
+    assert f"{ATTACHED + 1} bytes; {ATTACHED} at most" in refused.fault.message
+    assert (refused.secret, refused.payload) == (b"", b"")
 
 
 # Ends ---------------------------------------------------------------------------------------------

@@ -1,0 +1,90 @@
+"""Who asks: a name that a query carries is anybody's, so it is believed as far as it is known.
+
+A query does not tell by which link it came. Zenoh tells which sessions are linked, and which one
+replies to a query. So a client may prove its name: its queries carry a secret as their attachment,
+and it replies at ``crux/<robot>/clients/<name>`` with the secret's digest. Whoever sends another's
+name without the secret, or a name that nobody has, has one place with all others who do.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections import OrderedDict
+from typing import Any, Final
+
+__all__ = ["SHARED", "Names", "digest"]
+
+SHARED: Final = ""
+"""The place of those whom nothing tells apart."""
+
+KEPT: Final = 4096
+"""Names whose digests are remembered, the last to be asked for."""
+
+PROOFS: Final = 16
+"""Digests of one name: a session may have several clients."""
+
+PAUSE: Final = 1.0
+"""How long a name's digest is not asked for again [s]."""
+
+
+def digest(secret: bytes) -> bytes:
+    """Return what a client tells of its secret."""
+    return hashlib.sha256(secret).digest()
+
+
+class Names:
+    """What is known of the sessions that ask. For one thread.
+
+    Attributes
+    ----------
+    linked : set of str
+        Sessions with a link to the service's own.
+    """
+
+    def __init__(self) -> None:
+        self.linked: set[str] = set()
+        self._proofs: OrderedDict[str, set[bytes]] = OrderedDict()
+        self._asked: OrderedDict[str, float] = OrderedDict()
+
+    def place(self, name: str, secret: bytes) -> str:
+        """Return the place of a query that carries a name, and perhaps a secret."""
+        proofs = self._proofs.get(name)
+        if proofs is not None:
+            return name if digest(secret) in proofs else SHARED
+        return name if name in self.linked else SHARED
+
+    def is_to_prove(self, name: str, secret: bytes) -> bool:
+        """Whether the session of a name is to be asked for its digest now."""
+        if not name or not secret or digest(secret) in self._proofs.get(name, ()):
+            return False
+        now = time.perf_counter()
+        if now - self._asked.pop(name, -PAUSE) < PAUSE:
+            self._asked[name] = now
+            return False
+        self._asked[name] = now
+        _forget(self._asked)
+        return True
+
+    def proven(self, name: str, proof: bytes) -> None:
+        """Take a digest that the session of a name has told."""
+        proofs = self._proofs.pop(name, set())
+        self._proofs[name] = proofs
+        if len(proofs) < PROOFS:
+            proofs.add(proof)
+        _forget(self._proofs)
+
+    def has_proof(self, name: str) -> bool:
+        """Whether the session of a name has told a digest."""
+        return name in self._proofs
+
+    def gone(self, name: str) -> None:
+        """Forget a session."""
+        self.linked.discard(name)
+        self._proofs.pop(name, None)
+        self._asked.pop(name, None)
+
+
+def _forget(kept: OrderedDict[str, Any]) -> None:
+    if len(kept) > KEPT:
+        kept.popitem(last=False)
