@@ -226,7 +226,7 @@ def test_a_cell_of_no_size_and_three_columns_are_no_grid(tmp_path):
 
 
 def test_endings_that_no_scan_has_and_files_that_are_not_there_are_refused(tmp_path):
-    for name, words in (("a.stl", "a scan's file ends in"), ("a.pcd", "no such file")):
+    for name, words in (("a.step", "a scan's file ends in"), ("a.pcd", "no such file")):
         with pytest.raises(InvalidInputError, match=words):
             read_scan(tmp_path / name)
 

@@ -38,7 +38,7 @@ def test_it_is_said_which_axis_was_taken_for_up(
     assert "warning: with z up this is ground, or a roof;" in out
     assert run(["rock", cloud, *output, "--up", "y"]) == DONE
     out = " ".join(capfd.readouterr().out.split())
-    assert "up y of the file's axes holes" in out
+    assert "up y of the file's axes view" in out
     assert "ground" not in out
     for more, up, assumed in (([], "z", True), (["--up", "z"], "z", False)):
         assert run(["rock", cloud, *output, *more, "--json"]) == DONE
@@ -130,7 +130,7 @@ def test_rock_is_not_written_over_its_scan(
     ("arguments", "words"),
     [
         (["none.pcd", "-o", "rock.ply"], "file: no such file: none.pcd"),
-        (["wall.stl", "-o", "rock.ply"], "file: wall.stl: a scan's file ends in"),
+        (["wall.dxf", "-o", "rock.ply"], "file: wall.dxf: a scan's file ends in"),
         (["none.pcd"], "Missing option '-o'"),
         (["none.pcd", "-o", "rock.stl"], "must end in .ply"),
         (["none.pcd", "-o", "none/rock.ply"], "no such folder"),
@@ -194,11 +194,12 @@ def test_a_scan_that_is_a_sieve_is_told_to_be_one(
     asked = ["rock", str(cloud), "-o", str(rock), "--view", "0,1,0"]
     assert run([*asked, "--hole", "0.02"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
-    told = re.search(r"warning: (\d+) holes .* --hole ([\d.]+) would bridge nine in ten", said)
+    told = re.search(r"warning: (\d+) holes .*: with --hole ([\d.]+), (\d+) are left", said)
     assert told is not None
     looked = ["holds", str(rock), "-o", str(tmp_path / "h.json"), "--spacing", "0.3"]
     assert run([*looked, "--workers", "1"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
-    assert "nothing holds: is the scan full of holes? `crux rock --hole` bridges wider" in said
+    assert "nothing holds: is the scan full of holes? `crux rock` says what helps" in said
     assert run([*asked, "--hole", told[2], "--json"]) == DONE
-    assert len(result(capfd)["holes"]) <= 0.15 * int(told[1])
+    made = result(capfd)
+    assert len(made["holes"]) + len(made["steps"]) == int(told[3]) <= 0.1 * int(told[1])
