@@ -177,7 +177,8 @@ def rock(
         told = {"up": reading["up"], "up_assumed": assumed, "view_assumed": _assumed(scan)}
         say(_summary(made) | told | {"warnings": warnings, "file": str(output)})
         return
-    if assumed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
+    closed = scan.faces is not None and scan.shown() is None
+    if assumed and not closed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
         warnings.insert(
             0,
             f"with {reading['up']} up this is ground, or a roof; of a wall that was seen along "
@@ -187,8 +188,8 @@ def rock(
 
 
 def _assumed(scan: Scan) -> bool:
-    """Whether the view is from the file's origin because nothing tells from where."""
-    return scan.assumed and scan.view is None and scan.faces is None
+    """Whether nothing tells from where the rock was seen, nor do its triangles."""
+    return scan.assumed and scan.view is None and (scan.faces is None or scan.shown() is None)
 
 
 def _summary(made: ScannedRock) -> dict[str, Any]:
@@ -296,7 +297,9 @@ def _print_rock(
     table.add_row("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z")
     table.add_row("up", up, "of the file's axes" + (", assumed" if assumed else ""))
     view = ", ".join(f"{number:z.2f}" for number in made.pose.rotation[:, 2])
-    whence = "z up" + (", assumed: from the file's origin" if _assumed(scan) else "")
+    whence = "z up"
+    if _assumed(scan):
+        whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
     table.add_row("view", view, whence)
     for name, what, sizes in (
         ("holes", "wider", [each.width for each in made.holes]),
