@@ -76,7 +76,7 @@ def read_columns(path: Path) -> RawScan:
         return RawScan(np.empty((0, 3)))
     if names is None:
         _check_unnamed(lines, style, width, path)
-    return RawScan(_read(lines, style, columns))
+    return RawScan(_read(lines, style, columns, path))
 
 
 def _text(path: Path) -> str:
@@ -187,7 +187,7 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
             )
 
 
-def _read(lines: Sequence[str], style: _Style, columns: Sequence[int]) -> Array:
+def _read(lines: Sequence[str], style: _Style, columns: Sequence[int], path: Path) -> Array:
     if style == _Style(None, ".") or style.mark:
         text = "\n".join(lines)
         if style.decimal == ",":
@@ -205,7 +205,9 @@ def _read(lines: Sequence[str], style: _Style, columns: Sequence[int]) -> Array:
         cells = _cells(line, style)
         if len(cells) <= max(columns):
             raise InvalidInputError(
-                f"line {i + 1} of the points has {len(cells)} columns: {line.strip()[:60]!r}"
+                f"line {i + 1} of the points has {len(cells)} columns, {line.strip()[:60]!r}: "
+                f"{path}",
+                field="file",
             )
         found[i] = [_number(cells[column], style) for column in columns]
     return found

@@ -52,8 +52,7 @@ def check_digits(points: Array, scale: float, path: Path) -> None:
         step = 10.0 ** (math.floor(math.log10(max(largest, 1e-300))) + 1 - digits)
         if scale * step <= coarsest:
             return
-        far = np.abs(points).max(axis=0) >= 0.1 * largest
-        cut = points[:, far]
+        cut = points[:, np.abs(points).max(axis=0).argmax()]
         if np.allclose(cut, step * np.round(cut / step), rtol=1e-12, atol=0.0):
             distinct = len(np.unique(points, axis=0))
             if distinct <= SAME * len(points):

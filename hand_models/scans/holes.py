@@ -59,6 +59,12 @@ class Gaps:
         width, sliver = self._width
         return np.asarray(sliver | (width > hole))
 
+    def covered(self, hole: float) -> float:
+        """Return the part of the area across z that is left if wider gaps stay open."""
+        edges = self._edges
+        area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        return float(area[~self.open_(hole)].sum() / area.sum())
+
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
         """Return holes and steps that the outline does not reach, the widest and highest first.
 

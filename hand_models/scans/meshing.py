@@ -103,6 +103,7 @@ def mesh_scan(
         steps=tuple(each._replace(place=each.place - start) for each in steps),
         read=scan.read,
         dropped=scan.dropped,
+        covered=made.gaps.covered(hole),
         outliers=scan.outliers,
         spacing=_spacing(points),
         filled=tuple(in_scan(cells, middle, axes) for cells in filled),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from hand_models.parameters import scan_table
+from hand_models.scans.holes import Gaps
 from hand_models.scans.meshing import triangulated, wider_holes
 from hand_models.scans.outliers import drop_outliers
 from hand_models.scans.rock import ScannedRock
@@ -14,6 +15,9 @@ __all__ = ["Remedy", "remedy"]
 
 STD_RATIO: Final = 2.0
 """Standard deviations beyond which points are dropped on trial, as in Open3D's example."""
+
+KEPT: Final = 0.95
+"""Part of what was covered that has to be covered still: dropped points may be of the rim."""
 
 
 class Remedy(NamedTuple):
@@ -36,10 +40,11 @@ class Remedy(NamedTuple):
 def remedy(
     scan: Scan, rock: ScannedRock, hole: float, *, spacing: float | None = None
 ) -> Remedy | None:
-    """Return what would leave at most a tenth of the holes and steps of a scan, None if nothing.
+    """Return what would leave a scan in one piece with few holes and steps, None if nothing does.
 
-    Tried are dropping points that stand alone (`drop_outliers`), unless some were dropped, and
-    bridging holes up to the palm's width.
+    Few are a tenth of those that it has or of those that are many, and it has to cover half of its
+    outline, and as much as it did. Tried are dropping points that stand alone (`drop_outliers`),
+    unless some were dropped, and bridging holes up to the palm's width.
 
     Parameters
     ----------
@@ -53,16 +58,20 @@ def remedy(
         As of `mesh_scan`.
     """
     table = scan_table()
-    enough = table.scalar("mesh", "left_holes") * (len(rock.holes) + len(rock.steps))
-    neighbours = table.scalar("outliers", "neighbours")
-    if not scan.outliers and len(scan.points) > neighbours:
+    count = max(len(rock.holes) + len(rock.steps), table.scalar("mesh", "many_holes"))
+    enough = table.scalar("mesh", "left_holes") * count
+    covered = max(KEPT * rock.covered, table.scalar("mesh", "least_covered"))
+
+    def tried(option: str, value: float, gaps: Gaps, wide: float) -> Remedy | None:
+        left = sum(map(len, gaps.left(wide)))
+        helps = left <= enough and gaps.covered(wide) >= covered
+        return Remedy(option, value, left) if helps else None
+
+    if not scan.outliers and len(scan.points) > table.scalar("outliers", "neighbours"):
         gaps = triangulated(drop_outliers(scan, STD_RATIO), spacing).gaps
-        left = sum(map(len, gaps.left(hole)))
-        if left <= enough:
-            return Remedy("std_ratio", STD_RATIO, left)
+        found = tried("std_ratio", STD_RATIO, gaps, hole)
+        if found is not None:
+            return found
     gaps = triangulated(scan, spacing).gaps
-    for wider in wider_holes(hole):
-        left = sum(map(len, gaps.left(wider)))
-        if left <= enough:
-            return Remedy("hole", wider, left)
-    return None
+    each = (tried("hole", wider, gaps, wider) for wider in wider_holes(hole))
+    return next((found for found in each if found is not None), None)

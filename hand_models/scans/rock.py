@@ -70,6 +70,9 @@ class ScannedRock:
         Points that look like cells of a grid that had no height, in the scan's axes.
     steps : tuple of Step
         That were left open, the highest first.
+    covered : float
+        Part of the area within the points' convex outline that has triangles, seen along the view;
+        one of triangles that were kept.
     outliers : int
         Points that were left out because they stand alone.
     kept, turned : bool
@@ -86,6 +89,7 @@ class ScannedRock:
     spacing: float
     filled: tuple[FilledCells, ...] = ()
     steps: tuple[Step, ...] = ()
+    covered: float = 1.0
     outliers: int = 0
     kept: bool = False
     turned: bool = False

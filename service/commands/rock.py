@@ -202,6 +202,7 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
         "vertices": len(made.vertices),
         "triangles": len(made.faces),
         "spacing": made.spacing,
+        "covered": made.covered,
         "extent": made.extent.tolist(),
         "view": made.pose.rotation[:, 2].tolist(),
         "holes": [{"width": hole.width, "place": hole.place.tolist()} for hole in made.holes],
@@ -224,16 +225,19 @@ def _warnings(scan: Scan, made: ScannedRock, hole: float, spacing: float | None)
         found.append(
             "the triangles showed their backs to that view, and were turned over: is it meant?"
         )
-    open_ = len(made.holes) + len(made.steps)
-    if open_ > scan_table().scalar("mesh", "many_holes"):
-        helps = _advice(scan, made, hole, spacing)
-        found.append(f"{open_} holes and steps leave hands little to hold{helps}")
+    open_, table = len(made.holes) + len(made.steps), scan_table()
+    pieces = made.covered < table.scalar("mesh", "least_covered")
+    if pieces or open_ > table.scalar("mesh", "many_holes"):
+        found.append(
+            f"{open_} holes and steps, and gaps over {100.0 * (1.0 - made.covered):.0f} % of the "
+            f"outline, leave hands little to hold{_advice(scan, made, hole, spacing)}"
+        )
     found += [
         f"{each.cells:,} points are at exactly {each.value:g} m, with cliffs around them; leave "
         "out cells that have no height"
         for each in made.filled
     ]
-    if not made.filled and made.extent.max() > scan_table().scalar("scan", "largest"):
+    if not made.filled and made.extent.max() > table.scalar("scan", "largest"):
         found.append(_why_large(made))
     return found
 
@@ -248,11 +252,11 @@ def _advice(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -
     if found is None:
         widest = scan_table().scalar("mesh", "widest_bridge")
         return (
-            f"; neither dropping stray points nor a --hole up to {widest:g} bridges nine in ten: "
+            f"; neither dropping stray points nor a --hole up to {widest:g} helps: "
             "rock is to be scanned more closely, or from another side"
         )
     how = {"std_ratio": "without stray points, --std-ratio", "hole": "with --hole"}[found.option]
-    return f": {how} {found.value:g}, {found.left} are left"
+    return f": {how} {found.value:g}, {found.left} holes and steps are left"
 
 
 def _why_large(made: ScannedRock) -> str:
