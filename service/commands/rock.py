@@ -146,7 +146,7 @@ def rock(
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Make a mesh hold of a scan: a point cloud, a grid of heights, or triangles, which are kept.
+    """Make a mesh hold of a scan: points, a grid of heights, or triangles.
 
     The triangles are in a frame on the rock, z into it along the view and x up, which is a hold's
     own; the table tells its pose in the file's axes, turned so that z is up, in metres.
