@@ -7,6 +7,17 @@ from .holds import (
     Plane as Plane,
     Sphere as Sphere,
 )
-from .mesh import Mesh as Mesh, read_mesh as read_mesh
+from .mesh import Mesh as Mesh
+from .mesh_files import (
+    MESH_ENDINGS as MESH_ENDINGS,
+    read_mesh as read_mesh,
+    read_vertices as read_vertices,
+)
 from .profile import Profile as Profile
-from .triangles import Triangles as Triangles, drawn_out as drawn_out, grid as grid, weld as weld
+from .triangles import (
+    Triangles as Triangles,
+    drawn_out as drawn_out,
+    edges_of as edges_of,
+    grid as grid,
+    weld as weld,
+)

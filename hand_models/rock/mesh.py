@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose, go_on
+from hand_models.base import Array, InvalidInputError, Pose, go_on
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.smoothing import OutlinedHold
@@ -33,46 +32,13 @@ from hand_models.rock.triangles import (
     wound_alike,
 )
 
-__all__ = ["Mesh", "read_mesh"]
-
-ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
+__all__ = ["Mesh"]
 
 RAYS: Final = 5
 """Rays along each side of the palm that look which way triangles face."""
 
 EDGE: Final = 1e-9
 """By how much, of a triangle's size, a ray may pass beside it and still meet it."""
-
-
-def read_mesh(path: Path) -> tuple[Array, Indices]:
-    """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
-
-    Raises
-    ------
-    InvalidInputError
-        If it cannot be read, or has no triangles; the field is ``file``.
-    """
-    import trimesh
-
-    if path.suffix.lower() not in ENDINGS:
-        raise InvalidInputError(f"{path}: a mesh file ends in {', '.join(ENDINGS)}", field="file")
-    try:
-        if not path.is_file():
-            raise InvalidInputError(f"no such file: {path}", field="file")
-        mesh = trimesh.load_mesh(str(path), process=False)
-    except InvalidInputError:
-        raise
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
-    except ImportError:
-        # what is no text either, trimesh would have another package guess the encoding of
-        raise InvalidInputError(f"cannot read {path}: broken or cut short", field="file") from None
-    except Exception as error:
-        # every loader fails in its own way on what is no mesh
-        raise InvalidInputError(f"cannot read {path}: {error}", field="file") from None
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise InvalidInputError(f"no triangles in {path}", field="file")
-    return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.intp)
 
 
 class Mesh(OutlinedHold):
@@ -264,13 +230,15 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tu
     farthest = table.scalar("scan", "farthest")
     if np.abs(points).max() > farthest:
         raise InvalidInputError(
-            f"must be within {farthest:g} m of the frame's origin", field="vertices"
+            f"must be within {farthest:g} m of the frame's origin; map coordinates are to have an "
+            "offset subtracted, as `crux rock` does",
+            field="vertices",
         )
     largest, size = table.scalar("scan", "largest"), float(np.ptp(points, axis=0).max())
     if size > largest:
         raise InvalidInputError(
-            f"{size:.4g} m across; at most {largest:g} m is possible (vertices are in metres: "
-            "divide millimetres by 1000)",
+            f"{size:.4g} m across; at most {largest:g} m is possible: vertices are in metres, so "
+            "divide millimetres by 1000, or cut it to what hands reach",
             field="vertices",
         )
     return Triangles(points, corners.astype(np.intp)), left_out

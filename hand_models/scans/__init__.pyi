@@ -1,5 +1,7 @@
-from .meshing import mesh_scan as mesh_scan
+from .meshing import mesh_scan as mesh_scan, too_large as too_large
+from .outliers import drop_outliers as drop_outliers
 from .pictures import plot_holds as plot_holds, plot_rock as plot_rock
 from .reading import ENDINGS as ENDINGS, read_scan as read_scan
-from .rock import Hole as Hole, ScannedRock as ScannedRock, write_rock as write_rock
+from .remedies import Remedy as Remedy, remedy as remedy
+from .rock import Hole as Hole, ScannedRock as ScannedRock, Step as Step, write_rock as write_rock
 from .scan import UNITS as UNITS, UPS as UPS, Scan as Scan, Unit as Unit, Up as Up

@@ -5,7 +5,9 @@ Columns go along x, rows against y: the first row is the farthest up the map, as
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -36,6 +38,15 @@ GEO_KEYS: Final = 34735
 NO_DATA: Final = 42113
 """Tags of a GeoTIFF."""
 
+DEFLATE: Final = 1032
+"""Bytes that one byte of a compressed array may stand for, at most."""
+
+SHORT: Final = 1024
+"""Length of an array that may be stored in fewer bytes than that says."""
+
+TIFF_RATIO: Final = 1500
+"""Heights that one byte of a compressed TIFF may stand for: of LZW at most 1,400."""
+
 MODEL_TYPE: Final = 1024
 GEOGRAPHIC: Final = 2
 """The GeoKey of a model's type, and its value for degrees."""
@@ -46,9 +57,7 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     with path.open("rb") as file:
         if not file.read(len(MAGIC[0])).startswith(MAGIC):
             raise InvalidInputError(f"no NumPy file: {path}", field="file")
-        file.seek(0)
-        found = np.load(file, allow_pickle=False)
-        arrays = {"": found} if isinstance(found, np.ndarray) else {k: found[k] for k in found}
+    arrays = _arrays(path)
     flat = [name for name, array in arrays.items() if array.ndim == 2]
     named = [name for name in HEIGHTS if name in flat]
     if len(flat) != 1 and not named:
@@ -64,6 +73,34 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
             field="file",
         )
     return _grid(heights, _sides(cell, _numpy_cell(arrays)))
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an ``.npy`` or ``.npz``, whose headers name no more than is there."""
+    if not zipfile.is_zipfile(path):
+        # maps the file, which must be as long as its header says
+        return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
+    found: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():
+            if info.file_size > DEFLATE * info.compress_size + SHORT:
+                raise InvalidInputError(f"{info.filename} in {path} is broken", field="file")
+            with archive.open(info) as file:
+                content = io.BytesIO(file.read(info.file_size))
+            version = np.lib.format.read_magic(content)
+            header = np.lib.format.read_array_header_1_0
+            if version != (1, 0):
+                header = np.lib.format.read_array_header_2_0
+            shape, _, kind = header(content)
+            left = info.file_size - content.tell()
+            if not kind.hasobject and math.prod(shape) * kind.itemsize > left:
+                raise InvalidInputError(
+                    f"{info.filename} of shape {shape} is cut short in {path}", field="file"
+                )
+            content.seek(0)
+            name = info.filename.removesuffix(".npy")
+            found[name] = np.lib.format.read_array(content, allow_pickle=False)
+    return found
 
 
 def _numpy_cell(arrays: Mapping[str, NDArray[Any]]) -> Cell | None:
@@ -88,6 +125,11 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
             "floats are to be made 32-bit ones, as by gdal_translate -ot Float32",
             field="file",
         ) from None
+    if math.prod(image.size) > TIFF_RATIO * path.stat().st_size:
+        raise InvalidInputError(
+            f"{image.size[0]} by {image.size[1]} heights are more than {path} can have: cut short?",
+            field="file",
+        )
     with image:
         tags = {tag: image.getexif().get(tag) for tag in (NO_DATA, PIXEL_SCALE, TRANSFORMATION)}
         keys = tuple(image.getexif().get(GEO_KEYS, ()))
@@ -121,15 +163,15 @@ def is_esri(path: Path) -> bool:
 def read_esri(path: Path, cell: float | None) -> RawScan:
     """Return the heights of an ESRI ASCII grid."""
     header: dict[str, float] = {}
-    with path.open(encoding="utf-8") as file:
-        lines = iter(file)
-        first = ""
-        for first in lines:
-            words = first.split()
-            if len(words) != 2 or not words[0][0].isalpha():
-                break
-            header[words[0].lower()] = float(words[1])
-        values = np.array(" ".join([first, *lines]).split(), dtype=float)
+    # some programs write a comma before decimals, none between heights
+    lines = iter(path.read_text(encoding="utf-8").replace(",", ".").splitlines())
+    first = ""
+    for first in lines:
+        words = first.split()
+        if len(words) != 2 or not words[0][0].isalpha():
+            break
+        header[words[0].lower()] = float(words[1])
+    values = np.array(" ".join([first, *lines]).split(), dtype=float)
     shape = int(header.get("nrows", 0)), int(header.get(COLUMNS, 0))
     if values.size != math.prod(shape):
         raise InvalidInputError(

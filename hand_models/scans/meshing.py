@@ -9,19 +9,21 @@ edge longer than that, which are steps that hide rock.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, Progress
 from hand_models.parameters import scan_table
-from hand_models.rock import FilledCells, Triangles, filled_cells
-from hand_models.scans.rock import Hole, ScannedRock
-from hand_models.scans.scan import Scan
+from hand_models.rock import Triangles, filled_cells
+from hand_models.scans.frame import axes_along, in_scan, start_on
+from hand_models.scans.holes import Gaps
+from hand_models.scans.kept import keep_triangles
+from hand_models.scans.rock import ScannedRock
+from hand_models.scans.scan import UNITS, Scan
 
-__all__ = ["mesh_scan"]
+__all__ = ["Triangulated", "mesh_scan", "too_large", "triangulated", "wider_holes"]
 
 STEPS: Final = 3
 """Steps that are told: thinned, triangulated, parted from holes."""
@@ -35,11 +37,11 @@ FLAT: Final = 1e-9
 GROWTH: Final = 1.15
 """By how much squares grow at least until few enough points are left."""
 
-STEEP: Final = 0.1
-"""Across the view, what is left of an axis that may point up in a picture."""
+SMALLEST: Final = 0.1
+"""Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
 
-SLIVER: Final = 1e-6
-"""Area of a triangle without one, of its longest edge's square."""
+WIDER: Final = 1.2
+"""By how much the next width of a hole that is tried is wider."""
 
 
 def mesh_scan(
@@ -49,7 +51,7 @@ def mesh_scan(
     hole: float | None = None,
     tell: Progress = lambda done, total: None,
 ) -> ScannedRock:
-    """Return a scan as triangles, seen from where it was scanned.
+    """Return a scan as triangles, seen from where it was scanned; its own are kept, if it has any.
 
     Parameters
     ----------
@@ -59,25 +61,88 @@ def mesh_scan(
         default half the median distance between neighbours, or as much more as leaves no more
         points than ``scan.toml`` says [m].
     hole : float, optional
-        The widest hole that is bridged, by default as ``scan.toml`` says [m].
+        The widest hole that is bridged, by default as ``scan.toml`` says [m]. Of triangles that are
+        kept none is bridged, and wider ones are told.
     tell : callable, optional
         Told how far the work is.
 
     Raises
     ------
     InvalidInputError
-        If a length is not above zero, points are on a line, nothing is left, or the frame's origin
-        is not on the rock.
+        If a length is not above zero, points are on a line, nothing is left, the frame's origin is
+        not on the rock, or a spacing is given for triangles that are kept.
     """
     table = scan_table()
     hole = _length(table.scalar("mesh", "hole") if hole is None else hole, "hole")
     tell(0, STEPS)
-    axes = _axes(scan.direction())
+    if scan.faces is not None:
+        if spacing is not None:
+            raise InvalidInputError(
+                "is of points, and the file has triangles, which are kept", field="spacing"
+            )
+        rock = keep_triangles(scan, hole)
+        tell(STEPS, STEPS)
+        return rock
+    made = triangulated(scan, spacing, tell=tell)
+    points, axes, middle = made.points, made.axes, made.middle
+    faces = made.corners[~made.gaps.open_(hole)]
+    if not len(faces):
+        raise _nothing_left(scan, made, hole)
+    filled = filled_cells(Triangles(points, made.corners))
+    holes, steps = made.gaps.left(hole)
+    used, faces = np.unique(faces, return_inverse=True)
+    points, faces = points[used], faces.reshape(-1, 3)
+    start = start_on(points, scan, middle, axes)
+    tell(STEPS, STEPS)
+    return ScannedRock(
+        vertices=points - start,
+        # counterclockwise for who looks along z
+        faces=_clockwise(points, faces),
+        pose=Pose(middle + axes @ start, axes),
+        holes=tuple(each._replace(place=each.place - start) for each in holes),
+        steps=tuple(each._replace(place=each.place - start) for each in steps),
+        read=scan.read,
+        dropped=scan.dropped,
+        covered=made.gaps.covered(hole),
+        outliers=scan.outliers,
+        spacing=_spacing(points),
+        filled=tuple(in_scan(cells, middle, axes) for cells in filled),
+    )
+
+
+class Triangulated(NamedTuple):
+    """Points of a scan, one a square, and the triangles between them.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        From ``middle`` along ``axes`` [m].
+    corners : ndarray of int, shape (m, 3)
+    gaps : Gaps
+    middle : ndarray, shape (3,)
+        In the scan's axes [m].
+    axes : ndarray, shape (3, 3)
+        Columns, in the scan's axes.
+    """
+
+    points: Array
+    corners: Indices
+    gaps: Gaps
+    middle: Array
+    axes: Array
+
+
+def triangulated(
+    scan: Scan, spacing: float | None, *, tell: Progress = lambda done, total: None
+) -> Triangulated:
+    """Return a scan thinned and triangulated across the view; parameters as of `mesh_scan`."""
+    axes = axes_along(scan.direction())
     middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
     points = (scan.points - middle) @ axes
     _check_spread(points)
     if spacing is None:
-        points = _fewer(points, 0.5 * _spacing(points), int(table.scalar("mesh", "vertices")))
+        most = int(scan_table().scalar("mesh", "vertices"))
+        points = _fewer(points, 0.5 * _spacing(points), most)
     else:
         points = points[_kept(points, _length(spacing, "spacing"))]
     tell(1, STEPS)
@@ -89,57 +154,67 @@ def mesh_scan(
             f"no triangles: {str(error).splitlines()[0]}", field="file"
         ) from None
     tell(2, STEPS)
-    corners, beside = flat.simplices.astype(np.intp), flat.neighbors
-    width, open_ = _widths(points[corners], beside)
-    open_ |= width > hole
-    faces = corners[~open_]
-    if not len(faces):
-        raise InvalidInputError(
-            f"points are {1e3 * _spacing(points):.3g} mm apart, and holes wider than "
-            f"{1e3 * hole:.3g} mm stay open: no triangle is left; is the unit right?",
-            field="hole",
-        )
-    filled = filled_cells(Triangles(points, corners))
-    holes = _holes(points[corners], beside, width, open_)
-    used, faces = np.unique(faces, return_inverse=True)
-    points, faces = points[used], faces.reshape(-1, 3)
-    start = _start(points, None if scan.origin is None else (scan.origin - middle) @ axes)
-    tell(STEPS, STEPS)
-    return ScannedRock(
-        vertices=points - start,
-        # counterclockwise for who looks along z
-        faces=_clockwise(points, faces),
-        pose=Pose(middle + axes @ start, axes),
-        holes=tuple(Hole(wide, place - start) for wide, place in holes),
-        read=scan.read,
-        dropped=scan.dropped,
-        spacing=_spacing(points),
-        filled=tuple(_in_scan(cells, middle, axes) for cells in filled),
+    corners = flat.simplices.astype(np.intp)
+    return Triangulated(points, corners, Gaps(points[corners], flat.neighbors), middle, axes)
+
+
+def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputError:
+    """Return an error that names why every triangle bridges more than a hole may be wide."""
+    table, apart = scan_table(), _spacing(made.points)
+    extent = float(np.ptp(made.points, axis=0).max())
+    corners = made.gaps.triangles
+    rise = float(np.median(np.ptp(corners[..., 2], axis=1)))
+    what = "cells" if scan.heights else "points"
+    told = f"{what} are {1e3 * apart:.3g} mm apart"
+    open_ = f"and holes wider than {1e3 * hole:.3g} mm stay open: no triangle is left"
+    if apart <= hole < rise:
+        told = f"{told} across the view and {1e3 * rise:.3g} mm along it: no triangle is left"
+        if scan.heights:
+            cause = "is the cell in degrees, or in another unit than the heights?"
+            return InvalidInputError(f"{told}; {cause}", field="cell")
+        return InvalidInputError(f"{told}; was it seen from another side?", field="view")
+    if extent > table.scalar("scan", "largest"):
+        return InvalidInputError(f"{told}, {open_}; {too_large(extent)}", field="hole")
+    for wider in wider_holes(hole):
+        if made.gaps.open_(wider).mean() <= table.scalar("mesh", "left_holes"):
+            return InvalidInputError(
+                f"{told}, {open_}; --hole {wider:g} bridges them", field="hole"
+            )
+    return InvalidInputError(
+        f"{told}, {open_}; rock is to be scanned with points less than that apart", field="hole"
     )
 
 
-def _in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
-    """Return cells in the scan's axes: where any are found, the rock's axes are along them."""
-    axis = int(np.abs(axes[:, cells.axis]).argmax())
-    value = float(middle[axis] + axes[axis, cells.axis] * cells.value)
-    return FilledCells(axis, value, cells.cells)
+def too_large(extent: float) -> str:
+    """Return what may be wrong with rock that is larger than a hold may be, in words.
+
+    Parameters
+    ----------
+    extent : float
+        Of its longest side [m].
+    """
+    largest = scan_table().scalar("scan", "largest")
+    fit = [unit for unit, metres in UNITS.items() if SMALLEST <= metres * extent <= largest]
+    unit = f"in {' or '.join(fit)} (--unit), or " if fit else ""
+    return (
+        f"{extent:.4g} m across, and a hold may be {largest:g} m; is it {unit}to be "
+        "scaled (--width), or cut to what hands reach?"
+    )
+
+
+def wider_holes(hole: float) -> list[float]:
+    """Return widths above one that may be tried instead, up to the widest that is sensible [m]."""
+    widest = scan_table().scalar("mesh", "widest_bridge")
+    found, wider = [], hole
+    while (wider := math.ceil(1e3 * WIDER * wider - 1e-9) / 1e3) < widest:
+        found.append(wider)
+    return [*found, widest] if hole < widest else []
 
 
 def _length(value: float, field: str) -> float:
     if not (math.isfinite(value) and value > 0.0):
         raise InvalidInputError(f"must be finite and above zero, got {value:g}", field=field)
     return value
-
-
-def _axes(view: Array) -> Array:
-    """Return the rock's axes as columns: z along the view, x up, or along y if that is the view."""
-    for upward in (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])):
-        x = upward - (upward @ view) * view
-        length = np.linalg.norm(x)
-        if length > STEEP:
-            break
-    x = x / length
-    return np.column_stack([x, np.cross(view, x), view])
 
 
 def _check_spread(points: Array) -> None:
@@ -177,59 +252,6 @@ def _kept(points: Array, side: float) -> Indices:
     begins = np.concatenate([[0], np.flatnonzero(new) + 1])
     ends = np.append(begins[1:], len(order))
     return np.sort(order[(begins + ends - 1) // 2])
-
-
-def _widths(triangles: Array, beside: NDArray[np.int32]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return what each triangle bridges [m], and which ones are slivers of the outline.
-
-    Parameters
-    ----------
-    triangles : ndarray, shape (m, 3, 3)
-    beside : ndarray of int, shape (m, 3)
-        Neighbours, −1 for none.
-    """
-    edges = triangles[:, [1, 2, 0]] - triangles
-    across = np.hypot(edges[..., 0], edges[..., 1])
-    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-    sliver = twice <= SLIVER * across.max(axis=1) ** 2
-    circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, twice))
-    step = np.linalg.norm(edges, axis=2).max(axis=1)
-    return np.maximum(circle, step), sliver & (beside < 0).any(axis=1)
-
-
-def _holes(
-    triangles: Array, beside: NDArray[np.int32], width: Array, open_: NDArray[np.bool_]
-) -> list[tuple[float, Array]]:
-    """Return width and middle of each hole that the outline does not reach, the widest first."""
-    count = len(triangles)
-    rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
-    graph = scipy.sparse.coo_matrix(
-        (np.ones(len(rows)), (rows, beside[rows, side])), (count, count)
-    )
-    number, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    outside = np.zeros(number, dtype=bool)
-    outside[part[(beside < 0).any(axis=1)]] = True
-    inside = np.flatnonzero(open_ & ~outside[part])
-    order = inside[np.argsort(part[inside], kind="stable")]
-    groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1) if len(order) else []
-    found = [(float(width[g].max()), triangles[g].mean(axis=(0, 1))) for g in groups]
-    return sorted(found, key=lambda entry: -entry[0])
-
-
-def _start(points: Array, wanted: Array | None) -> Array:
-    """Return the point where the frame begins: the nearest, across the view, to what is wanted."""
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    target = middle if wanted is None else wanted
-    distance = np.hypot(*(points[:, :2] - target[:2]).T)
-    nearest = int(distance.argmin())
-    near = scan_table().scalar("scan", "near")
-    if wanted is not None and distance[nearest] > near:
-        raise InvalidInputError(
-            f"the nearest rock is {distance[nearest]:.3g} m away, across the view; at most "
-            f"{near:g} m is possible",
-            field="origin",
-        )
-    return np.asarray(points[nearest])
 
 
 def _clockwise(points: Array, faces: Indices) -> Indices:

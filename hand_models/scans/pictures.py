@@ -185,6 +185,8 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
 def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarMappable:
     """Draw triangles as the scanner saw them, and return what their colours mean: heights [mm]."""
     corners = vertices[faces]
+    # what is nearer to the scanner over what is behind it
+    corners = corners[np.argsort(-corners[:, :, 2].mean(axis=1), kind="stable")]
     heights = -1e3 * corners[:, :, 2].mean(axis=1)
     scale = _scale(np.percentile(heights, [0.5, 99.5]))
     colours = ScalarMappable(scale, palette)

@@ -9,20 +9,53 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, CruxError, InvalidInputError, finite_vector
+from hand_models.base import (
+    Array,
+    CruxError,
+    InvalidInputError,
+    Pose,
+    check_file,
+    finite_vector,
+)
+from hand_models.rock import MESH_ENDINGS, read_vertices
+from hand_models.scans.columns import read_columns
+from hand_models.scans.digits import check_digits
 from hand_models.scans.grids import is_esri, read_esri, read_geotiff, read_numpy
-from hand_models.scans.points import read_columns, read_pcd, read_ply
+from hand_models.scans.pcd import read_pcd
 from hand_models.scans.scan import UNITS, UPS, RawScan, Scan, Unit, Up
 
 __all__ = ["ENDINGS", "read_scan"]
 
-ENDINGS: Final = (".pcd", ".ply", ".xyz", ".txt", ".csv", ".npy", ".npz", ".tif", ".tiff", ".asc")
+TEXTS: Final = (".xyz", ".txt", ".csv", ".pts", ".asc")
+GRIDS: Final = (".npy", ".npz", ".tif", ".tiff")
+
+ENDINGS: Final = (".pcd", *MESH_ENDINGS, *TEXTS, *GRIDS)
+
+OTHERS: Final = {
+    **dict.fromkeys(
+        (".las", ".laz", ".e57", ".ptx", ".fls", ".rcp", ".bin"),
+        "save it as PLY or PCD with 64-bit coordinates, or as text with all decimals, in "
+        "CloudCompare or by `pdal translate`",
+    ),
+    **dict.fromkeys(
+        (".glb", ".gltf", ".fbx", ".dae", ".3mf", ".3ds", ".wrl", ".usdz"),
+        "save its triangles as PLY, STL or OBJ, in MeshLab or Blender",
+    ),
+    **dict.fromkeys(
+        (".vrt", ".img", ".dem", ".hgt", ".adf", ".nc"),
+        "make it GeoTIFF by `gdal_translate -of GTiff`",
+    ),
+}
+"""What to do with files of other kinds."""
 
 FEWEST: Final = 3
 """Points of a triangle."""
 
 LARGEST: Final = 1e12
 """Of a file's numbers; what is beyond that is lost in rounding."""
+
+UNTURNED: Final = 1e-3
+"""Turn of a scanner that is taken for none [rad]."""
 
 
 def read_scan(
@@ -41,8 +74,9 @@ def read_scan(
     Parameters
     ----------
     path : Path
-        Of a point cloud (PCD, PLY, XYZ, CSV), or of a grid of heights (``.npy``, ``.npz``,
-        GeoTIFF, ESRI ASCII): columns along x, rows against y, heights along z.
+        Of a point cloud (PCD, PLY, OBJ, XYZ, CSV), of triangles (PLY, OBJ, STL, OFF), or of a grid
+        of heights (``.npy``, ``.npz``, GeoTIFF, ESRI ASCII): columns along x, rows against y,
+        heights along z.
     unit : {'m', 'cm', 'mm'}
         Of the file's numbers.
     up : {'x', 'y', 'z', '-x', '-y', '-z'}
@@ -53,7 +87,8 @@ def read_scan(
         finds.
     viewpoint : array_like, shape (3,), optional
         Where the scanner was, in the file's axes and unit; by default what a PCD file says, else
-        the file's origin.
+        the file's origin. With a view or a viewpoint, a PCD's VIEWPOINT is not used; without,
+        its rotation, if it has one, places the points, which are in the scanner's frame then.
     origin : array_like, shape (3,), optional
         Where the rock's frame is to begin, in the file's axes and unit; by default in the middle.
     cell : float, optional
@@ -72,53 +107,94 @@ def read_scan(
     if up not in UPS:
         raise InvalidInputError(f"valid are {', '.join(UPS)}, got {up!r}", field="up")
     raw = _raw(path, cell)
-    finite = raw.points[np.isfinite(raw.points).all(axis=1)]
-    if len(finite) < FEWEST:
-        more = len(raw.points) - len(finite)
-        told = f", and {more} that are not finite" if more else ""
-        raise InvalidInputError(
-            f"at least three points are needed, {path} has {len(finite)}{told}", field="file"
-        )
-    largest = float(np.abs(finite).max())
-    if largest > LARGEST:
-        raise InvalidInputError(f"numbers up to {largest:.3g} are no lengths", field="file")
-    scale, turn = _scale(finite, unit, width), UPS[up]
+    if raw.scanner is not None and view is None and viewpoint is None:
+        raw = _in_world(raw, raw.scanner)
+    else:
+        raw = raw._replace(scanner=None)
+    read = len(raw.points)
+    raw = _finite(raw)
+    _check_numbers(raw.points, read, path)
+    scale, turn = _scale(raw.points, unit, width), UPS[up]
+    check_digits(raw.points, scale, path)
 
     def placed(point: ArrayLike, field: str) -> Array:
         return np.asarray(scale * turn @ finite_vector(point, 3, field))
 
-    points = scale * finite @ turn.T
+    points = scale * raw.points @ turn.T
     seen = None if view is None else turn @ finite_vector(view, 3, "view")
-    scanner = placed((0.0, 0.0, 0.0) if raw.viewpoint is None else raw.viewpoint, "viewpoint")
-    if viewpoint is not None:
-        scanner = placed(viewpoint, "viewpoint")
+    known = viewpoint
+    if known is None and raw.scanner is not None:
+        known = raw.scanner.position
+    scanner = placed((0.0, 0.0, 0.0) if known is None else known, "viewpoint")
     if seen is None and viewpoint is not None:
         seen = points.mean(axis=0) - scanner
     elif seen is None and raw.heights:
         seen = -turn[:, 2]
     return Scan(
         points=points,
-        read=len(raw.points),
+        read=read,
         view=None if seen is None else _unit_vector(seen),
         viewpoint=scanner,
         origin=None if origin is None else placed(origin, "origin"),
+        assumed=known is None,
+        heights=raw.heights,
+        faces=raw.faces,
     )
+
+
+def _in_world(raw: RawScan, scanner: Pose) -> RawScan:
+    """Return points placed by the pose of the scanner in whose frame they are, if it is turned."""
+    if 0.5 * (float(np.trace(scanner.rotation)) - 1.0) > math.cos(UNTURNED):
+        return raw
+    return raw._replace(points=raw.points @ scanner.rotation.T + scanner.position)
+
+
+def _finite(raw: RawScan) -> RawScan:
+    """Return the points that are finite, and the triangles of three such."""
+    finite = np.asarray(np.isfinite(raw.points).all(axis=1))
+    if finite.all():
+        return raw
+    faces = raw.faces
+    if faces is not None:
+        faces = (np.cumsum(finite) - 1)[faces[np.all(finite[faces], axis=1)]]
+    return raw._replace(points=raw.points[finite], faces=faces)
+
+
+def _check_numbers(points: Array, read: int, path: Path) -> None:
+    if len(points) < FEWEST:
+        more = read - len(points)
+        told = f", and {more} that are not finite" if more else ""
+        raise InvalidInputError(
+            f"at least three points are needed, {path} has {len(points)}{told}", field="file"
+        )
+    largest = float(np.abs(points).max())
+    if largest > LARGEST:
+        raise InvalidInputError(
+            f"numbers up to {largest:.3g} are no lengths; where they stand for points that were "
+            "not measured, write nan",
+            field="file",
+        )
 
 
 def _raw(path: Path, cell: float | None) -> RawScan:
     ending = path.suffix.lower()
     if ending not in ENDINGS:
-        raise InvalidInputError(f"{path}: a scan's file ends in {', '.join(ENDINGS)}", field="file")
-    if not path.is_file():
-        raise InvalidInputError(f"no such file: {path}", field="file")
+        does = OTHERS.get(ending, "")
+        raise InvalidInputError(
+            f"{path}: a scan's file ends in {', '.join(ENDINGS)}" + (does and f"; {does}"),
+            field="file",
+        )
+    check_file(path)
     try:
         match ending:
             case ".npy" | ".npz":
                 return read_numpy(path, cell)
             case ".tif" | ".tiff":
                 return read_geotiff(path, cell)
-            case ".pcd" | ".ply":
-                read = read_pcd if ending == ".pcd" else read_ply
+            case ".pcd":
+                read = read_pcd
+            case _ if ending in MESH_ENDINGS:
+                read = _read_vertices
             case _:
                 if is_esri(path):
                     return read_esri(path, cell)
@@ -136,6 +212,11 @@ def _raw(path: Path, cell: float | None) -> RawScan:
         # every reader fails in its own way on what is no scan
         what = " ".join(str(error).split()) or type(error).__name__
         raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
+
+
+def _read_vertices(path: Path) -> RawScan:
+    vertices, faces = read_vertices(path)
+    return RawScan(vertices, faces=faces if len(faces) else None)
 
 
 def _scale(points: Array, unit: Unit, width: float | None) -> float:

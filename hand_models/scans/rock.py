@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -12,22 +13,36 @@ from trimesh.exchange.ply import export_ply
 from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import FilledCells
 
-__all__ = ["Hole", "ScannedRock", "write_rock"]
+__all__ = ["Hole", "ScannedRock", "Step", "write_rock"]
 
 
-@dataclass(frozen=True, eq=False)
-class Hole:
-    """Where the rock was not seen.
+class Hole(NamedTuple):
+    """Where no point of the rock was seen.
 
     Attributes
     ----------
     width : float
-        Diameter of the widest circle without points, or the height of a step if that is more [m].
+        Diameter of the widest circle without points whose middle is in it, across the view [m].
     place : ndarray, shape (3,)
         The middle of its corners, in the rock's frame [m].
     """
 
     width: float
+    place: Array
+
+
+class Step(NamedTuple):
+    """Where neighbouring points are so far apart along the view that rock may hide between them.
+
+    Attributes
+    ----------
+    height : float
+        Along the view [m].
+    place : ndarray, shape (3,)
+        The middle of its corners, in the rock's frame [m].
+    """
+
+    height: float
     place: Array
 
 
@@ -50,9 +65,19 @@ class ScannedRock:
     read, dropped : int
         Points of the file, and how many of them are not finite.
     spacing : float
-        Median distance between neighbours [m].
+        Median distance between neighbours, of triangles that were kept the median edge [m].
     filled : tuple of FilledCells
         Points that look like cells of a grid that had no height, in the scan's axes.
+    steps : tuple of Step
+        That were left open, the highest first.
+    covered : float
+        Part of the area within the points' convex outline that has triangles, seen along the view;
+        one of triangles that were kept.
+    outliers : int
+        Points that were left out because they stand alone.
+    kept, turned : bool
+        Whether the triangles are the file's, and whether they were turned over, since they showed
+        their backs to the view that was given.
     """
 
     vertices: Array
@@ -63,6 +88,11 @@ class ScannedRock:
     dropped: int
     spacing: float
     filled: tuple[FilledCells, ...] = ()
+    steps: tuple[Step, ...] = ()
+    covered: float = 1.0
+    outliers: int = 0
+    kept: bool = False
+    turned: bool = False
 
     @property
     def extent(self) -> Array:

@@ -8,9 +8,10 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, Indices, InvalidInputError, Pose
+from hand_models.parameters import scan_table
 
-__all__ = ["UNITS", "UPS", "RawScan", "Scan", "Unit", "Up"]
+__all__ = ["UNITS", "UPS", "RawScan", "Scan", "Unit", "Up", "areas_of"]
 
 Unit = Literal["m", "cm", "mm"]
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -31,6 +32,15 @@ UPS: Final[Mapping[Up, Array]] = {
 UPRIGHT: Final = 0.7
 """Least |z| of a normal of rock that is taken to be ground, seen from above."""
 
+CLOSED: Final = 0.05
+"""Part of its area that a surface shows to any side, below which it is taken to be closed."""
+
+
+def areas_of(points: Array, faces: Indices) -> Array:
+    """Return the areas of triangles along their outward normals, shape (m, 3) [m²]."""
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    return np.asarray(0.5 * np.cross(b - a, c - a))
+
 
 class RawScan(NamedTuple):
     """What a file has.
@@ -39,15 +49,18 @@ class RawScan(NamedTuple):
     ----------
     points : ndarray, shape (n, 3)
         In the file's axes and unit; not finite where nothing was measured.
-    viewpoint : ndarray, shape (3,), or None
-        Where the scanner was, if the file tells.
+    scanner : Pose or None
+        Where the scanner was, if the file tells; if it was turned, the points are in its frame.
     heights : bool
         Whether z is a height over a grid, seen from above.
+    faces : ndarray of int, shape (m, 3), or None
+        Triangles of the points, if the file has any.
     """
 
     points: Array
-    viewpoint: Array | None = None
+    scanner: Pose | None = None
     heights: bool = False
+    faces: Indices | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +72,21 @@ class Scan:
     points : ndarray, shape (n, 3)
         Finite, z up [m].
     read : int
-        Points of the file, those that are not finite, too.
+        Points of the file, those that are left out, too.
     view : ndarray, shape (3,), or None
         In which direction it was looked at, of length one; None if that follows from the points.
     viewpoint : ndarray, shape (3,)
-        Where the scanner was, the file's origin by default [m].
+        Where the scanner was [m].
     origin : ndarray, shape (3,), or None
         Where the rock's frame is to begin; None for the middle [m].
+    assumed : bool
+        Whether the viewpoint is the file's origin because nothing says where the scanner was.
+    heights : bool
+        Whether the points are a grid of heights.
+    faces : ndarray of int, shape (m, 3), or None
+        Triangles of the points, counterclockwise seen from outside, if the file has any.
+    outliers : int
+        Points that were left out because they stand alone (`drop_outliers`).
     """
 
     points: Array
@@ -73,26 +94,37 @@ class Scan:
     view: Array | None
     viewpoint: Array
     origin: Array | None
+    assumed: bool = False
+    heights: bool = False
+    faces: Indices | None = None
+    outliers: int = 0
 
     @property
     def dropped(self) -> int:
         """Points of the file that are not finite."""
-        return self.read - len(self.points)
+        return self.read - len(self.points) - self.outliers
 
     def direction(self) -> Array:
         """Return in which direction the rock was looked at, shape (3,), of length one.
 
-        That is `view`; else the direction in which the points vary least, away from the viewpoint,
-        or downward where the viewpoint is among the points and the rock is ground.
+        That is `view`; else that against which its triangles face, or downward if these close; else
+        the direction in which the points vary least, away from the viewpoint, or downward where the
+        viewpoint is among the points and the rock is ground.
 
         Raises
         ------
         InvalidInputError
-            If it cannot be told from which side; the field is ``view``.
+            If it cannot be told from which side, or the viewpoint is assumed and so far away that
+            no scanner can have been there; the field is ``view``.
         """
         if self.view is not None:
             return self.view
+        if self.faces is not None:
+            shown = self.shown()
+            return np.array([0.0, 0.0, -1.0]) if shown is None else -shown
         middle = self.points.mean(axis=0)
+        if self.assumed:
+            self._check_origin(middle)
         normal = np.asarray(np.linalg.eigh(np.cov((self.points - middle).T))[1][:, 0])
         depth = (self.points - self.viewpoint) @ normal
         if depth.min() > 0.0:
@@ -101,8 +133,32 @@ class Scan:
             return -normal
         if abs(normal[2]) >= UPRIGHT:
             return np.asarray(-normal * np.sign(normal[2]))
+        whose = "the file's origin, as it names none" if self.assumed else "the scanner's place"
         raise InvalidInputError(
             "from which side the rock was seen does not follow from the points, as the viewpoint "
-            "(the file's origin by default) is among them; give a direction or a viewpoint",
+            f"({whose}) is among them; give --view or --viewpoint",
             field="view",
         )
+
+    def shown(self) -> Array | None:
+        """Return toward which side triangles face together, of length one, None if they close."""
+        assert self.faces is not None
+        areas = areas_of(self.points, self.faces)
+        total = areas.sum(axis=0)
+        length = float(np.linalg.norm(total))
+        if length <= CLOSED * float(np.linalg.norm(areas, axis=1).sum()):
+            return None
+        return np.asarray(total / length)
+
+    def _check_origin(self, middle: Array) -> None:
+        """Refuse the file's origin as the scanner's place if no scanner can have been there."""
+        size = float(np.ptp(self.points, axis=0).max())
+        away = float(np.linalg.norm(middle - self.viewpoint))
+        if away > scan_table().scalar("scan", "farthest_scanner") * size:
+            raise InvalidInputError(
+                "the file does not say from where the rock was seen, and its origin, "
+                f"{away:,.0f} m from rock of {size:.3g} m, is no scanner's place (map "
+                "coordinates?): give --view X,Y,Z, the direction in which the scanner looked, or "
+                "--viewpoint",
+                field="view",
+            )

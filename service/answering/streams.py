@@ -151,9 +151,9 @@ class Streams:
     def release(self, identifier: str) -> None:
         """Let a stream go."""
         with self._lock:
-            stream = self._kept.pop(identifier, None)
-        if stream is not None:
-            stream.close()
+            kept = self._kept.pop(identifier, None)
+        if kept is not None:
+            kept.stream.close()
 
     def close(self) -> None:
         """Let all streams go."""

@@ -59,7 +59,7 @@ COMMANDS: Final = {
     "query": Entry("network", "Ask a running service for a plan."),
     "rock": Entry(
         "rock",
-        "Make a mesh hold of a scan: a point cloud, or a grid of heights.",
+        "Make a mesh hold of a scan: points, a grid of heights, or triangles.",
     ),
     "route": Entry(
         "routes",

@@ -356,7 +356,7 @@ def _print(
     if not found:
         open_rock = [reason for reason, _ in refused.most_common(1)] == [AT_BORDER]
         out.print(
-            "nothing holds: is the scan full of holes? `crux rock --hole` bridges wider ones"
+            "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
             if open_rock
             else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
             markup=False,

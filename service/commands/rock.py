@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,7 +17,7 @@ from service.tables import progress, say, writing
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hand_models.scans import ScannedRock
+    from hand_models.scans import Scan, ScannedRock
 
 __all__ = ["rock"]
 
@@ -27,13 +26,15 @@ OUTPUT: Final = ".ply"
 STEEP: Final = 0.9
 """Vertical part of a view from which on the rock is ground, or a roof."""
 
-SIEVE: Final = 100
-"""Holes from which on it is said which `--hole` would bridge most."""
-
-NINE_IN_TEN: Final = 0.9
-
 NAMED: Final = 5
-"""Holes whose width is told."""
+"""Holes whose width is told, and steps whose height is."""
+
+PLACE: Final = 6
+ORIENTATION: Final = 7
+"""Digits after the point of a printed pose [m]; what is 10 m away is off by some micrometres."""
+
+BULK: Final = (1.0, 99.0)
+"""Percentiles between which the points are of rock, if a few stray ones reach farther."""
 
 
 def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...] | None:
@@ -91,14 +92,14 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     callback=_triple,
     metavar="X,Y,Z",
     help="In which direction the scanner looked, in the file's axes; by default where the points "
-    "vary least, away from the viewpoint; down a grid's heights.",
+    "vary least, away from the viewpoint; down a grid's heights; into triangles.",
 )
 @click.option(
     "--viewpoint",
     callback=_triple,
     metavar="X,Y,Z",
     help="In place of a view: where the scanner was, in the file's axes and unit; by default what "
-    "a PCD file says, else the file's origin.",
+    "a PCD file says, else the file's origin, unless that is too far away.",
 )
 @click.option(
     "--origin",
@@ -119,6 +120,19 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     show_default=True,
     help="The widest hole, and the highest step, that is bridged [m].",
 )
+@click.option(
+    "--std-ratio",
+    type=float,
+    metavar="R",
+    help="Drop stray points (statistical outlier removal): those whose mean distance to their "
+    "neighbours is above the mean by more than R standard deviations; 1 to 3 are usual.",
+)
+@click.option(
+    "--neighbours",
+    type=int,
+    help="Whose mean distance that is; by default "
+    f"{scan_table().scalar('outliers', 'neighbours'):g}.",
+)
 @plot_option("Draw the rock there, as the scanner saw it.")
 @json_option
 def rock(
@@ -126,37 +140,56 @@ def rock(
     output: Path,
     spacing: float | None,
     hole: float,
+    std_ratio: float | None,
+    neighbours: int | None,
     picture: Path | None,
     as_json: bool,
     **reading: Any,
 ) -> None:
-    """Make a mesh hold of a scan: a point cloud, or a grid of heights.
+    """Make a mesh hold of a scan: points, a grid of heights, or triangles.
 
     The triangles are in a frame on the rock, z into it along the view and x up, which is a hold's
     own; the table tells its pose in the file's axes, turned so that z is up, in metres.
     """
-    from hand_models.scans import mesh_scan, plot_rock, read_scan, write_rock
+    from hand_models.scans import drop_outliers, mesh_scan, plot_rock, read_scan, write_rock
     from service.tables import console
 
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
+    if neighbours is not None and std_ratio is None:
+        raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
     if output.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
     with progress(f"meshing {file.name}") as tell:
         scan = read_scan(file, **reading)
+        if std_ratio is not None:
+            scan = drop_outliers(scan, std_ratio, neighbours=neighbours)
         made = mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)
         with writing(output, "--output"):
             write_rock(made, output)
         if picture is not None:
             with writing(picture):
                 plot_rock(made, picture, file.name)
+        warnings = _warnings(scan, made, hole, spacing)
     source = click.get_current_context().get_parameter_source("up")
     assumed = source is not ParameterSource.COMMANDLINE
     if as_json:
-        told = {"up": reading["up"], "up_assumed": assumed, "file": str(output)}
-        say(_summary(made) | told)
-    else:
-        _print_rock(made, hole, reading["up"], assumed, output, console())
+        told = {"up": reading["up"], "up_assumed": assumed, "view_assumed": _assumed(scan)}
+        say(_summary(made) | told | {"warnings": warnings, "file": str(output)})
+        return
+    closed = scan.faces is not None and scan.shown() is None
+    if assumed and not closed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
+        warnings.insert(
+            0,
+            f"with {reading['up']} up this is ground, or a roof; of a wall that was seen along "
+            f"{reading['up']}, tell with --up which axis points up",
+        )
+    _print_rock(scan, made, hole, reading["up"], assumed, output, console(), warnings)
+
+
+def _assumed(scan: Scan) -> bool:
+    """Whether nothing tells from where the rock was seen, nor do its triangles."""
+    return scan.assumed and scan.view is None and (scan.faces is None or scan.shown() is None)
 
 
 def _summary(made: ScannedRock) -> dict[str, Any]:
@@ -164,11 +197,16 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
     return {
         "read": made.read,
         "dropped": made.dropped,
+        "outliers": made.outliers,
+        "kept": made.kept,
         "vertices": len(made.vertices),
         "triangles": len(made.faces),
         "spacing": made.spacing,
+        "covered": made.covered,
         "extent": made.extent.tolist(),
+        "view": made.pose.rotation[:, 2].tolist(),
         "holes": [{"width": hole.width, "place": hole.place.tolist()} for hole in made.holes],
+        "steps": [{"height": step.height, "place": step.place.tolist()} for step in made.steps],
         "filled": [
             {"axis": "xyz"[each.axis], "value": each.value, "points": each.cells}
             for each in made.filled
@@ -180,8 +218,72 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
     }
 
 
+def _warnings(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -> list[str]:
+    """Return what may not be meant, and its cause where that can be told."""
+    found = []
+    if made.turned:
+        found.append(
+            "the triangles showed their backs to that view, and were turned over: is it meant?"
+        )
+    open_, table = len(made.holes) + len(made.steps), scan_table()
+    pieces = made.covered < table.scalar("mesh", "least_covered")
+    if pieces or open_ > table.scalar("mesh", "many_holes"):
+        found.append(
+            f"{open_} holes and steps, and gaps over {100.0 * (1.0 - made.covered):.0f} % of the "
+            f"outline, leave hands little to hold{_advice(scan, made, hole, spacing)}"
+        )
+    found += [
+        f"{each.cells:,} points are at exactly {each.value:g} m, with cliffs around them; leave "
+        "out cells that have no height"
+        for each in made.filled
+    ]
+    if not made.filled and made.extent.max() > table.scalar("scan", "largest"):
+        found.append(_why_large(made))
+    return found
+
+
+def _advice(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -> str:
+    """Return what was tried and helps against many holes, in words."""
+    from hand_models.scans import remedy
+
+    if made.kept:
+        return ": fill them where the triangles were made"
+    found = remedy(scan, made, hole, spacing=spacing)
+    if found is None:
+        widest = scan_table().scalar("mesh", "widest_bridge")
+        return (
+            f"; neither dropping stray points nor a --hole up to {widest:g} helps: "
+            "rock is to be scanned more closely, or from another side"
+        )
+    how = {"std_ratio": "without stray points, --std-ratio", "hole": "with --hole"}[found.option]
+    return f": {how} {found.value:g}, {found.left} holes and steps are left"
+
+
+def _why_large(made: ScannedRock) -> str:
+    """Return why rock may be larger than a hold may be, in words."""
+    import numpy as np
+
+    from hand_models.scans import too_large
+
+    size, largest = float(made.extent.max()), scan_table().scalar("scan", "largest")
+    bulk = float(np.ptp(np.percentile(made.vertices, BULK, axis=0), axis=0).max())
+    if bulk <= largest:
+        return (
+            f"{size:.4g} m across, and a hold may be {largest:g} m; {BULK[1] - BULK[0]:g} in a "
+            f"hundred points are within {bulk:.3g} m: drop the stray ones (--std-ratio)"
+        )
+    return too_large(size)
+
+
 def _print_rock(
-    made: ScannedRock, hole: float, up: str, assumed: bool, output: Path, out: Console
+    scan: Scan,
+    made: ScannedRock,
+    hole: float,
+    up: str,
+    assumed: bool,
+    output: Path,
+    out: Console,
+    warnings: list[str],
 ) -> None:
     """Print how many points and triangles there are, how large the rock is, and what is open."""
     from service.tables import table_of
@@ -192,49 +294,35 @@ def _print_rock(
     table.add_column("", overflow="fold")
     table.add_row("points read", f"{made.read:,}", "")
     table.add_row("dropped", f"{made.dropped:,}", "not finite")
+    if made.outliers:
+        table.add_row("outliers", f"{made.outliers:,}", "dropped, far from their neighbours")
     table.add_row("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart")
-    table.add_row("triangles", f"{len(made.faces):,}", "")
+    table.add_row("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else "")
     table.add_row("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z")
-    ground = abs(float(made.pose.rotation[2, 2])) >= STEEP
     table.add_row("up", up, "of the file's axes" + (", assumed" if assumed else ""))
-    widths = ", ".join(f"{1e3 * found.width:.0f}" for found in made.holes[:NAMED])
-    more = ", …" if len(made.holes) > NAMED else ""
-    told = f"wider than {1e3 * hole:g} mm" + (f": {widths}{more} mm" if widths else "")
-    table.add_row("holes", str(len(made.holes)), told)
+    view = ", ".join(f"{number:z.2f}" for number in made.pose.rotation[:, 2])
+    whence = "z up"
+    if _assumed(scan):
+        whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
+    table.add_row("view", view, whence)
+    for name, what, sizes in (
+        ("holes", "wider", [each.width for each in made.holes]),
+        ("steps", "higher", [each.height for each in made.steps]),
+    ):
+        named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
+        more = ", …" if len(sizes) > NAMED else ""
+        told = f"{what} than {1e3 * hole:g} mm" + (f": {named}{more} mm" if named else "")
+        table.add_row(name, str(len(sizes)), told)
     out.print(table)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
-    if assumed and ground:
-        out.print(
-            f"warning: with {up} up this is ground, or a roof; of a wall that was seen along {up}, "
-            "tell with --up which axis points up",
-            markup=False,
-        )
-    if len(made.holes) > SIEVE:
-        most = sorted(found.width for found in made.holes)[int(NINE_IN_TEN * len(made.holes))]
-        out.print(
-            f"warning: {len(made.holes)} holes leave hands little to hold: --hole "
-            f"{math.ceil(1e3 * most) / 1e3:g} would bridge nine in ten",
-            markup=False,
-        )
-    for each in made.filled:
-        out.print(
-            f"warning: {each.cells:,} points are at exactly {each.value:g} m, with cliffs around "
-            "them; leave out cells that have no height",
-            markup=False,
-        )
-    largest = scan_table().scalar("scan", "largest")
-    if made.extent.max() > largest:
-        out.print(
-            f"warning: {made.extent.max():.4g} m across, and a hold may be {largest:g} m; "
-            "is the unit right?",
-            markup=False,
-        )
+    for warning in warnings:
+        out.print(f"warning: {warning}", markup=False)
     out.print(str(output), markup=False, soft_wrap=True)
 
 
 def _pose(pose: Pose) -> str:
     place, turn = (
-        ", ".join(f"{number:.6g}" for number in vector)
-        for vector in (pose.position, pose.quaternion())
+        ", ".join(f"{number:z.{digits}f}" for number in vector)
+        for vector, digits in ((pose.position, PLACE), (pose.quaternion(), ORIENTATION))
     )
     return f'{{"position": [{place}], "orientation": [{turn}]}}'

@@ -79,8 +79,9 @@ def test_a_step_that_hides_rock_is_open(tmp_path):
     points = wall(0.004)
     points[:, 1] += np.where(np.abs(points[:, [0, 2]]).max(axis=1) < 0.04, 0.1, 0.0)
     rock = meshed(points, tmp_path, {"view": (0, 1, 0)})
-    (ring,) = rock.holes
-    assert ring.width == pytest.approx(0.1, abs=0.01)
+    (ring,) = rock.steps
+    assert ring.height == pytest.approx(0.1, abs=0.01)
+    assert not rock.holes
 
 
 def test_a_spacing_keeps_one_point_a_square(tmp_path):
@@ -152,8 +153,9 @@ def test_lengths_are_above_zero(field, value, tmp_path):
 
 
 def test_points_too_far_apart_are_told(tmp_path):
-    with pytest.raises(InvalidInputError, match=r"^hole: points are 40 mm apart, .* is the unit"):
+    with pytest.raises(InvalidInputError, match=r"^hole: points are 40 mm apart, .* --hole 0\.06 "):
         meshed(wall(0.04), tmp_path, {"view": (0, 1, 0)})
+    assert meshed(wall(0.04), tmp_path, {"view": (0, 1, 0)}, hole=0.06).extent[0] > 0.2
 
 
 def test_progress_is_told(tmp_path):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -226,7 +228,7 @@ def test_a_cell_of_no_size_and_three_columns_are_no_grid(tmp_path):
 
 
 def test_endings_that_no_scan_has_and_files_that_are_not_there_are_refused(tmp_path):
-    for name, words in (("a.stl", "a scan's file ends in"), ("a.pcd", "no such file")):
+    for name, words in (("a.step", "a scan's file ends in"), ("a.pcd", "no such file")):
         with pytest.raises(InvalidInputError, match=words):
             read_scan(tmp_path / name)
 
@@ -255,3 +257,47 @@ def test_what_64_bit_floats_are_to_be_made_is_said(tmp_path):
     path.write_bytes(head + heights + struct.pack("<H", len(tags)) + entries + bytes(4))
     with pytest.raises(InvalidInputError, match="gdal_translate -ot Float32"):
         read_scan(path, cell=CELL)
+
+
+# Counts beyond the file --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(10**6, 10**6), (10**9, 2), (3, 10**12)])
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+def test_the_shape_of_an_array_is_compared_with_its_size(shape, ending, tmp_path):
+    content = io.BytesIO()
+    header = {"descr": "<f8", "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(content, header)
+    content.write(bytes(96))
+    path = tmp_path / f"a.{ending}"
+    if ending == "npz":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("z.npy", content.getvalue())
+    else:
+        path.write_bytes(content.getvalue())
+    with pytest.raises(InvalidInputError, match=r"^file: "):
+        read_scan(path, cell=0.01)
+
+
+@pytest.mark.parametrize("compression", ["raw", "tiff_lzw", "tiff_adobe_deflate"])
+def test_the_size_of_a_picture_is_compared_with_that_of_its_file(compression, tmp_path):
+    path = write_geotiff(tmp_path / "a.tif", np.zeros((9, 7)), CELL, compression=compression)
+    content = path.read_bytes()
+    entry = struct.pack("<HHI", 256, 4, 1)
+    if entry not in content:
+        entry = struct.pack("<HHI", 256, 3, 1)
+    place = content.index(entry)
+    wide = struct.pack("<HHII", 256, 4, 1, 2_000_000)
+    path.write_bytes(content[:place] + wide + content[place + 12 :])
+    with pytest.raises(InvalidInputError, match=r"more than .* can have"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("rows", ["1000000000", "1e300", "-3", "nan"])
+def test_the_rows_of_a_text_are_compared_with_what_it_has(rows, tmp_path):
+    path = tmp_path / "a.asc"
+    path.write_text(f"ncols 3\nnrows {rows}\ncellsize 0,5\n1,5 2 3\n4 5 6\n7 8 9\n")
+    with pytest.raises(InvalidInputError, match=r"^file: "):
+        read_scan(path)
+    path.write_text("ncols 3\nnrows 3\ncellsize 0,5\n1,5 2 3\n4 5 6\n7 8 9\n")
+    assert read_scan(path).points[0].tolist() == [0.0, 1.0, 1.5]

@@ -38,7 +38,7 @@ def test_it_is_said_which_axis_was_taken_for_up(
     assert "warning: with z up this is ground, or a roof;" in out
     assert run(["rock", cloud, *output, "--up", "y"]) == DONE
     out = " ".join(capfd.readouterr().out.split())
-    assert "up y of the file's axes holes" in out
+    assert "up y of the file's axes view" in out
     assert "ground" not in out
     for more, up, assumed in (([], "z", True), (["--up", "z"], "z", False)):
         assert run(["rock", cloud, *output, *more, "--json"]) == DONE
@@ -130,7 +130,7 @@ def test_rock_is_not_written_over_its_scan(
     ("arguments", "words"),
     [
         (["none.pcd", "-o", "rock.ply"], "file: no such file: none.pcd"),
-        (["wall.stl", "-o", "rock.ply"], "file: wall.stl: a scan's file ends in"),
+        (["wall.dxf", "-o", "rock.ply"], "file: wall.dxf: a scan's file ends in"),
         (["none.pcd"], "Missing option '-o'"),
         (["none.pcd", "-o", "rock.stl"], "must end in .ply"),
         (["none.pcd", "-o", "none/rock.ply"], "no such folder"),
@@ -194,11 +194,106 @@ def test_a_scan_that_is_a_sieve_is_told_to_be_one(
     asked = ["rock", str(cloud), "-o", str(rock), "--view", "0,1,0"]
     assert run([*asked, "--hole", "0.02"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
-    told = re.search(r"warning: (\d+) holes .* --hole ([\d.]+) would bridge nine in ten", said)
+    told = re.search(r"warning: (\d+) holes .*: with --hole ([\d.]+), (\d+) holes .* left", said)
     assert told is not None
     looked = ["holds", str(rock), "-o", str(tmp_path / "h.json"), "--spacing", "0.3"]
     assert run([*looked, "--workers", "1"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
-    assert "nothing holds: is the scan full of holes? `crux rock --hole` bridges wider" in said
+    assert "nothing holds: is the scan full of holes? `crux rock` says what helps" in said
     assert run([*asked, "--hole", told[2], "--json"]) == DONE
-    assert len(result(capfd)["holes"]) <= 0.15 * int(told[1])
+    made = result(capfd)
+    assert len(made["holes"]) + len(made["steps"]) == int(told[3]) <= 0.1 * int(told[1])
+
+
+def printed(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str:
+    assert run(["rock", *arguments]) == DONE
+    return " ".join(capfd.readouterr().out.split())
+
+
+def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    points = wall(0.01) + np.array([402117.25, 5310842.75, 812.5])
+    cloud, output = str(tmp_path / "wall.xyz"), ["-o", str(tmp_path / "rock.ply")]
+    np.savetxt(cloud, points, fmt="%.4f")
+    assert run(["rock", cloud, *output]) == BAD_INPUT
+    assert "view: the file does not say from where" in complaint(capfd)
+    view = ["--view", "0,1,0"]
+    out = printed([cloud, *output, *view], capfd)
+    pose = json.loads(re.findall(r"pose (\{.*?\})", out)[0])
+    assert run(["rock", cloud, *output, *view, "--json"]) == DONE
+    told = result(capfd)
+    assert told["view_assumed"] is False
+    for name, within in (("position", 1e-6), ("orientation", 1e-7)):
+        assert pose[name] == pytest.approx(told["pose"][name], rel=0.0, abs=within)
+    assert told["pose"]["position"][1] == pytest.approx(5310843.75, abs=0.05)
+
+
+def test_stray_points_are_told_and_dropped(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(0)
+    strays = rng.uniform([-0.17, 0.3, -0.17], [0.17, 0.9, 0.17], (90, 3))
+    cloud = str(write_cloud(tmp_path / "wall.xyz", np.vstack([wall(0.004, 0.2), strays])))
+    asked = [cloud, "-o", str(tmp_path / "rock.ply"), "--view", "0,1,0"]
+    assert "without stray points, --std-ratio 2, 0 holes and steps are left" in printed(
+        asked, capfd
+    )
+    out = printed([*asked, "--std-ratio", "2"], capfd)
+    assert re.search(r"outliers \d+ dropped, far from their neighbours", out)
+    assert "holes 0 wider than 20 mm steps 0 higher than 20 mm" in out
+    assert "warning" not in out
+    assert run(["rock", *asked, "--std-ratio", "2", "--neighbours", "8", "--json"]) == DONE
+    told = result(capfd)
+    assert told["outliers"] >= 90
+    assert told["covered"] > 0.95
+    assert told["warnings"] == []
+    for more, words in (
+        (["--neighbours", "8"], "neighbours: is of outliers"),
+        (["--std-ratio", "0"], "std_ratio: must be finite and above zero"),
+    ):
+        assert run(["rock", *asked, *more]) == BAD_INPUT
+        assert words in complaint(capfd)
+
+
+@pytest.mark.parametrize("ending", ["ply", "stl", "obj", "off"])
+def test_the_triangles_of_a_file_are_kept(
+    ending: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    mesh = trimesh.creation.icosphere(3, radius=0.2)
+    path, output = tmp_path / f"ball.{ending}", tmp_path / "rock.ply"
+    mesh.export(path)
+    out = printed([str(path), "-o", str(output), "--plot", str(tmp_path / "rock.png")], capfd)
+    assert f"triangles {len(mesh.faces):,} the file's own" in out
+    assert "assumed: from above" in out
+    assert "ground" not in out
+    made = trimesh.load_mesh(str(output), process=False)
+    assert made.volume == pytest.approx(mesh.volume, rel=1e-5)
+    mesh.invert()
+    mesh.update_faces(mesh.triangles_center[:, 0] < 0.0)
+    mesh.export(path)
+    out = printed([str(path), "-o", str(output), "--view", "1,0,0"], capfd)
+    assert "showed their backs to that view" in out
+
+
+def test_a_large_rock_is_said_to_be_so_for_its_own_reason(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    output = ["-o", str(tmp_path / "rock.ply"), "--view", "0,1,0"]
+    far = np.vstack([wall(0.004), [0.1, 400.0, 0.1], [40.0, 1.0, 30.0]])
+    stray = str(write_cloud(tmp_path / "stray.xyz", far))
+    assert "warning" not in printed([stray, *output, "--std-ratio", "2"], capfd)
+    out = printed([stray, *output, "--hole", "1000"], capfd)
+    assert "98 in a hundred points are within" in out
+    assert "--unit" not in out
+    thousand = str(write_cloud(tmp_path / "mm.xyz", 1e3 * wall(0.01)))
+    out = printed([thousand, *output, "--hole", "30"], capfd)
+    assert "is it in cm or mm (--unit)" in out
+    line = 2e-3 * np.arange(60)
+    heights = relief(*np.meshgrid(line, line))
+    heights[20:30, 20:30] = -9999.0
+    np.save(tmp_path / "a.npy", heights)
+    grid = [str(tmp_path / "a.npy"), *output[:2], "--cell", "2e-3", "--hole", "1e5"]
+    out = printed(grid, capfd)
+    assert "100 points are at exactly -9999 m" in out
+    assert "--unit" not in out

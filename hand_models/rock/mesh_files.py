@@ -1,0 +1,129 @@
+"""Mesh files: STL, PLY, OBJ and OFF, each read alone and no longer than it is.
+
+Nothing that a file names beside itself (an OBJ's ``mtllib``, a PLY's texture) is opened, and a
+PLY's counts are compared with its size before anything is made of them; the other formats have none
+that a reader would believe.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from hand_models.base import Array, CruxError, Indices, InvalidInputError, check_file
+
+__all__ = ["MESH_ENDINGS", "read_mesh", "read_vertices"]
+
+MESH_ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
+
+SIZES: Final = {"short": 2, "int": 4, "uint": 4, "float": 4, "double": 8, "ushort": 2} | {
+    f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)
+}
+"""Bytes of a PLY's types; those of one byte, and what is no type, are left out."""
+
+MOST_PROPERTIES: Final = 1000
+"""Properties of a PLY's elements: reading takes as long as the square of their number."""
+
+
+def read_mesh(path: Path) -> tuple[Array, Indices]:
+    """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read, or has no triangles; the field is ``file``.
+    """
+    vertices, faces = read_vertices(path)
+    if not len(faces):
+        raise InvalidInputError(f"no triangles in {path}", field="file")
+    return vertices, faces
+
+
+def read_vertices(path: Path) -> tuple[Array, Indices]:
+    """Return vertices of an STL, PLY, OBJ or OFF file, and faces, which a point cloud has not.
+
+    Returns
+    -------
+    vertices : ndarray, shape (n, 3)
+        In the file's unit.
+    faces : ndarray of int, shape (m, 3)
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read; the field is ``file``.
+    """
+    import trimesh
+
+    ending = path.suffix.lower()
+    if ending not in MESH_ENDINGS:
+        raise InvalidInputError(
+            f"{path}: a mesh file ends in {', '.join(MESH_ENDINGS)}", field="file"
+        )
+    check_file(path)
+    try:
+        content = path.read_bytes()
+        if ending == ".ply":
+            _check_counts(content)
+        # from memory, and so without a folder in which it would look for what the file names
+        found = trimesh.load(
+            io.BytesIO(content), file_type=ending[1:], process=False, skip_materials=True
+        )
+        # an OBJ with several materials has several
+        parts: list[Any] = (
+            list(found.geometry.values()) if isinstance(found, trimesh.Scene) else [found]
+        )
+    except CruxError as error:
+        raise InvalidInputError(f"cannot read {path}: {error}", field="file") from None
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
+    except ImportError:
+        # what is no text either, trimesh would have another package guess the encoding of
+        raise InvalidInputError(f"cannot read {path}: broken or cut short", field="file") from None
+    except Exception as error:
+        # every loader fails in its own way on what is no mesh
+        what = " ".join(str(error).split()) or type(error).__name__
+        if "unexpected length" in what:
+            what = (
+                "cut short, or its faces have different numbers of corners: make them triangles "
+                "before the export"
+            )
+        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
+    vertices = [np.array(part.vertices, dtype=float).reshape(-1, 3) for part in parts]
+    begins = np.cumsum([0, *map(len, vertices)])
+    faces = [
+        start + np.array(getattr(part, "faces", ()), dtype=np.intp).reshape(-1, 3)
+        for start, part in zip(begins, parts, strict=False)
+    ]
+    if not parts:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
+    return np.vstack(vertices), np.vstack(faces)
+
+
+def _check_counts(content: bytes) -> None:
+    """Refuse a PLY whose header names more than can be in the file."""
+    head, end, rest = content.partition(b"end_header")
+    words = [line.split() for line in head.decode("utf-8", "replace").splitlines()]
+    ascii_ = ["format", "ascii"] in [line[:2] for line in words]
+    counts: list[int] = []
+    least: list[int] = []
+    properties = 0
+    for line in words:
+        if line[:1] == ["element"] and len(line) == 3:
+            counts.append(int(line[2]))
+            least.append(0)
+        elif line[:1] == ["property"] and len(line) > 1 and least:
+            properties += 1
+            # of a list at least the number that says how long it is; in a text a digit and a blank
+            kind = line[2] if line[1] == "list" and len(line) > 2 else line[1]
+            least[-1] += 2 if ascii_ else SIZES.get(kind, 1)
+    needed = sum(count * max(size, 1) for count, size in zip(counts, least, strict=True))
+    if not end or properties > MOST_PROPERTIES or min(counts, default=0) < 0:
+        raise InvalidInputError(f"no header of a PLY, or more than {MOST_PROPERTIES} properties")
+    if needed > len(rest) + 1:  # a text may end without a blank
+        raise InvalidInputError(
+            f"its header names at least {needed:,} bytes, and {len(rest):,} are there: cut short?"
+        )

@@ -1,0 +1,213 @@
+"""Tables in text: a point a line, as programs and people write them."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.scans.scan import RawScan
+
+__all__ = ["read_columns"]
+
+AXES: Final = ("x", "y", "z")
+
+NAMES: Final = {
+    **dict.fromkeys(("easting", "east", "e", "points:0"), "x"),
+    **dict.fromkeys(("northing", "north", "n", "points:1"), "y"),
+    **dict.fromkeys(("height", "elevation", "elev", "altitude", "h", "points:2"), "z"),
+}
+"""Columns by other names than x, y and z."""
+
+DEGREES: Final = ("lat", "lon", "lng", "long", "latitude", "longitude")
+
+SAMPLE: Final = 1000
+"""Lines whose look tells how a table is written."""
+
+
+class _Style(NamedTuple):
+    """Mark between the columns of a table, None for blanks, and mark of its decimals."""
+
+    mark: str | None
+    decimal: str
+
+
+STYLES: Final = (
+    _Style(";", "."),
+    _Style(";", ","),
+    _Style(None, "."),
+    _Style(",", "."),
+    _Style(None, ","),
+)
+"""Ways to write a table, tried in this order."""
+
+
+def read_columns(path: Path) -> RawScan:
+    """Return points of a text with a point a line, parted by commas, semicolons or blanks.
+
+    A first line that is no numbers names the columns; without names the first three are meant. A
+    first line with the count of the others is left out. Decimals may follow a comma, unless commas
+    part the columns, too. What is empty is not finite.
+    """
+    lines = [line for line in _text(path).splitlines() if line.strip() and line.strip()[0] != "#"]
+    if lines and _is_count(lines[0], len(lines) - 1):
+        del lines[0]
+    if not lines:
+        return RawScan(np.empty((0, 3)))
+    style = _style(lines, path)
+    first = _cells(lines[0], style)
+    names = None
+    if not _numbers(first, style):
+        names = _names(first, style)
+        del lines[0]
+    width = len(_cells(lines[0], style)) if lines else len(names or ())
+    if width < len(AXES):
+        raise InvalidInputError(
+            f"three columns are needed, the first line has {width}: {path}", field="file"
+        )
+    columns = [0, 1, 2] if names is None else _meant(names, width, path)
+    if not lines:
+        return RawScan(np.empty((0, 3)))
+    if names is None:
+        _check_unnamed(lines, style, width, path)
+    return RawScan(_read(lines, style, columns, path))
+
+
+def _text(path: Path) -> str:
+    """Return a text in UTF-8, or in UTF-16 if it begins so; other letters stand in names only."""
+    content = path.read_bytes()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    if b"\0" in content:
+        raise InvalidInputError(f"no text: {path}", field="file")
+    return content.decode("utf-8-sig", "replace")
+
+
+def _is_count(line: str, rest: int) -> bool:
+    return line.strip().isdecimal() and int(line) == rest
+
+
+def _style(lines: Sequence[str], path: Path) -> _Style:
+    """Return the way of writing in which most of the first lines are three numbers or more."""
+    some = lines[1 : SAMPLE + 1] or lines[:1]
+    fits = [sum(_numbers(_cells(line, style), style) for line in some) for style in STYLES]
+    best = max(fits)
+    if not best:
+        raise InvalidInputError(
+            f"no three numbers in a line, parted by commas, semicolons or blanks: {path}",
+            field="file",
+        )
+    return STYLES[fits.index(best)]
+
+
+def _cells(line: str, style: _Style) -> list[str]:
+    if style.mark == "," and line.rstrip().endswith(","):
+        line = line.rstrip()[:-1]
+    return [cell.strip().strip("\"'") for cell in line.strip("\r\n").split(style.mark)]
+
+
+def _numbers(cells: Sequence[str], style: _Style) -> bool:
+    """Whether the first cells are numbers, and three at least are."""
+    try:
+        found = [_number(cell, style) for cell in cells[: len(AXES)]]
+    except ValueError:
+        return False
+    return len(found) == len(AXES) and any(map(np.isfinite, found))
+
+
+def _number(cell: str, style: _Style) -> float:
+    if style.decimal == ",":
+        if "." in cell:
+            raise ValueError(cell)
+        cell = cell.replace(",", ".")
+    return float(cell or "nan")
+
+
+def _names(cells: Sequence[str], style: _Style) -> list[str]:
+    """Return columns' names without marks and unit: ``//X``, ``x [m]`` and ``X_m`` are x."""
+    if len(cells) < len(AXES) and style.mark != ",":
+        # they are parted by something else than the numbers
+        cells = re.split(r"[\s,;]+", " ".join(cells))
+    bare = [re.sub(r"[\[(].*", "", cell.strip(" \t\"'/#")).strip().lower() for cell in cells]
+    found = [re.sub(r"[_ ](m|cm|mm)$", "", name) for name in bare]
+    if style.mark is None:
+        found = [name for name in found if name]
+    return found if set(AXES) <= set(found) else [NAMES.get(name, name) for name in found]
+
+
+def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
+    """Return where x, y and z are among columns that have names."""
+    if set(AXES) <= set(names):
+        if len(names) > width:
+            raise InvalidInputError(
+                f"{len(names)} columns have names, and the next line has {width} numbers: {path}",
+                field="file",
+            )
+        return [names.index(axis) for axis in AXES]
+    degrees = [name for name in names if name in DEGREES]
+    if degrees:
+        raise InvalidInputError(
+            f"column {degrees[0]} is in degrees, which are no lengths: project it to metres (UTM "
+            f"or the national grid) first: {path}",
+            field="file",
+        )
+    if len(names) == len(AXES) == width:
+        return [0, 1, 2]
+    raise InvalidInputError(
+        f"which columns are x, y and z does not follow from their names, {', '.join(names[:9])}: "
+        f"name them so in the first line of {path}",
+        field="file",
+    )
+
+
+def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) -> None:
+    """Refuse a table whose first three columns are hardly x, y and z."""
+    some = [_cells(line, style) for line in lines[:SAMPLE]]
+    whole = all(cell.removeprefix("-").isdecimal() for cells in some for cell in cells)
+    if style.mark == "," and width == 2 * len(AXES) and whole:
+        raise InvalidInputError(
+            "commas are between the columns and in the numbers, which cannot be told apart: write "
+            f"points in the numbers, or semicolons between the columns: {path}",
+            field="file",
+        )
+    begin = [cells[0] for cells in some]
+    if width > len(AXES) and len(some) > 2 and all(cell.isdecimal() for cell in begin):
+        numbers = [int(cell) for cell in begin]
+        if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
+            raise InvalidInputError(
+                "the first column counts the points, it is not x: name the columns in the first "
+                f"line of {path}",
+                field="file",
+            )
+
+
+def _read(lines: Sequence[str], style: _Style, columns: Sequence[int], path: Path) -> Array:
+    if style == _Style(None, ".") or style.mark:
+        text = "\n".join(lines)
+        if style.decimal == ",":
+            text = text.replace(",", ".")
+        try:
+            return np.asarray(
+                np.loadtxt(
+                    StringIO(text), delimiter=style.mark, usecols=columns, ndmin=2, quotechar='"'
+                )
+            )
+        except ValueError:
+            pass  # slower, for what has empty cells
+    found = np.empty((len(lines), len(columns)))
+    for i, line in enumerate(lines):
+        cells = _cells(line, style)
+        if len(cells) <= max(columns):
+            raise InvalidInputError(
+                f"line {i + 1} of the points has {len(cells)} columns, {line.strip()[:60]!r}: "
+                f"{path}",
+                field="file",
+            )
+        found[i] = [_number(cells[column], style) for column in columns]
+    return found

@@ -1,0 +1,123 @@
+"""Gaps between points that were triangulated: which triangles bridge too much, and what is left.
+
+A triangle bridges its circle, in which no point lies, and the distance between its corners in
+space. A hole is as wide as the largest circle without points whose middle is in it. Triangles on
+the outline have circles that reach beyond it, however short their edges: those are no holes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from hand_models.base import Array
+from hand_models.scans.rock import Hole, Step
+
+__all__ = ["Gaps", "empty_circles"]
+
+SLIVER: Final = 1e-6
+"""Area of a triangle without one, of its longest edge's square."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Triangles between points, seen along z.
+
+    Attributes
+    ----------
+    triangles : ndarray, shape (m, 3, 3)
+        Corners [m].
+    beside : ndarray of int, shape (m, 3)
+        Neighbours, −1 for none.
+    """
+
+    triangles: Array
+    beside: NDArray[np.int32]
+
+    @cached_property
+    def _edges(self) -> Array:
+        return self.triangles[:, [1, 2, 0]] - self.triangles
+
+    @cached_property
+    def _width(self) -> tuple[Array, NDArray[np.bool_]]:
+        """What each triangle bridges [m], and which ones are slivers of the outline."""
+        edges = self._edges
+        across = np.hypot(edges[..., 0], edges[..., 1])
+        twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        sliver = twice <= SLIVER * across.max(axis=1) ** 2
+        circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, twice))
+        step = np.linalg.norm(edges, axis=2).max(axis=1)
+        return np.maximum(circle, step), sliver & (self.beside < 0).any(axis=1)
+
+    def open_(self, hole: float) -> NDArray[np.bool_]:
+        """Return which triangles bridge more than a length [m], or nothing, shape (m,)."""
+        width, sliver = self._width
+        return np.asarray(sliver | (width > hole))
+
+    def covered(self, hole: float) -> float:
+        """Return the part of the area across z that is left if wider gaps stay open."""
+        edges = self._edges
+        area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        return float(area[~self.open_(hole)].sum() / area.sum())
+
+    def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
+        """Return holes and steps that the outline does not reach, the widest and highest first.
+
+        Parameters
+        ----------
+        hole : float
+            The widest, and the highest, that is bridged [m].
+        """
+        open_, beside, count = self.open_(hole), self.beside, len(self.triangles)
+        rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
+        graph = scipy.sparse.coo_matrix(
+            (np.ones(len(rows)), (rows, beside[rows, side])), (count, count)
+        )
+        number, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+        outside = np.zeros(number, dtype=bool)
+        outside[part[(beside < 0).any(axis=1)]] = True
+        inside = np.flatnonzero(open_ & ~outside[part])
+        order = inside[np.argsort(part[inside], kind="stable")]
+        groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1) if len(order) else []
+        circle, rise = empty_circles(self.triangles), np.abs(self._edges[..., 2]).max(axis=1)
+        holes: list[Hole] = []
+        steps: list[Step] = []
+        for group in groups:
+            place = self.triangles[group].mean(axis=(0, 1))
+            if circle[group].max() > hole:
+                holes.append(Hole(float(circle[group].max()), place))
+            elif rise[group].max() > hole:
+                steps.append(Step(float(rise[group].max()), place))
+        return (
+            tuple(sorted(holes, key=lambda each: -each.width)),
+            tuple(sorted(steps, key=lambda each: -each.height)),
+        )
+
+
+def empty_circles(triangles: Array) -> Array:
+    """Return the diameter of the largest circle without corners whose middle is in each triangle.
+
+    That is the circumscribed one's unless the triangle is obtuse; then its middle is on the longest
+    edge, where two corners are as near.
+
+    Parameters
+    ----------
+    triangles : ndarray, shape (m, 3, 3)
+        Of a Delaunay triangulation across z.
+    """
+    edges = triangles[:, [1, 2, 0], :2] - triangles[:, :, :2]
+    a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T
+    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    obtuse = a**2 + b**2 <= c**2
+    tiny = np.finfo(float).tiny
+    near = [
+        2.0 * one**2 * c / np.maximum(one**2 + c**2 - other**2, tiny)
+        for one, other in ((a, b), (b, a))
+    ]
+    circle = a * b * c / np.where(obtuse, 1.0, np.maximum(twice, tiny))
+    return np.asarray(np.where(obtuse, np.maximum(*near), circle))

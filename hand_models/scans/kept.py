@@ -1,0 +1,103 @@
+"""Triangles of a file, kept as they are and put into a frame on the rock."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from hand_models.base import Array, Indices, InvalidInputError, Pose
+from hand_models.rock import Triangles, edges_of, filled_cells, weld
+from hand_models.scans.frame import axes_along, in_scan, start_on
+from hand_models.scans.holes import empty_circles
+from hand_models.scans.rock import Hole, ScannedRock
+from hand_models.scans.scan import Scan, areas_of
+
+__all__ = ["keep_triangles"]
+
+
+def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
+    """Return the triangles of a scan as rock, welded where their corners coincide.
+
+    Their winding says on which side the rock is. If it contradicts the view that was given, they
+    are turned over.
+
+    Parameters
+    ----------
+    scan : Scan
+        With triangles.
+    hole : float
+        Holes that are wider are told [m].
+    """
+    assert scan.faces is not None
+    view = scan.direction()
+    axes = axes_along(view)
+    middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
+    points, faces = weld(Triangles((scan.points - middle) @ axes, scan.faces))
+    if not len(faces):
+        raise InvalidInputError("no triangle has an area", field="file")
+    shown = scan.shown()
+    turned = shown is not None and float(shown @ view) > 0.0
+    if turned:
+        faces = faces[:, ::-1]
+    before = np.unique(faces[areas_of(points, faces)[:, 2] < 0.0])
+    start = start_on(points[before] if len(before) else points, scan, middle, axes)
+    edges = edges_of(faces)
+    return ScannedRock(
+        vertices=points - start,
+        faces=faces,
+        pose=Pose(middle + axes @ start, axes),
+        holes=tuple(
+            Hole(width, place - start)
+            for width, place in _holes(points, faces, hole, closed=shown is None)
+        ),
+        read=scan.read,
+        dropped=scan.dropped,
+        spacing=float(np.median(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))),
+        filled=tuple(
+            in_scan(cells, middle, axes) for cells in filled_cells(Triangles(points, faces))
+        ),
+        kept=True,
+        turned=turned,
+    )
+
+
+def _holes(
+    points: Array, faces: Indices, hole: float, *, closed: bool
+) -> list[tuple[float, Array]]:
+    """Return width and middle of each border that goes around a hole, the widest first.
+
+    Of a surface that is open the largest border of each of its parts is its outline.
+    """
+    count, edges = len(points), edges_of(faces)
+    whole = scipy.sparse.coo_matrix((np.ones(len(edges)), edges.T), (count, count))
+    part = scipy.sparse.csgraph.connected_components(whole, directed=False)[1]
+    pairs, number = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    border = pairs[number == 1]
+    rim = scipy.sparse.coo_matrix((np.ones(len(border)), border.T), (count, count))
+    loop = scipy.sparse.csgraph.connected_components(rim, directed=False)[1]
+    on = np.unique(border)
+    order = on[np.argsort(loop[on], kind="stable")]
+    loops = np.split(order, np.flatnonzero(np.diff(loop[order])) + 1) if len(on) else []
+    loops.sort(key=lambda each: -float(np.linalg.norm(np.ptp(points[each], axis=0))))
+    found: list[tuple[float, Array]] = []
+    outlined: set[int] = set()
+    for each in loops:
+        if not closed and part[each[0]] not in outlined:
+            outlined.add(int(part[each[0]]))
+            continue
+        width = _width(points[each])
+        if width > hole:
+            found.append((width, points[each].mean(axis=0)))
+    return sorted(found, key=lambda entry: -entry[0])
+
+
+def _width(loop: Array) -> float:
+    """Return the diameter of the largest circle without corners within a border [m]."""
+    flat = (loop - loop.mean(axis=0)) @ np.linalg.svd(
+        loop - loop.mean(axis=0), full_matrices=False
+    )[2].T
+    try:
+        corners = scipy.spatial.Delaunay(flat[:, :2]).simplices
+    except scipy.spatial.QhullError:  # on a line, or too few
+        return 0.0
+    return float(empty_circles(flat[corners]).max())

@@ -1,0 +1,80 @@
+"""Tables in text, written as programs and people write them, and what is no table of points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hand_models import InvalidInputError
+from hand_models.scans import read_scan
+
+POINTS = [
+    [402117.25, 5310842.5, 812.125],
+    [402117.5, 5310842.25, 812.5],
+    [402118.0, 5310843.0, 1.0],
+]
+
+
+def table(mark: str, decimal: str = ".", before: str = "", after: str = "", head: str = "") -> str:
+    rows = (mark.join(repr(x).replace(".", decimal) for x in row) for row in POINTS)
+    return head + "\n".join(before + row + after for row in rows)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        table(";", ","),
+        table(";", ",", head="X;Y;Z\n"),
+        table("\t", ","),
+        table(" ", ","),
+        table(", "),
+        table(" ", after=" 10 20 0 0 1", head="//X Y Z R G Nx Ny Nz\n"),
+        table(",", after=",10,20", head="//X,Y,Z,R,G\n"),
+        table(",", before="7,", head='"RTData","Points:0","Points:1","Points:2"\n'),
+        table(",", before="1,", head="id,Easting,Northing,Elevation\n"),
+        table(",", head="X [m],Y [m],Z [m]\n"),
+        table(" ", after=" 3", head="x [m] y [m] z [m] i\n"),
+        table(" ", after=" 200 1 2 3", head="3\n"),
+        table(",", after=","),
+        table(" ", head="x,y,z\n"),
+        table(";", after=";4", head="X_m;Y_m;Z_m;i\n"),
+        table('","', before='"', after='"'),
+        table(",", before="0.5,", head="n,x,y,z\n"),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-8-sig"])
+def test_every_usual_table_has_the_points_that_were_written(text, encoding, tmp_path):
+    path = tmp_path / "cloud.csv"
+    path.write_bytes(text.replace("\n", "\r\n").encode(encoding))
+    assert read_scan(path).points.tolist() == POINTS
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (table(",", ","), "commas are between the columns and in the numbers"),
+        ("".join(f"{i} 1.5 2.5 3.5\n" for i in range(1, 5)), "the first column counts the points"),
+        ("lat,lon,alt\n47.1,8.1,300\n47.2,8.2,301\n", "column lat is in degrees"),
+        ("id;longitude;latitude;h\n1;8.1;47.1;300\n2;8.2;47.2;301\n", "is in degrees"),
+        ("a,b,c,d\n1,2,3,4\n5,6,7,8\n", "which columns are x, y and z does not follow"),
+        ("x,y,z\n1,2,3\n4,5\n6,7,8\n", "line 2 of the points has 2 columns"),
+        ("x,y,z,i\n1,2,3\n4,5,6\n6,7,8\n", "4 columns have names, and the next line has 3"),
+        ("1 2\n3 4\n5 6\n", "no three numbers in a line"),
+        ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no three numbers in a line"),
+        ("1 2 3\n4 5 6\n7 8 1e38\n", "write nan"),
+    ],
+)
+def test_what_is_no_table_of_points_is_refused_with_its_cause(text, words, tmp_path):
+    path = tmp_path / "cloud.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=words) as error:
+        read_scan(path)
+    assert error.value.field == "file"
+
+
+def test_what_is_empty_is_not_finite(tmp_path):
+    path = tmp_path / "cloud.csv"
+    path.write_text("x;y;z\n1,5;2;3\n4;;6\n5;6;7\n8;9;1\n", encoding="utf-8")
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.points, [[1.5, 2, 3], [5, 6, 7], [8, 9, 1]])
+    assert scan.dropped == 1
