@@ -266,6 +266,23 @@ class HandData(NamedTuple):
             h=np.concatenate([utilisation - self.l0, self.h]),
         )
 
+    def held(self, y: Array) -> HandData:
+        """Return the hand with its loads given, shape (m,): no column is left."""
+        z, none = y / self.unit, np.zeros(0)
+        return HandData(
+            G=self.G[:, :0],
+            g=self.G @ z + self.g,
+            L=self.L[:, :0],
+            l0=self.L @ z + self.l0,
+            H=np.zeros((0, 0)),
+            h=none,
+            E=self.E[:, :0],
+            e0=self.E @ z + self.e0,
+            tie=none,
+            rest=none,
+            unit=none,
+        )
+
 
 def hands_data(
     scaled: Sequence[ScaledRows], transports: Array, held: Sequence[Array]
