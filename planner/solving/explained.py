@@ -43,8 +43,9 @@ from planner.result import (
     Time,
 )
 from planner.scene import clearance, scene_of
-from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
+from planner.solving.load_factor import FoundFactor, needs_hands
 from planner.solving.prepared_checks import PreparedChecks, Reading
+from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Solution, not_least
 from planner.solving.spread import find_spread
 from planner.solving.why_not import given_wrench, overload, unexplained
@@ -115,6 +116,7 @@ def explained_plan(
         effort=None if read is None else read.effort,
         load_factor=factor.factor,
         load_factor_unbounded=factor.unbounded,
+        load_factor_status=factor.status if "load_factor" in question.want else "not_asked",
         limiting=told.limiting,
         hands=hands,
         prices=told.prices,

@@ -211,6 +211,7 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
     answer = late(QUESTION)
     assert answer.unfinished == ("load_factor",)
     assert answer.load_factor is None
+    assert answer.load_factor_status == "not_finished"
     assert not answer.load_factor_unbounded
     assert answer.status == "optimal"
     assert answer.verified
