@@ -31,10 +31,13 @@ class TensionTrade(NamedTuple):
         w of the sum of squared relative tensions.
     most : float
         Largest utilisation of the plan.
+    whole : float
+        What is given away at most, far from the cap.
     """
 
     weight: float
     most: float
+    whole: float = 0.0
 
 
 def tension_trade(least: float, cap: float) -> TensionTrade:
@@ -48,8 +51,8 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
         On the utilisation, that the question asks for.
     """
     given_away, weight = _numbers()
-    room = max(min(given_away * abs(least), cap - least), 0.0)
-    return TensionTrade(weight, least + room)
+    whole = given_away * abs(least)
+    return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
 
 
 @cache

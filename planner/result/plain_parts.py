@@ -139,14 +139,15 @@ class Finding(Struct, frozen=True):
     ----------
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
-        ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up`` or, where joints are
-        known, ``link_in_rock`` and ``links_collide``.
+        ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``,
+        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock`` and ``links_collide``.
     field : str
         Its place in the question, such as ``stance.hands[0].pose.orientation``.
     message : str
         What is odd, and the slip that it is likely to come of.
     value : float
-        What was measured: how deep, how far, how much of its reach, or a cosine.
+        What was measured: how deep, how far, how much of its reach, a cosine, or the utilisation
+        without the hand.
     unit : str
         Of that: ``m``, ``m/s²`` or ``1``.
     """

@@ -124,7 +124,7 @@ def _solve_fixed(
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     with checks:
-        found = least_utilisation(sets.data, cap, before)
+        found = least_utilisation(sets.data, cap, prepared.batch.closing_tensions, before)
     bound = found.bound if found.proven else None
     first = Solution(sets, found.outcome, cap, bound=bound, least=found)
     if found.proven:

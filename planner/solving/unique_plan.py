@@ -15,6 +15,7 @@ for less tension, up to a most, at which u is fixed.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from planner.programs import (
 )
 from planner.solving import dual_bounds
 from planner.solving.active_set import ApartError, Optimum, Point, Rows, optimum
+from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
 __all__ = ["LeastUtilisation", "active_set_optimum", "is_least", "least_utilisation"]
 
@@ -68,11 +70,14 @@ class LeastUtilisation(NamedTuple):
     meant : Outcome or None
         The plan that is meant; None where it is not found, for the time or as the outcome has not
         its last digits.
+    spare : tuple of SpareHand
+        Hands that add nothing.
     """
 
     outcome: Outcome
     bound: float
     meant: Outcome | None = None
+    spare: tuple[SpareHand, ...] = ()
 
     @property
     def proven(self) -> bool:
@@ -81,7 +86,10 @@ class LeastUtilisation(NamedTuple):
 
 
 def least_utilisation(
-    data: StanceData, cap: float, near: LeastUtilisation | None = None
+    data: StanceData,
+    cap: float,
+    closing: Sequence[float],
+    near: LeastUtilisation | None = None,
 ) -> LeastUtilisation:
     """Return the least utilisation, and the plan that is meant.
 
@@ -93,6 +101,8 @@ def least_utilisation(
     data : StanceData
     cap : float
         On the utilisation, that the question asks for.
+    closing : sequence of float
+        Closing tension of every hand [N].
     near : LeastUtilisation, optional
         Of the same hands at another wrench: where its active rows are those of the optimum, no
         solver is asked.
@@ -100,7 +110,7 @@ def least_utilisation(
     if near is not None:
         exact = active_set_optimum(data, near.outcome, rounds=1)
         if exact is not None and not _far_beyond(exact.outcome):
-            return _meant(data, exact, cap, near.meant)
+            return _meant(data, exact, cap, closing, near.meant)
     outcome, share = programs.unique(data), 1.0
     if outcome.solved and _far_beyond(outcome):
         smaller = outcome.value**-2
@@ -112,7 +122,7 @@ def least_utilisation(
     exact = active_set_optimum(data, outcome, share)
     if exact is None:
         return LeastUtilisation(outcome, dual_bounds.unique_bound(data, outcome, share))
-    return _meant(data, exact, cap)._replace(outcome=outcome)
+    return _meant(data, exact, cap, closing)._replace(outcome=outcome)
 
 
 def _far_beyond(outcome: Outcome) -> bool:
@@ -177,10 +187,19 @@ def _rounds(size: int) -> int:
 
 
 def _meant(
-    data: StanceData, exact: ActiveSetOptimum, cap: float, near: Outcome | None = None
+    data: StanceData,
+    exact: ActiveSetOptimum,
+    cap: float,
+    closing: Sequence[float],
+    near: Outcome | None = None,
 ) -> LeastUtilisation:
     """Return what is meant, from the exact least utilisation; ``near`` as of another wrench."""
     trade = tension_trade(exact.outcome.value, cap)
+    spare = spare_hands(data, exact.outcome, trade)
+    if spare:
+        resting = at_closing(data, trade, spare, closing)
+        if resting.solved:
+            return LeastUtilisation(exact.outcome, exact.bound, resting, spare)
     least, face = exact.found
     if trade.most <= least.u or face.keeps(least, trade.weight / exact.weight):
         return LeastUtilisation(exact.outcome, exact.bound, exact.outcome)

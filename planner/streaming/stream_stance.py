@@ -107,6 +107,7 @@ class StreamStance:
         self.check = LoadsCheck(check, reader, self.columns)
         self.drive = prepared.batch.hands[0].hand.drive
         self.winches = _winches(reader, spaces)
+        self._closing = prepared.batch.closing_tensions
         self._least = reader.least
         self._rows, self._rest = reader.rows / LOAD_UNIT, reader.at_rest
 
@@ -119,7 +120,8 @@ class StreamStance:
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""
         data = self._data.turned(self._scaled(body_wrench))
-        outcome, bound, meant = found = least_utilisation(data, self.cap)
+        found = least_utilisation(data, self.cap, self._closing)
+        outcome, bound, meant = found.outcome, found.bound, found.meant
         if not found.proven:
             meant = None
             outcome = programs.margin(data)
