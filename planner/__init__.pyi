@@ -63,6 +63,7 @@ from .result import (
     Finger as Finger,
     HandPlan as HandPlan,
     LimitName as LimitName,
+    LoadFactorStatus as LoadFactorStatus,
     Plan as Plan,
     Price as Price,
     Quantiles as Quantiles,

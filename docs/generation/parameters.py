@@ -20,7 +20,7 @@ FILES = {
         "experiments.toml",
         "draws.toml",
     ),
-    "planner.parameters": ("robosimian.toml", "scene.toml"),
+    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml"),
 }
 
 SHOWN = 6

@@ -24,11 +24,13 @@ from .row_layout import (
     named_row as named_row,
 )
 from .seat_scatter import (
-    DRAWS as DRAWS,
+    HUNDREDTH as HUNDREDTH,
+    PLACES as PLACES,
     TENTH as TENTH,
     Robustness as Robustness,
+    closed_about as closed_about,
     robustness as robustness,
-    scattered_hands as scattered_hands,
+    scattered_places as scattered_places,
 )
 from .seat_search import BEST as BEST, PULL_OFF as PULL_OFF, best_seats as best_seats
 from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces

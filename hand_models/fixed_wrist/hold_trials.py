@@ -77,7 +77,7 @@ class FoundHold(NamedTuple):
         How far it reaches in each of `WAYS`, with whatever else [N]; NaN if it holds nothing.
     pure : float
         How far in the pull-off with every other component zero [N]; NaN if nowhere.
-    worst, tenth : ndarray, shape (5,), or None
+    worst, tenth, hundredth : ndarray, shape (5,), or None
         As of `Robustness`.
     """
 
@@ -88,6 +88,7 @@ class FoundHold(NamedTuple):
     pure: float
     worst: Array | None = None
     tenth: Array | None = None
+    hundredth: Array | None = None
 
 
 def grid_of_trials(
@@ -244,6 +245,6 @@ def try_holds(
         made = FoundHold(seating.pose.inverse(), seating.rule, seating.backed_off, support, pure)
         if robust:
             left = robustness(hand, outcome, DIRECTIONS)
-            made = made._replace(worst=left.worst, tenth=left.tenth)
+            made = made._replace(worst=left.worst, tenth=left.tenth, hundredth=left.hundredth)
         found.append(made)
     return found

@@ -182,7 +182,7 @@ def _ranked(trials: Trials) -> list[Tried]:
 
 def _told(trials: Trials, change: Change, trial: Trial) -> Advice:
     """Return a change, and what came of it, as an advice."""
-    holds = trials.holds(trial.utilisation)
+    holds, factor = trials.holds(trial.utilisation), trial.load_factor()
     return Advice(
         kind=change.kind,
         limbs=list(change.limbs),
@@ -191,6 +191,7 @@ def _told(trials: Trials, change: Change, trial: Trial) -> Advice:
         size=change.size,
         status="optimal" if holds else "overloaded",
         utilisation=trial.utilisation,
-        load_factor=trial.load_factor().factor,
+        load_factor=factor.factor,
+        load_factor_status=factor.status,
         holds=holds,
     )

@@ -7,6 +7,7 @@ body: whatever the body needs, there are no loads.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
@@ -25,11 +26,19 @@ from planner.explanation.infeasibility import (
 )
 from planner.explanation.irreducible_infeasible_set import (
     balance_alone,
+    blocks_up_to,
     irreducible_set,
     sufficient_alone,
 )
 from planner.prepare import FORCE_CAP, PASSIVE_JOINT, TENSION_CHANGE
-from planner.programs import JOINT_FORCE, JOINT_TORQUE, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import (
+    JOINT_FORCE,
+    JOINT_TORQUE,
+    LOAD_UNIT,
+    WRENCH_UNIT,
+    Outcome,
+    StanceData,
+)
 from planner.question import Limits
 from planner.result import Certificate, LimitName
 
@@ -119,7 +128,10 @@ def certify(
         irreducible = irreducible_set(system, weights)
     else:
         irreducible = () if balance_alone(system) else None
+    up_to = None
     if irreducible is not None:
+        size = LOAD_UNIT * blocks_up_to(system, irreducible)
+        up_to = size if math.isfinite(size) else None
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,
@@ -137,6 +149,7 @@ def certify(
             (name for name in ranked(weights) if name.limit != HELD_WRENCH), limits, spaces
         ),
         irreducible=irreducible,
+        irreducible_up_to=up_to,
         sufficient=sufficient_alone(system, irreducible),
         spaces=dict(zip(limbs, spaces, strict=True)),
     )
@@ -194,6 +207,7 @@ def certify_idle(used: LimitUse, cap: float, alone: bool | None) -> Certificate:
         nearest=None,
         blocking=(used.name,),
         irreducible=(used.name,),
+        irreducible_up_to=None,
         sufficient=None if alone is None else (used.name,) * alone,
         spaces={},
     )

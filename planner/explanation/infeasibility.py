@@ -11,6 +11,7 @@ beyond any strength, always counts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -122,6 +123,16 @@ class HardRowSystem:
     def proves(self, direction: Array, multipliers: Array) -> bool:
         """Whether the multipliers show that no loads balance."""
         return self.bound(direction, multipliers) < float(direction @ self.wrench)
+
+    def proven_up_to(self, direction: Array, multipliers: Array) -> float:
+        """Return the size of loads |z| up to which the multipliers show that none balance.
+
+        d · (W − g) − λ · h, by which they prove it, is used up there by Gᵀd − Hᵀλ, which rounding
+        leaves, or the box X: infinite where nothing is left of it.
+        """
+        gain = float(direction @ self.goal - multipliers @ self.h)
+        leak = float(np.abs(self.G.T @ direction - self.H.T @ multipliers).sum())
+        return gain / leak if leak > 0.0 else math.inf
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
         """Return what multipliers weigh each constraint with, those that count alone."""

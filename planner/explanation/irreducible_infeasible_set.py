@@ -22,7 +22,7 @@ from planner.explanation.infeasibility import BODY, WEIGHS, Chosen, HardRowSyste
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
-__all__ = ["balance_alone", "irreducible_set", "sufficient_alone"]
+__all__ = ["balance_alone", "blocks_up_to", "irreducible_set", "sufficient_alone"]
 
 BROKEN: Final = 1e-7
 """Rows that must be broken by more than this have no loads, in the program's units."""
@@ -86,6 +86,18 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
         elif trial.gain > KEPT and not _needed(system, kept, np.ones_like(system.h, bool), [name]):
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
+
+
+def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
+    """Return the size of loads |z| up to which constraints without any are proven to have none.
+
+    At least `UNLIMITED`, the box in which they were found to; infinite where no box is needed.
+    """
+    proof = system.least_violation(names)
+    if proof is None:
+        return UNLIMITED
+    tied, rows = system.rows_of(names)
+    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), UNLIMITED)
 
 
 def sufficient_alone(

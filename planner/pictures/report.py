@@ -62,6 +62,8 @@ PHASE_COLOURS: Final = {
 def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
     """Write ``stages.csv``, ``margin.png`` and ``summary.json`` into a folder.
 
+    A stage's ``margin`` is the cap on the utilisation minus its utilisation.
+
     Returns
     -------
     dict of str to Path
@@ -161,6 +163,7 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
         "utilisation": used,
         "margin": None if used is None else stage.question.limits.utilisation - used,
         "load_factor": plan.load_factor,
+        "load_factor_status": plan.load_factor_status,
         **_spread(stage, plan),
         "joint_utilisation": plan.joint_utilisation,
         "limiting_limb": name.limb or None,
@@ -235,7 +238,9 @@ def draw_route(result: RouteResult) -> Figure:
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color="tab:red")
     for i in np.flatnonzero(np.isnan(factor)):
-        told = "unbounded" if result.plans[i].load_factor_unbounded else "none"
+        answer = result.plans[i]
+        told = "unbounded" if answer.load_factor_unbounded else "none"
+        told = "not finished" if answer.load_factor_status == "not_finished" else told
         lower.text(i, 0.05, told, rotation=90, ha="center", va="bottom", fontsize=8, color="0.4")
     lower.set(ylabel="load factor [1]", xlabel="stance")
     lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))

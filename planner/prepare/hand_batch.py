@@ -247,6 +247,11 @@ class HandBatch:
         )
 
     @cached_property
+    def closing_tensions(self) -> tuple[float, ...]:
+        """With which the hands were closed [N]."""
+        return tuple([hand.closing_tension for hand in self.hands])
+
+    @cached_property
     def friction(self) -> Array:
         """Of each tile's surface, shape (T,)."""
         each = np.array([hand.surface.friction for hand in self.hands])

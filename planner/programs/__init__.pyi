@@ -8,6 +8,7 @@ from .solvers import (
     effort as effort,
     holds as holds,
     least_tensions as least_tensions,
+    less_tension as less_tension,
     load_factor as load_factor,
     margin as margin,
     nearest as nearest,
@@ -36,3 +37,4 @@ from .stance_data import (
 )
 from .stance_program import SOLVER as SOLVER
 from .supports import SilentHighs as SilentHighs, Support as Support
+from .trade import TensionTrade as TensionTrade, tension_trade as tension_trade

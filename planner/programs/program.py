@@ -8,10 +8,11 @@ wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give
 Below these six rows the balance has one for each component of a hand's wrench that is given
 (`held`). What joints, caps and largest changes of tension say are rows of the hands' sets.
 
-Eight programs share these rows:
+Nine programs share these rows:
 
 =============  =============================================================================
 `Unique`       min u + `TIE` · mean (tension / maximum)²       least utilisation, made unique
+`LessTension`  min u + w Σ (tension / maximum)²  the plan that is meant: see `tension_trade`
 `Margin`       min u                              least utilisation; its duals are the prices
 `Curved`       min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
 `TieBreak`     min Σ (tension / maximum)²         among plans of least utilisation
@@ -39,12 +40,14 @@ from hand_models.hand import FINGERS
 from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
 from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import REFINED, SHARP, VERTEX, Definition, StanceProgram
+from planner.programs.trade import TensionTrade
 
 __all__ = [
     "TIE",
     "UNLIMITED",
     "Curved",
     "Effort",
+    "LessTension",
     "LoadFactor",
     "Margin",
     "Nearest",
@@ -88,7 +91,7 @@ class Margin(StanceProgram):
 
 
 class Unique(StanceProgram):
-    """min u + `TIE` · mean (tension / maximum)²: the plan that is meant, in one solve.
+    """min u + `TIE` · mean (tension / maximum)²: the least utilisation, made unique in one solve.
 
     A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
 
@@ -126,6 +129,33 @@ class Unique(StanceProgram):
         """Return the plan of least utilisation; ``value`` is that utilisation."""
         outcome, u = self.run()
         return outcome if u is None else replace(outcome, value=float(u[0]))
+
+
+class LessTension(Unique):
+    """min u + w Σ (tension / maximum)² with u ≤ most: the plan that is meant.
+
+    Parameters
+    ----------
+    data : StanceData
+    trade : TensionTrade
+        w and most.
+    """
+
+    def __init__(self, data: StanceData, trade: TensionTrade) -> None:
+        super().__init__(data)
+        self.most, self.weights = trade.most, trade.weight * data.rows.tie
+
+    def define(self) -> Definition:
+        import cvxpy as cp
+
+        problem, (u, z), rows = super().define()
+        capped = cp.Problem(problem.objective, [*rows, u <= self.most])
+        return Definition(capped, (u, z), rows)
+
+    def conic(self) -> ConicProgram:
+        u, loads, b = self.blocks(1, below=1)
+        u[self.of_limits], u[-1], b[-1] = -1.0, 1.0, self.most
+        return super().conic()._replace(A=(Columns.of(u), loads), b=b)
 
 
 def tie_weight(hands: int) -> float:

@@ -13,6 +13,7 @@ from planner.programs.conic import LATE, Outcome, Reached
 from planner.programs.program import (
     Curved,
     Effort,
+    LessTension,
     LoadFactor,
     Margin,
     Nearest,
@@ -21,6 +22,7 @@ from planner.programs.program import (
     Unique,
 )
 from planner.programs.stance_data import StanceData
+from planner.programs.trade import TensionTrade
 
 __all__ = [
     "SLACK",
@@ -30,6 +32,7 @@ __all__ = [
     "effort",
     "holds",
     "least_tensions",
+    "less_tension",
     "load_factor",
     "margin",
     "nearest",
@@ -62,6 +65,11 @@ def vertex(data: StanceData) -> Outcome:
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
     """Solve `Unique`."""
     return Unique(data, share).solve()
+
+
+def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
+    """Solve `LessTension`."""
+    return LessTension(data, trade).solve()
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:

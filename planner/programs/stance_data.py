@@ -271,6 +271,22 @@ class HandData(NamedTuple):
             h=np.concatenate([utilisation - self.l0, self.h]),
         )
 
+    def about(self, centre: Array, stiffness: float) -> HandData:
+        """Return the hand with loads counted from a centre, shape (m,), and ties so much dearer."""
+        return self._replace(
+            g=self.g + self.G @ centre,
+            l0=self.l0 + self.L @ centre,
+            h=self.h - self.H @ centre,
+            e0=self.e0 + self.E @ centre,
+            tie=stiffness * self.tie,
+        )
+
+    def held(self, y: Array) -> HandData:
+        """Return the hand with its loads given, shape (m,): no column is left, nor hard rows."""
+        fixed, none = self.about(y / self.unit, 1.0), np.zeros(0)
+        fixed = fixed._replace(H=np.zeros((0, 0)), h=none, tie=none, rest=none, unit=none)
+        return fixed._replace(G=self.G[:, :0], L=self.L[:, :0], E=self.E[:, :0])
+
 
 def hands_data(
     scaled: Sequence[ScaledRows], transports: Array, held: Sequence[Array]

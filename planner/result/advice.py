@@ -6,6 +6,8 @@ from typing import Any, Literal
 
 from msgspec import Struct
 
+from planner.result.plain_parts import LoadFactorStatus
+
 __all__ = ["Advice", "AdviceKind"]
 
 AdviceKind = Literal[
@@ -53,7 +55,8 @@ class Advice(Struct, frozen=True):
         ``optimal`` or ``overloaded``, with the change.
     utilisation : float
     load_factor : float or None
-        None where there is none, no end to it, or no time to find it.
+    load_factor_status : {'found', 'at_least', 'unbounded', 'none', 'not_finished'}
+        Whether it is there; why not: there is no end to it, there is none, or no time to find it.
     holds : bool
         Whether the utilisation is within the cap that was asked for.
     """
@@ -67,3 +70,4 @@ class Advice(Struct, frozen=True):
     utilisation: float
     load_factor: float | None
     holds: bool
+    load_factor_status: LoadFactorStatus = "not_asked"

@@ -5,6 +5,8 @@ A name that does not exist is None, and null on its way; what was not asked for 
 
 from __future__ import annotations
 
+from typing import Literal
+
 from msgspec import UNSET, Struct, UnsetType
 from msgspec.structs import astuple
 
@@ -14,6 +16,7 @@ __all__ = [
     "Finding",
     "Finger",
     "LimitName",
+    "LoadFactorStatus",
     "Price",
     "RobustLoadFactor",
     "Solver",
@@ -75,6 +78,11 @@ class Price(LimitName, frozen=True, kw_only=True):
         return LimitName(self.limb, self.finger, self.phalanx, self.limit, self.joint)
 
 
+LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
+"""What is known of a load factor: it is there, or that it is no less; no multiple of the body
+wrench is too much, or none can be held; it was not asked for, or a deadline came before."""
+
+
 class Solver(Struct, frozen=True):
     """Which solver ended how.
 
@@ -131,15 +139,15 @@ class Finding(Struct, frozen=True):
     ----------
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
-        ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit`` or,
-        where joints are known, ``link_in_rock`` and ``links_collide``.
+        ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
+        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock`` and ``links_collide``.
     field : str
         Its place in the question, such as ``stance.hands[0].pose.orientation``.
     message : str
         What is odd, and the slip that it is likely to come of.
     value : float
-        What was measured: how deep, how far, how much of its reach, or a cosine; or the number
-        that looks as if it were in another unit.
+        What was measured: how deep, how far, how much of its reach, a cosine, or the utilisation
+        without the hand; or the number that looks as if it were in another unit.
     unit : str
         Of that, such as ``m``, ``m/s²`` or ``1``.
     """
@@ -198,22 +206,34 @@ class Clearance(Struct, frozen=True, kw_only=True):
 class RobustLoadFactor(Struct, frozen=True):
     """The load factor where the hands are not quite where they were put.
 
-    All hands are closed anew at random places about their own, each drawn apart. H stays in W, so
-    that body and joints stay, too: it is the rock that is elsewhere.
+    Each hand is closed anew at ``places`` about its own, a scrambled Sobol sequence by its limb's
+    name, and the places of all hands are combined at random. H stays in W, so that body and joints
+    stay, too: it is the rock that is elsewhere. Quantiles are over all draws: one in which a hand
+    cannot be, or nothing can be held, has a load factor of zero.
 
     Attributes
     ----------
     draws, without : int
-        Draws, and those of them in which a hand cannot be, or there is no load factor.
+        Combinations of places, and those of them that have a load factor of zero.
     refused : dict of str to int
         In how many draws a hand cannot be, by limb; those that always can are left out.
     position, angle : float
         The scatter: to either side along each axis of H [m], and about each [rad].
     seed : int
         Of the draws.
-    worst, tenth : float or None
-        The least in the other draws, and what it exceeds in nine in ten of them; None if there are
-        none.
+    worst : float
+        Deprecated: the same as ``hundredth``. It was the least of the draws that had one, which
+        hangs on how many there are.
+    tenth : float
+        What it exceeds in nine in ten draws.
+    tenth_interval : list of float, length 2
+        What holds that in 95 %, for all that so many draws tell.
+    hundredth : float
+        What it exceeds in 99 of a hundred draws.
+    hundredth_interval : list of float, length 2
+        The same of that.
+    places : int
+        Of each hand.
     """
 
     draws: int
@@ -222,8 +242,12 @@ class RobustLoadFactor(Struct, frozen=True):
     position: float
     angle: float
     seed: int
-    worst: float | None
-    tenth: float | None
+    worst: float
+    tenth: float
+    tenth_interval: list[float]
+    hundredth: float
+    hundredth_interval: list[float]
+    places: int
 
 
 class Tile(Struct, frozen=True):

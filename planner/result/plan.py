@@ -17,6 +17,7 @@ from planner.result.plain_parts import (
     Clearance,
     Finding,
     LimitName,
+    LoadFactorStatus,
     Price,
     RobustLoadFactor,
     Solver,
@@ -72,6 +73,10 @@ class Certificate:
         (``held_wrench``) that by themselves leave no balance, each of them needed for that. Others
         may be in the way, too. In the order of ``blocking``. Empty where loads of any sign, up to
         10⁶ N, would not balance it. None where rounding leaves the set undecided.
+    irreducible_up_to : float or None
+        Loads up to which they are proven to leave no balance [N], at least 10⁶: far beyond any
+        strength, but rows that are all but parallel may meet beyond. None where no loads of any
+        size balance, or there is no set.
     sufficient : tuple of LimitName or None
         Those of them without any one of which, all other rows in place, there is a plan: within
         the cap, or at any utilisation. Empty if no single one does. None where that is undecided,
@@ -89,6 +94,7 @@ class Certificate:
     nearest: Array | None
     blocking: tuple[LimitName, ...]
     irreducible: tuple[LimitName, ...] | None
+    irreducible_up_to: float | None
     sufficient: tuple[LimitName, ...] | None
     spaces: Mapping[str, WrenchSpace]
 
@@ -108,6 +114,8 @@ class Plan:
     load_factor : float or None
         Largest s for which s × body wrench has a plan with utilisation ≤ 1, if it was asked for and
         exists.
+    load_factor_status : {'found', 'at_least', 'unbounded', 'none', 'not_asked', 'not_finished'}
+        Whether it is there, and why not.
     load_factor_unbounded : bool
         Whether there is no end to such s.
     limiting : LimitName or None
@@ -185,6 +193,7 @@ class Plan:
     spread: Spread | None = None
     clearance: Clearance | None = None
     advice: tuple[Advice, ...] | None = None
+    load_factor_status: LoadFactorStatus = "not_asked"
 
     @property
     def joint_shares(self) -> Mapping[str, Array] | None:

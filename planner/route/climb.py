@@ -19,7 +19,7 @@ from hand_models.parameters import Draw
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance, Want
-from planner.result import Finding, Plan
+from planner.result import Finding, LoadFactorStatus, Plan
 from planner.robots import UnreachableError
 from planner.solving import plan
 
@@ -32,6 +32,16 @@ JointAngles = Array | Literal["solve"]
 
 WORTH_A_PROCESS: Final = 40
 """Stages below this many are planned faster here than in processes that must first start."""
+
+LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
+    "none",
+    "not_finished",
+    "not_asked",
+    "at_least",
+    "found",
+    "unbounded",
+)
+"""What is known of load factors; of several stages the first that any has is known of the least."""
 
 WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
 """Statuses of stages, each worse than the one before."""
@@ -133,6 +143,7 @@ class OutOfReach:
     utilisation: None = None
     load_factor: None = None
     load_factor_unbounded: Literal[False] = False
+    load_factor_status: Literal["none"] = "none"
     limiting: None = None
     joint_utilisation: None = None
     spread: None = None
@@ -181,6 +192,12 @@ class RouteResult:
     def load_factor_unbounded(self) -> bool:
         """Whether there is no end to the load factor of any stage."""
         return all(p.load_factor_unbounded for p in self.plans)
+
+    @property
+    def load_factor_status(self) -> LoadFactorStatus:
+        """Whether the least of all stages is there, and why not."""
+        found = {p.load_factor_status for p in self.plans}
+        return next(status for status in LEAST_KNOWN if status in found)
 
     @property
     def crux(self) -> int:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
+from hand_models.hand import FINGERS
 from planner import deadline
 from planner.deadline import Unfinished, late, late_sentence
 from planner.explanation import (
@@ -33,6 +34,7 @@ from planner.programs import SLACK, SOLVER
 from planner.result import (
     Certificate,
     Clearance,
+    Finding,
     HandPlan,
     LimitName,
     Plan,
@@ -43,13 +45,17 @@ from planner.result import (
     Time,
 )
 from planner.scene import clearance, scene_of, wrench_findings
-from planner.solving.load_factor import FoundFactor, find_robust_load_factor, needs_hands
+from planner.solving.load_factor import FoundFactor, needs_hands
 from planner.solving.prepared_checks import PreparedChecks, Reading
+from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Solution, not_least
 from planner.solving.spread import find_spread
 from planner.solving.why_not import given_wrench, overload, unexplained
 
 __all__ = ["explained_plan"]
+
+LEFT: Final = 0.5
+"""How far a tension may be from that of closing to be left there [N]: less than motors are held."""
 
 
 class _Verdict(NamedTuple):
@@ -109,6 +115,8 @@ def explained_plan(
         unfinished += late("spread") if spread is None else ()
     read, hands = told.plan, None if told.plan is None else told.plan.hands
     odd = wrench_findings(question)
+    if hands is not None:
+        odd = (*odd, *_spare_findings(prepared, found))
     return Plan(
         status=told.status,
         body_wrench=prepared.wrench,
@@ -116,6 +124,7 @@ def explained_plan(
         effort=None if read is None else read.effort,
         load_factor=factor.factor,
         load_factor_unbounded=factor.unbounded,
+        load_factor_status=factor.status if "load_factor" in question.want else "not_asked",
         limiting=told.limiting,
         hands=hands,
         prices=told.prices,
@@ -143,6 +152,23 @@ def explained_plan(
         spread=spread,
         clearance=_clearance(prepared) if "clearance" in question.want else None,
     )
+
+
+def _spare_findings(prepared: PreparedStance, found: Solution) -> Iterator[Finding]:
+    """Yield which hands add nothing to the plan."""
+    if found.least is None or found.effort is not None or found.reading is None:
+        return
+    loads, closing = found.reading.loads, prepared.batch.closing_tensions
+    for i, without, _ in found.least.spare:
+        message = (
+            f"{prepared.limbs[i]} adds nothing: without it the least utilisation would be "
+            f"{without:.4g}, with it {found.outcome.value:.4g}"
+        )
+        off = np.abs(loads[i][: len(FINGERS)] - closing[i]).max()
+        if off <= LEFT:
+            message += f"; its tendons are left at their closing tension of {closing[i]:g} N"
+        field = f"stance.hands[{i}]"
+        yield Finding("hand_adds_nothing", field, message, without, "1")
 
 
 def _clearance(prepared: PreparedStance) -> Clearance:

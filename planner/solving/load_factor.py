@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.fixed_wrist import DRAWS, TENTH, scattered_hands, wrench_spaces
-from hand_models.hand import SettledHand
 from planner import deadline, programs
-from planner.deadline import Budget, DeadlineError, Unfinished, late
+from planner.deadline import Budget, Unfinished, late
 from planner.explanation import LimitUse
 from planner.floating import NO_WRENCH, most_load
 from planner.prepare import HandSets, PreparedStance
 from planner.programs import SLACK, StanceData
-from planner.result import RobustLoadFactor
+from planner.result import LoadFactorStatus
 from planner.solving.solution import Solution
 
-__all__ = ["FoundFactor", "find_load_factor", "find_robust_load_factor", "needs_hands"]
-
-SEED: Final = 0
-"""Of the places of hands that are drawn."""
+__all__ = [
+    "FoundFactor",
+    "find_load_factor",
+    "most_of_fixed",
+    "needs_hands",
+    "overloaded_by_itself",
+]
 
 
 class FoundFactor(NamedTuple):
@@ -44,12 +44,21 @@ class FoundFactor(NamedTuple):
     unbounded: bool = False
     unfinished: tuple[Unfinished, ...] = ()
 
+    @property
+    def status(self) -> LoadFactorStatus:
+        """What is known of it, where it was asked for."""
+        if self.unbounded:
+            return "unbounded"
+        if self.factor is not None:
+            return "at_least" if self.least else "found"
+        return "not_finished" if self.unfinished else "none"
+
 
 def find_load_factor(
     prepared: PreparedStance, found: Solution, idle: Sequence[LimitUse], budget: Budget
 ) -> FoundFactor:
     """Return how many times the body wrench could be held, if it can be known."""
-    if _overloaded_by_itself(idle):
+    if overloaded_by_itself(idle):
         return FoundFactor()
     if not needs_hands(prepared):
         # any multiple of it can be held, or none
@@ -62,50 +71,13 @@ def find_load_factor(
         if most is not None:
             return FoundFactor(most.factor, least=not most.sure)
     else:
-        factor = _most(prepared.hands, found.sets.data)
+        factor = most_of_fixed(prepared.hands, found.sets.data)
         if factor is not None:
             return FoundFactor(factor)
     return FoundFactor(unfinished=late("load_factor"))
 
 
-def find_robust_load_factor(
-    prepared: PreparedStance, idle: Sequence[LimitUse]
-) -> RobustLoadFactor | None:
-    """Return it where the hands are not quite where they were put; None if time does not allow."""
-    hand, limbs = prepared.question.stance.robot.hand, prepared.limbs
-    # drawn in the order of their names, whatever the order of the question
-    order = np.argsort(limbs)
-    settled = [prepared.batch.hands[i] for i in order.tolist()]
-    places = scattered_hands(hand, settled, DRAWS, SEED, hand.seat_scatter)
-    factors: list[float] = []
-    refused: Counter[str] = Counter()
-    try:
-        for drawn in places:
-            deadline.check("all draws were planned")
-            draw = [drawn[i] for i in np.argsort(order).tolist()]
-            there = [each for each in draw if isinstance(each, SettledHand)]
-            pairs = zip(limbs, draw, strict=True)
-            refused.update(limb for limb, each in pairs if not isinstance(each, SettledHand))
-            if len(there) == len(draw) and not _overloaded_by_itself(idle):
-                factor = _most_elsewhere(prepared, there)
-                factors += [] if factor is None else [factor]
-        deadline.check("all draws were planned")
-    except DeadlineError:
-        return None
-    without = DRAWS - len(factors)
-    worst, tenth = np.percentile(factors, [0.0, TENTH]).tolist() if factors else (None, None)
-    return RobustLoadFactor(DRAWS, without, dict(refused), *hand.seat_scatter, SEED, worst, tenth)
-
-
-def _most_elsewhere(prepared: PreparedStance, settled: Sequence[SettledHand]) -> float | None:
-    """Return the load factor of the same hands closed elsewhere; None if there is none."""
-    spaces = wrench_spaces(settled, prepared.question.limits.tendon_tension)
-    pairs = zip(prepared.hands.added, spaces, strict=True)
-    moved = prepared.hands.with_sets([rows.on(space) for rows, space in pairs])
-    return _most(moved, moved.sets(moved.at_rest(moved.idle)).data)
-
-
-def _overloaded_by_itself(idle: Sequence[LimitUse]) -> bool:
+def overloaded_by_itself(idle: Sequence[LimitUse]) -> bool:
     """Whether a limb without a hand cannot bear itself, whatever the body needs."""
     return any(used.utilisation > 1.0 + SLACK for used in idle)
 
@@ -115,7 +87,7 @@ def needs_hands(prepared: PreparedStance) -> bool:
     return bool(np.abs(prepared.hands.wrench[:6]).max() > NO_WRENCH)
 
 
-def _most(hands: HandSets, data: StanceData) -> float | None:
+def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
     """Return the load factor of hands with fixed wrists; None if none passes its checks."""
     result = programs.load_factor(data)
     if not result.solved:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 from planner import deadline, programs
 from planner.deadline import Budget, Overlap, Unfinished, late
 from planner.floating import LargestFactor, WristSolution, least_effort, least_use, with_room
 from planner.prepare import PreparedStance, Sets
-from planner.programs import SLACK, Outcome
+from planner.programs import SLACK, Outcome, StanceData, tension_trade
 from planner.solving import dual_bounds
 from planner.solving.prepared_checks import PreparedChecks, Reading, read_loads
-from planner.solving.unique_plan import is_least, least_utilisation
+from planner.solving.unique_plan import LeastUtilisation, is_least, least_utilisation
 
 __all__ = [
     "Solution",
@@ -49,6 +50,8 @@ class Solution(NamedTuple):
         Of the program of least effort.
     unfinished : tuple of str
         What the deadline came before.
+    least : LeastUtilisation or None
+        What the plan was found from, of fixed wrists.
     """
 
     sets: Sets
@@ -61,6 +64,7 @@ class Solution(NamedTuple):
     factor: LargestFactor | None = None
     effort: Outcome | None = None
     unfinished: tuple[Unfinished, ...] = ()
+    least: LeastUtilisation | None = None
 
     @property
     def wrong(self) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ def solve_question(
     checks: Overlap[PreparedChecks],
     budget: Budget,
     near: WristSolution | None = None,
-    before: Outcome | None = None,
+    before: LeastUtilisation | None = None,
 ) -> Solution:
     """Return the plan that is asked for.
 
@@ -111,22 +115,23 @@ def solve_question(
 
 
 def _solve_fixed(
-    prepared: PreparedStance, checks: Overlap[PreparedChecks], before: Outcome | None
+    prepared: PreparedStance, checks: Overlap[PreparedChecks], before: LeastUtilisation | None
 ) -> Solution:
-    """Return the plan of least utilisation, of these that of least tensions.
+    """Return the plan that is meant: of least utilisation, but for what less tension is worth.
 
-    One solve has its utilisation, and mostly its active rows, which give its last digits; else
-    a second solve has these. What reads and checks the loads is prepared meanwhile.
+    One solve has the least utilisation, and mostly its active rows, which give its last digits and
+    the plan; else a second solve has these. What reads and checks the loads is prepared meanwhile.
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     with checks:
-        found = least_utilisation(sets.data, before)
-    first = Solution(sets, found.outcome, cap, bound=found.bound if found.proven else None)
+        found = least_utilisation(sets.data, cap, prepared.batch.closing_tensions, before)
+    bound = found.bound if found.proven else None
+    first = Solution(sets, found.outcome, cap, bound=bound, least=found)
     if found.proven:
-        if found.loads is None:
-            first = _tie_broken(prepared, checks.result(), first)
+        if found.meant is None:
+            first = _less_tense(prepared, checks.result(), first)
         else:
-            reading = read_loads(prepared, checks.result(), sets, found.loads)
+            reading = read_loads(prepared, checks.result(), sets, found.meant.loads)
             first = first._replace(reading=reading)
         if not first.wrong:
             return first
@@ -139,7 +144,7 @@ def _solve_fixed(
 
 
 def solve_in_two(prepared: PreparedStance, checks: Overlap[PreparedChecks], sets: Sets) -> Solution:
-    """Return the plan of least effort among those of the very least utilisation.
+    """Return the plan that is meant from the very least utilisation, by a solver for each.
 
     Where hands are asked for thousands of times what they can do, a small error of the largest load
     may be more than the others' checks let pass: then the plan is a vertex.
@@ -148,7 +153,7 @@ def solve_in_two(prepared: PreparedStance, checks: Overlap[PreparedChecks], sets
     found = Solution(sets, outcome, cap)
     if not outcome.solved:
         return found
-    found = _tie_broken(prepared, checks.result(), found)
+    found = _less_tense(prepared, checks.result(), found)
     if deadline.expired() or not (found.wrong or not_least(found)):
         return found
     exact = solve_at_vertex(prepared, checks, sets)
@@ -165,10 +170,12 @@ def solve_at_vertex(
     return found._replace(reading=read_loads(prepared, checks.result(), sets, found.outcome.loads))
 
 
-def _tie_broken(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:
-    """Return the plan of least tensions among those of least utilisation."""
-    sets = found.sets
-    tidy = programs.least_tensions(sets.data, found.outcome.value)
+def _less_tense(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:
+    """Return the plan of less tension for a little utilisation, or else for none."""
+    sets, least = found.sets, found.outcome.value
+    tidy = programs.less_tension(sets.data, tension_trade(least, found.cap))
+    if not (tidy.solved or deadline.expired()):
+        tidy = programs.least_tensions(sets.data, least)
     if tidy.solved:
         found = found._replace(reading=read_loads(prepared, checks, sets, tidy.loads))
     else:
@@ -196,8 +203,28 @@ def _solve_floating(
         unfinished=late("wrists"),
     )
     if search.exact:
-        return _with_wrists(prepared, checks, found, search)
+        return _with_wrists(prepared, checks, found, _less_tense_beside(prepared, search))
     return found._replace(sets=prepared.hands.sets(search.point))
+
+
+def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> WristSolution:
+    """Return a search's plan with less tension in its fixed hands, floating wrists as they are."""
+    wrists, data = prepared.hands.wrists, search.sets.data
+    if None not in wrists or deadline.expired():
+        return search
+    loads = search.point.loads
+    held = [
+        hand if wrist is None else hand.held(y)
+        for hand, wrist, y in zip(data.hands, wrists, loads, strict=True)
+    ]
+    cap = prepared.question.limits.utilisation
+    trade = tension_trade(search.measure.utilisation, cap)
+    found = programs.less_tension(StanceData(tuple(held), data.wrench), trade)
+    if not found.solved:
+        return search
+    pairs = zip(wrists, loads, found.loads, strict=True)
+    loads = tuple([new if wrist is None else old for wrist, old, new in pairs])
+    return replace(search, point=replace(search.point, loads=loads))
 
 
 def _with_wrists(
@@ -259,25 +286,28 @@ def _solve_floating_effort(
 def not_least(found: Solution) -> list[str]:
     """Return what is wrong if the multipliers do not prove the plan the best.
 
-    With floating hands, the best of their sets about the plan.
+    But for what fixed hands give away for less tension; with floating hands, the best of their sets
+    about the plan.
     """
     if found.unproven or "least_utilisation" in found.unfinished:
         return []
-    data, bound = found.sets.data, found.bound
-    if found.effort is None:
-        used = found.utilisation
-    else:
-        used = found.outcome.value
-        if found.least_use is not None:
-            # of these sets, which are about another point, the outcome is
-            data = found.least_use.sets.data
+    data, bound, least = found.sets.data, found.bound, found.outcome.value
+    if found.least_use is not None:
+        # of these sets, which may be about another point, the outcome is
+        data = found.least_use.sets.data
+        if found.effort is None:
+            least = found.least_use.measure.utilisation
     if bound is None:
         bound = dual_bounds.least_bound(data, found.outcome)
-    if not is_least(used, bound):
-        return [f"utilisation {used:.6g} is only proven to be above {bound:.6g}"]
-    if found.effort is not None:
-        effort = found.effort.value if found.search is None else found.search.measure.effort
-        bound = dual_bounds.least_effort_bound(found.sets.data, found.effort, found.cap)
-        if not is_least(effort, bound):
-            return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
+    if not is_least(least, bound):
+        return [f"utilisation {least:.6g} is only proven to be above {bound:.6g}"]
+    if found.effort is None:
+        most, used = tension_trade(least, found.cap).most, found.utilisation
+        if not is_least(used, most):
+            return [f"utilisation {used:.6g} is above {most:.6g}, what less tension is worth"]
+        return []
+    effort = found.effort.value if found.search is None else found.search.measure.effort
+    bound = dual_bounds.least_effort_bound(found.sets.data, found.effort, found.cap)
+    if not is_least(effort, bound):
+        return [f"effort {effort:.6g} is only proven to be above {bound:.6g}"]
     return []

@@ -10,13 +10,13 @@ from planner import deadline
 from planner.deadline import Budget, Overlap
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import Outcome
 from planner.question import Question, checked_body_wrench
 from planner.result import Plan, Time
 from planner.solving.explained import explained_plan
 from planner.solving.load_factor import FoundFactor, find_load_factor
 from planner.solving.prepared_checks import PreparedChecks, prepare_checks
 from planner.solving.solution import solve_question
+from planner.solving.unique_plan import LeastUtilisation
 from planner.solving.why_not import beyond_all_loads, look_again
 
 __all__ = ["KnownStance", "plan", "plan_on"]
@@ -49,8 +49,8 @@ def plan_on(
     prepared: PreparedStance,
     start: float,
     known: PreparedChecks | None = None,
-    before: Outcome | None = None,
-) -> tuple[Plan, Outcome]:
+    before: LeastUtilisation | None = None,
+) -> tuple[Plan, LeastUtilisation | None]:
     """Answer a question of a prepared stance.
 
     Parameters
@@ -60,14 +60,14 @@ def plan_on(
         When it began, on the clock of `time.perf_counter`.
     known : PreparedChecks, optional
         What reads and checks its plans; by default it is made beside the solver.
-    before : Outcome, optional
-        How the program of the same hands ended at another wrench.
+    before : LeastUtilisation, optional
+        What came of the same hands at another wrench.
 
     Returns
     -------
     plan : Plan
-    outcome : Outcome
-        How its program ended.
+    least : LeastUtilisation or None
+        What it was found from, of fixed wrists.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def plan_on(
         factor = find_load_factor(prepared, found, ready.idle, budget)
     solved = time.perf_counter()
     times = Time(modelled - start, solved - modelled, 0.0)
-    return explained_plan(prepared, ready, found, proof, factor, times, start), found.outcome
+    return explained_plan(prepared, ready, found, proof, factor, times, start), found.least
 
 
 class KnownStance:
@@ -113,7 +113,7 @@ class KnownStance:
     def __init__(self, question: Question) -> None:
         self.prepared = prepared = prepare_stance(question)
         self._checks: PreparedChecks | None = None
-        self._before: Outcome | None = None
+        self._before: LeastUtilisation | None = None
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None and not prepared.floating:
             self._checks = prepare_checks(prepared)
@@ -135,7 +135,7 @@ class KnownStance:
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         with deadline.within(self.prepared.question.deadline, started=start):
             prepared = self.prepared.turned(wrench)
-            answer, outcome = plan_on(prepared, start, self._checks, self._before)
-        if outcome.solved:
-            self._before = outcome
+            answer, least = plan_on(prepared, start, self._checks, self._before)
+        if least is not None and least.outcome.solved:
+            self._before = least
         return answer

@@ -1,47 +1,44 @@
-"""The plan of least utilisation that is meant: one program, its last digits, and its proof.
+"""The plan that is meant: least utilisation, its proof, and what of it is given away for tension.
 
 An interior-point solver ends near the optimum of `program.Unique`, whose second term is so small
 that tensions may be off by newtons while the objective has all its digits. Which rows are active is
-nearly clear by then: C z − d u = b of the balance and these rows, with d one for limits. With them
-as equations the optimum is where (Karush, Kuhn and Tucker)
+nearly clear by then, and the active-set method (`planner.solving.active_set`) has the last digits.
+Where the rows that were active at another wrench still are, no solver is needed: one system, and
+the signs of its multipliers, prove the plan.
 
-    Q z + Cᵀ λ = 0,   dᵀ λ = 1,   C z − d u = b,
-
-Q the curvature of the small term. Newton's step to it from the solver's own point is, with z
-eliminated, one small system, r being what is missing in the three:
-
-    [ S  d ] [ δλ ]   [ C Q⁻¹ r₁ − r₂ ]
-    [ dᵀ 0 ] [ δu ] = [ r₃            ] ,   S = C Q⁻¹ Cᵀ,   δz = Q⁻¹ (r₁ − Cᵀ δλ).
-
-A little softness keeps S regular where rows say the same, and takes nothing away, since steps are
-repeated. On the way there the first row that would break becomes active; at its end the one with
-the least λ < 0 no longer is: the active-set method for a convex quadratic program (Nocedal and
-Wright, Numerical Optimization, algorithm 16.3), begun next to its end.
-
-Where the rows that were active at another wrench still are, no solver is needed: one such system,
-and the signs of its multipliers, prove the plan.
+From there to the plan that is meant (`program.LessTension`), whose second term is larger, the same
+method goes on: mostly the same rows are active, and their multipliers at the larger weight prove
+that the plan stays as it is, for the price of one step. Where it is not, utilisation is given away
+for less tension, up to a most, at which u is fixed.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hand_models.base import Array
-from planner import programs
-from planner.programs import TIE, Outcome, StanceData, parted, tie_weight
+from planner import deadline, programs
+from planner.programs import (
+    TIE,
+    Outcome,
+    StanceData,
+    TensionTrade,
+    parted,
+    tension_trade,
+    tie_weight,
+)
 from planner.solving import dual_bounds
+from planner.solving.active_set import ApartError, Optimum, Point, Rows, optimum
+from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
 __all__ = ["LeastUtilisation", "active_set_optimum", "is_least", "least_utilisation"]
 
-Mask = npt.NDArray[np.bool_]
-
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
-
 
 SURE: Final = (1e-6, 1.0)
 """How many times a row's multiplier may be less than its room for the row to be active at first."""
@@ -49,32 +46,11 @@ SURE: Final = (1e-6, 1.0)
 ROUNDS: Final = 12
 """Sets of active rows that are tried at most."""
 
-MANY: Final = 96
-"""Rows that may break on the way to where active ones meet; with more, it is sooner solved anew."""
-
 LARGE: Final = 64
 """Loads of a stance up to which so many systems are worth it: fewer for more, by their cube."""
 
-HOLDS: Final = 1e-9
-"""By how much a row may be broken, scaled."""
-
-PUSHES: Final = 1e-14
-"""How far below zero a multiplier may be, those of the limits adding up to one."""
-
-SOFT: Final = 1e-13
-"""Softness of S, whose diagonal is scaled to ones."""
-
-STEPS: Final = 6
-"""Newton's steps for a set of active rows, at most."""
-
-MET: Final = 1e-10
-"""What may be missing of the equations of rows, scaled."""
-
-STILL: Final = 1e-13
-"""What may be missing of Q z + Cᵀ λ = 0."""
-
-WHOLE: Final = 1e-9
-"""What may be missing of dᵀ λ = 1."""
+FREE: Final = 1e-6
+"""How much more than one the multipliers of limits add up to where u is not free."""
 
 
 def is_least(value: float, bound: float) -> bool:
@@ -83,20 +59,25 @@ def is_least(value: float, bound: float) -> bool:
 
 
 class LeastUtilisation(NamedTuple):
-    """What came of `programs.unique`.
+    """What came of `programs.unique`, and of `programs.less_tension` from there.
 
     Attributes
     ----------
     outcome : Outcome
+        Of the least utilisation.
     bound : float
         The least utilisation is not below; −∞ without a solution.
-    loads : tuple of ndarray or None
-        y of each hand, exact [N]; None where their last digits are not found.
+    meant : Outcome or None
+        The plan that is meant; None where it is not found, for the time or as the outcome has not
+        its last digits.
+    spare : tuple of SpareHand
+        Hands that add nothing.
     """
 
     outcome: Outcome
     bound: float
-    loads: tuple[Array, ...] | None = None
+    meant: Outcome | None = None
+    spare: tuple[SpareHand, ...] = ()
 
     @property
     def proven(self) -> bool:
@@ -104,23 +85,32 @@ class LeastUtilisation(NamedTuple):
         return self.outcome.solved and is_least(self.outcome.value, self.bound)
 
 
-def least_utilisation(data: StanceData, near: Outcome | None = None) -> LeastUtilisation:
-    """Return the plan of least utilisation, of these the one of least tensions.
+def least_utilisation(
+    data: StanceData,
+    cap: float,
+    closing: Sequence[float],
+    near: LeastUtilisation | None = None,
+) -> LeastUtilisation:
+    """Return the least utilisation, and the plan that is meant.
 
-    What makes it unique exceeds the least utilisation by up to `program.TIE` times its square: far
-    beyond the limits it is asked for again with less weight.
+    What makes the plan of `programs.unique` unique exceeds the least utilisation by up to
+    `program.TIE` times its square: far beyond the limits it is asked for again with less weight.
 
     Parameters
     ----------
     data : StanceData
-    near : Outcome, optional
+    cap : float
+        On the utilisation, that the question asks for.
+    closing : sequence of float
+        Closing tension of every hand [N].
+    near : LeastUtilisation, optional
         Of the same hands at another wrench: where its active rows are those of the optimum, no
         solver is asked.
     """
     if near is not None:
-        exact = active_set_optimum(data, near, rounds=1)
+        exact = active_set_optimum(data, near.outcome, rounds=1)
         if exact is not None and not _far_beyond(exact.outcome):
-            return LeastUtilisation(exact.outcome, exact.bound, exact.outcome.loads)
+            return _meant(data, exact, cap, closing, near.meant)
     outcome, share = programs.unique(data), 1.0
     if outcome.solved and _far_beyond(outcome):
         smaller = outcome.value**-2
@@ -132,42 +122,12 @@ def least_utilisation(data: StanceData, near: Outcome | None = None) -> LeastUti
     exact = active_set_optimum(data, outcome, share)
     if exact is None:
         return LeastUtilisation(outcome, dual_bounds.unique_bound(data, outcome, share))
-    return LeastUtilisation(outcome, exact.bound, exact.outcome.loads)
+    return _meant(data, exact, cap, closing)._replace(outcome=outcome)
 
 
 def _far_beyond(outcome: Outcome) -> bool:
     """Whether what makes a plan unique may cost more utilisation than counts."""
     return OPTIMAL * outcome.value < TIE * outcome.value**2
-
-
-class _Point(NamedTuple):
-    """Loads z, scaled, the utilisation u and the multipliers λ of rows."""
-
-    z: Array
-    u: float
-    multipliers: Array
-
-
-class _Rows(NamedTuple):
-    """All rows C z − d u ≤ b of a stance, of which the first, of the balance, are equations."""
-
-    C: Array
-    d: Array
-    b: Array
-    equations: int
-
-    @classmethod
-    def of(cls, data: StanceData) -> _Rows:
-        """Return those of a stance: balance, limits, hard rows."""
-        C, rest, limits = data.rows.whole, data.rows.rest, data.rows.limits
-        nb = len(data.wrench)
-        d = np.zeros(len(C))
-        d[nb : nb + limits] = 1.0
-        return cls(C, d, np.concatenate([data.offset, rest]), nb)
-
-    def room(self, z: Array, u: float) -> Array:
-        """Return by how much each row holds."""
-        return np.asarray(self.b + self.d * u - self.C @ z)
 
 
 class ActiveSetOptimum(NamedTuple):
@@ -179,10 +139,17 @@ class ActiveSetOptimum(NamedTuple):
         Its value is the utilisation.
     bound : float
         The least utilisation is not below.
+    found : Optimum
+    rows : Rows
+    weight : float
+        Of its second term, on the sum of squares.
     """
 
     outcome: Outcome
     bound: float
+    found: Optimum
+    rows: Rows
+    weight: float
 
 
 def active_set_optimum(
@@ -201,30 +168,119 @@ def active_set_optimum(
         Sets of active rows that are tried at most; by default as many as are sooner tried than
         solved anew.
     """
-    assert near.balance_dual is not None
-    rows, unit = _Rows.of(data), data.rows.unit
-    Q = 2.0 * share * tie_weight(len(data.hands)) * data.rows.tie
-    multipliers = np.concatenate([near.balance_dual, *near.limit_duals, *near.hard_duals])
-    start = _Point(np.concatenate(near.loads) / unit, near.value, multipliers)
+    rows, weight = Rows.of(data), share * tie_weight(len(data.hands))
+    Q = 2.0 * weight * data.rows.tie
+    start = _point(data, near)
+    found = _on_active_rows(rows, Q, start, _rounds(len(Q)) if rounds is None else rounds)
+    if found is None:
+        return None
+    # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
+    point = found.point
+    second = 0.5 * float(Q @ point.z**2) - share * TIE * point.u**2
+    outcome = _outcome(data, point)
+    return ActiveSetOptimum(outcome, point.u + second, found, rows, weight)
+
+
+def _rounds(size: int) -> int:
+    """Return how many sets of active rows are sooner tried than a program is solved anew."""
+    return min(ROUNDS, int(ROUNDS * (LARGE / size) ** 3))
+
+
+def _meant(
+    data: StanceData,
+    exact: ActiveSetOptimum,
+    cap: float,
+    closing: Sequence[float],
+    near: Outcome | None = None,
+) -> LeastUtilisation:
+    """Return what is meant, from the exact least utilisation; ``near`` as of another wrench."""
+    trade = tension_trade(exact.outcome.value, cap)
+    spare = spare_hands(data, exact.outcome, trade)
+    if spare:
+        resting = at_closing(data, trade, spare, closing)
+        if resting.solved:
+            return LeastUtilisation(exact.outcome, exact.bound, resting, spare)
+    least, face = exact.found
+    if trade.most <= least.u or face.keeps(least, trade.weight / exact.weight):
+        return LeastUtilisation(exact.outcome, exact.bound, exact.outcome)
+    meant = None if near is None else _nearby(data, exact, trade, near, 1)
+    meant = meant or _from_least(data, exact, trade)
+    if meant is None and not deadline.expired():
+        outcome = programs.less_tension(data, trade)
+        if outcome.solved:
+            rounds = _rounds(len(face.Q))
+            meant = _nearby(data, exact, trade, outcome, rounds) or outcome
+    return LeastUtilisation(exact.outcome, exact.bound, meant)
+
+
+def _from_least(data: StanceData, exact: ActiveSetOptimum, trade: TensionTrade) -> Outcome | None:
+    """Return the plan of less tension, sought from that of least utilisation; None if too far."""
+    rows, (least, face) = exact.rows, exact.found
+    weight, rounds = trade.weight / exact.weight, _rounds(len(face.Q))
+    try:
+        found = optimum(rows, face.Q, least, face, rounds, weight)
+        if found is not None and found.point.u > trade.most:
+            # the objective is convex: the optimum with u at most so much has just that
+            z, u, multipliers = found.point
+            way = (trade.most - least.u) / (u - least.u)
+            start = Point(least.z + way * (z - least.z), trade.most, multipliers)
+            active = rows.tight(start.z, start.u)
+            found = optimum(rows, face.Q, start, active, rounds, weight, fixed=True)
+    except ApartError:
+        return None
+    return None if found is None else _outcome(data, found.point)
+
+
+def _nearby(
+    data: StanceData, exact: ActiveSetOptimum, trade: TensionTrade, near: Outcome, rounds: int
+) -> Outcome | None:
+    """Return the plan of less tension near a solver's, or one at another wrench; None if too far.
+
+    ``rounds``: sets of active rows that are tried at most.
+    """
+    rows, Q, weight = exact.rows, exact.found.face.Q, trade.weight / exact.weight
+    start = _point(data, near)
+    # at the most that is given away the multipliers of limits add up to more
+    fixed = float(rows.d @ start.multipliers) > 1.0 + FREE
+    if fixed:
+        start = start._replace(u=trade.most)
+    found = _on_active_rows(rows, Q, start, rounds, weight, fixed=fixed)
+    if found is None:
+        return None
+    point = found.point
+    stays = float(rows.d @ point.multipliers) >= 1.0 if fixed else point.u <= trade.most
+    return _outcome(data, point) if stays else None
+
+
+def _on_active_rows(
+    rows: Rows, Q: Array, start: Point, rounds: int, weight: float = 1.0, *, fixed: bool = False
+) -> Optimum | None:
+    """Return the optimum from the rows that are active where a solver ended; None if too far."""
     room = rows.room(start.z, start.u)
-    if rounds is None:
-        rounds = min(ROUNDS, int(ROUNDS * (LARGE / len(Q)) ** 3))
     for sure in SURE:
-        active = multipliers > sure * room
+        active = start.multipliers > sure * room
         active[: rows.equations] = True
         try:
-            found = _optimum(rows, Q, start, active, rounds)
-        except _ApartError:
+            return optimum(rows, Q, start, active, rounds, weight, fixed=fixed)
+        except ApartError:
             continue
-        if found is None:
-            break
-        # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
-        second = 0.5 * float(Q @ found.z**2) - share * TIE * found.u**2
-        return ActiveSetOptimum(_outcome(data, found), found.u + second)
     return None
 
 
-def _outcome(data: StanceData, found: _Point) -> Outcome:
+def _point(data: StanceData, outcome: Outcome) -> Point:
+    """Return where a program ended."""
+    assert outcome.balance_dual is not None
+    parts = (outcome.balance_dual, *outcome.limit_duals, *outcome.hard_duals)
+    z = np.concatenate(outcome.loads) / data.rows.unit
+    return Point(z, outcome.value, np.concatenate(parts))
+
+
+def _loads(data: StanceData, point: Point) -> tuple[Array, ...]:
+    """Return y of each hand at a point."""
+    return parted(point.z * data.rows.unit, [len(hand.unit) for hand in data.hands])
+
+
+def _outcome(data: StanceData, found: Point) -> Outcome:
     """Return an optimum as a solver would that took no step."""
     balance, limits, hard = data.by_rows(found.multipliers)
     return Outcome(
@@ -232,75 +288,8 @@ def _outcome(data: StanceData, found: _Point) -> Outcome:
         status="optimal",
         iterations=0,
         value=found.u,
-        loads=parted(found.z * data.rows.unit, [len(hand.unit) for hand in data.hands]),
+        loads=_loads(data, found),
         limit_duals=limits,
         hard_duals=hard,
         balance_dual=balance,
     )
-
-
-class _ApartError(Exception):
-    """Active rows do not meet."""
-
-
-def _optimum(rows: _Rows, Q: Array, start: _Point, active: Mask, rounds: int) -> _Point | None:
-    """Return the optimum, by the active-set method; None if it is too far away."""
-    z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
-    for _ in range(rounds):
-        found = _meeting(rows, Q, _Point(z, u, multipliers), active)
-        after = rows.room(found.z, found.u)
-        after[active] = 0.0
-        if after.min() < -HOLDS:
-            broken = np.flatnonzero(after < -HOLDS)
-            if len(broken) > MANY:
-                return None
-            room = np.maximum(rows.room(z, u)[broken], 0.0)
-            way = room / (room - after[broken])
-            first = int(way.argmin())
-            z, u = z + way[first] * (found.z - z), u + way[first] * (found.u - u)
-            active[broken[first]] = True
-            continue
-        z, u, multipliers = found
-        least = rows.equations + int(multipliers[rows.equations :].argmin())
-        if multipliers[least] >= -PUSHES:
-            return found
-        active[least] = False
-        multipliers[least] = 0.0
-    return None
-
-
-def _meeting(rows: _Rows, Q: Array, start: _Point, active: Mask) -> _Point:
-    """Return the least point where active rows meet; raises `_ApartError` where they do not."""
-    C, d, b = rows.C[active], rows.d[active], rows.b[active]
-    z, u, multipliers = start.z, start.u, start.multipliers[active]
-    flexible = C / Q
-    S = flexible @ C.T
-    diagonal = S.diagonal()
-    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    S = scale[:, None] * S * scale
-    S.flat[:: len(S) + 1] += SOFT
-    try:
-        # S⁻¹ = rootᵀ root
-        root = np.linalg.inv(np.linalg.cholesky(S)) * scale
-    except np.linalg.LinAlgError:
-        raise _ApartError from None
-    across = (root @ d) @ root
-    stiffness = float(d @ across)
-    if not stiffness > 0.0:
-        raise _ApartError
-    for taken in range(STEPS):
-        r1, r2, r3 = -Q * z - multipliers @ C, b + d * u - C @ z, 1.0 - float(d @ multipliers)
-        if taken and _size(r1) <= STILL and _size(r2) <= MET and abs(r3) <= WHOLE:
-            whole = np.zeros(len(active))
-            whole[active] = multipliers
-            return _Point(z, u, whole)
-        step = (root @ (flexible @ r1 - r2)) @ root
-        rise = (float(d @ step) - r3) / stiffness
-        step -= rise * across
-        z, u, multipliers = z + (r1 - step @ C) / Q, u + rise, multipliers + step
-    raise _ApartError
-
-
-def _size(missing: Array) -> float:
-    """Return the Euclidean norm, which none of what is missing exceeds."""
-    return math.sqrt(missing.dot(missing))

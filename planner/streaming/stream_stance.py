@@ -16,7 +16,7 @@ from hand_models.base import Array, UnsupportedError
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
-from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome
+from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome, tension_trade
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
 from planner.solving import KnownStance, is_least, least_utilisation
@@ -105,6 +105,7 @@ class StreamStance:
         self.check = LoadsCheck(check, reader, self.columns)
         self.drive = prepared.batch.hands[0].hand.drive
         self.winches = _winches(reader, spaces)
+        self._closing = prepared.batch.closing_tensions
         self._least = reader.least
         self._rows, self._rest = reader.rows / LOAD_UNIT, reader.at_rest
 
@@ -117,19 +118,19 @@ class StreamStance:
     def solve(self, body_wrench: Array) -> Solved | None:
         """Return the plan of least utilisation that is meant; None without one that is proven."""
         data = self._data.turned(self._scaled(body_wrench))
-        outcome, bound, loads = found = least_utilisation(data)
+        found = least_utilisation(data, self.cap, self._closing)
+        outcome, bound, meant = found.outcome, found.bound, found.meant
         if not found.proven:
-            loads = None
+            meant = None
             outcome = programs.margin(data)
             if not outcome.solved:
                 return None
             bound = solving.least_bound(data, outcome)
             if not is_least(outcome.value, bound):
                 return None
-        if loads is None:
-            tidy = programs.least_tensions(data, outcome.value)
-            loads = tidy.loads if tidy.solved else outcome.loads
-        return Solved(self._stacked(loads), outcome, bound)
+        if meant is None:
+            meant = programs.less_tension(data, tension_trade(outcome.value, self.cap))
+        return Solved(self._stacked((meant if meant.solved else outcome).loads), outcome, bound)
 
     def affine_bound(self, body_wrench: Array, solved: Solved) -> AffineBound | None:
         """Return what the solver's answer proves for every wrench."""

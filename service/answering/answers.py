@@ -29,6 +29,7 @@ WHOLE: Final = (
     "body_wrench",
     "load_factor",
     "load_factor_unbounded",
+    "load_factor_status",
     "joints",
     "warnings",
     "findings",

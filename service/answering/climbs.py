@@ -35,6 +35,7 @@ def climb(request: RouteRequest, robots: Robots = ROBOTS) -> RouteReply:
         utilisation=crux.utilisation,
         load_factor=result.load_factor,
         load_factor_unbounded=result.load_factor_unbounded,
+        load_factor_status=result.load_factor_status,
         limiting=crux.limiting,
         stages=[
             RouteStage(
@@ -45,6 +46,7 @@ def climb(request: RouteRequest, robots: Robots = ROBOTS) -> RouteReply:
                 utilisation=plan.utilisation,
                 load_factor=plan.load_factor,
                 load_factor_unbounded=plan.load_factor_unbounded,
+                load_factor_status=plan.load_factor_status,
                 joint_utilisation=plan.joint_utilisation,
                 limiting=plan.limiting,
                 reason=plan.reason,

@@ -104,11 +104,12 @@ def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
 
 
 def _robust(found: Robustness) -> replies.RobustCapability:
-    worst, tenth = (
-        dict(zip(SIDES, map(plain, reach.tolist()), strict=True))
-        for reach in (found.worst, found.tenth)
-    )
-    return told(replies.RobustCapability, found, worst=worst, tenth=tenth)
+    names = "worst", "tenth", "hundredth"
+    reaches = {
+        name: dict(zip(SIDES, map(plain, getattr(found, name).tolist()), strict=True))
+        for name in names
+    }
+    return told(replies.RobustCapability, found, **reaches)
 
 
 def _stop(settled: SettledHand, tile: Tile) -> str | None:

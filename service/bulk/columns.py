@@ -27,6 +27,20 @@ INDEX: Final = "index"
 EXPLAINED: Final = ("irreducible", "sufficient")
 """Columns that need an explanation."""
 
+FACTOR: Final = "found, at_least; or why there is none: unbounded, none, not_asked, not_finished"
+"""Meaning of the column about what is known of a load factor."""
+
+TOLD: Final = (
+    "id",
+    "name",
+    "status",
+    "utilisation",
+    "load_factor",
+    "load_factor_status",
+    "verified",
+)
+"""Columns that are fields of a reply."""
+
 BETWEEN: Final = "; "
 """What stands between the parts of a text that has several."""
 
@@ -89,6 +103,7 @@ class _Told(msgspec.Struct):
     utilisation: float | None = None
     load_factor: float | None = None
     load_factor_unbounded: bool | None = None
+    load_factor_status: str | None = None
     limiting: LimitName | None = None
     hands: list[_Hand] | None = None
     verified: bool | None = None
@@ -111,6 +126,7 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     yield Column("utilisation", "float", "1", "the largest of any limit")
     yield Column("load_factor", "float", "1", "where the request wants it, and it is bounded")
     yield Column("load_factor_unbounded", "bool", "", "whether there is no end to it")
+    yield Column("load_factor_status", "text", "", FACTOR)
     yield from _limiting()
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
@@ -145,6 +161,7 @@ def _route_columns() -> Iterator[Column]:
     yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
     yield Column("load_factor", "float", "1", "the least of all stages, where it is bounded")
     yield Column("load_factor_unbounded", "bool", "", "whether there is no end to any of them")
+    yield Column("load_factor_status", "text", "", FACTOR)
     yield from _limiting()
     yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
     yield from _failed()
@@ -210,10 +227,7 @@ def row_of(answer: Answer, form: Format, columns: Sequence[str]) -> Answer:
 
 
 def _values(told: _Told) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        name: getattr(told, name)
-        for name in ("id", "name", "status", "utilisation", "load_factor", "verified", "crux")
-    }
+    found: dict[str, Any] = {name: getattr(told, name) for name in (*TOLD, "crux")}
     if told.status is not None:
         found["load_factor_unbounded"] = bool(told.load_factor_unbounded)
         found["warnings"] = BETWEEN.join(told.warnings) or None

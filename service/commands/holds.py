@@ -296,6 +296,7 @@ def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:
         "pure_pull_off": found.pure if math.isfinite(found.pure) else None,
         "worst": by_way(found.worst),
         "tenth": by_way(found.tenth),
+        "hundredth": by_way(found.hundredth),
     }
 
 
@@ -330,12 +331,12 @@ def _print(
     from hand_models.fixed_wrist import AT_BORDER
     from service.tables import table_of
 
-    numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "worst")
+    numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "99 in 100")
     table = table_of("x, y, z mm", numbers=numbers)
     for trial, each in found[:SHOWN]:
         left = [
             "-" if values is None or not math.isfinite(values[0]) else f"{values[0]:.1f}"
-            for values in (each.tenth, each.worst)
+            for values in (each.tenth, each.hundredth)
         ]
         table.add_row(
             ", ".join(f"{1e3 * value:z.0f}" for value in trial.point),

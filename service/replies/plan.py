@@ -9,6 +9,7 @@ from planner import (
     Clearance,
     Finding,
     LimitName,
+    LoadFactorStatus,
     Price,
     RobustLoadFactor,
     Solver,
@@ -26,17 +27,19 @@ __all__ = ["BriefPlanReply", "Certificate", "PlanReply"]
 class Certificate(Struct, kw_only=True):
     """Why nothing balances the body: at any ``utilisation`` (null), or up to that cap on it.
 
-    Every body wrench w that the hands can supply, and their wrenches v on the rock with which they
-    do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for hands that are given a
-    wrench); what is asked for has ``needed``, which is more. ``nearest`` can be supplied,
-    ``shortfall`` is what is missing; both are null where hands have no loads, whatever the body
-    needs, and where a deadline came before. ``irreducible``: limits, hard rows and given wrenches
-    (``held_wrench``) that by themselves leave no balance, each of them needed for that; others may
-    be in the way, too. Empty where loads of any sign do not balance, null where rounding or a
-    deadline leaves it undecided. ``sufficient``: those of them of which any one, taken away alone,
-    would let the stance be held; empty if no single one would, null where that is not known. In all
-    of these the caller's own limits come first, then other limits, then hard rows.
-    ``wrench_spaces``, by limb, come with ``"want": ["model"]`` where there is no plan.
+    Every body wrench w that the hands can supply with loads up to 10⁶ N, and their wrenches v on
+    the rock with which they do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for
+    hands that are given a wrench); what is asked for has ``needed``, which is more. ``nearest`` can
+    be supplied, ``shortfall`` is what is missing; both are null where hands have no loads, whatever
+    the body needs, and where a deadline came before. ``irreducible``: limits, hard rows and given
+    wrenches (``held_wrench``) that by themselves leave no balance, each of them needed for that;
+    others may be in the way, too. Empty where loads of any sign do not balance, null where rounding
+    or a deadline leaves it undecided. ``irreducible_up_to``: loads up to which they are proven to
+    leave no balance [N], at least 10⁶; null where that is so for loads of any size. ``sufficient``:
+    those of them of which any one, taken away alone, would let the stance be held; empty if no
+    single one would, null where that is not known. In all of these the caller's own limits come
+    first, then other limits, then hard rows. ``wrench_spaces``, by limb, come with ``"want":
+    ["model"]`` where there is no plan.
     """
 
     utilisation: float | None = None
@@ -48,6 +51,7 @@ class Certificate(Struct, kw_only=True):
     nearest: Vector | None
     blocking: list[LimitName]
     irreducible: list[LimitName] | None = None
+    irreducible_up_to: float | None = None
     sufficient: list[LimitName] | None = None
     wrench_spaces: dict[str, WrenchSet] | UnsetType = UNSET
 
@@ -55,9 +59,12 @@ class Certificate(Struct, kw_only=True):
 class PlanReply(StanceReply, kw_only=True):
     """Who carries what, and what margin is left.
 
-    ``effort``: the sum of squared relative tendon tensions and joint torques; where it is the
-    objective, palms, lateral reactions and wrists count a little, too, so that there is one plan:
-    it may so be a few tenths of a percent above the least. ``joints``: the
+    ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why it
+    is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``, ``not_finished``
+    by the deadline. ``utilisation``: up to 0.1 % above the least, where that saves tension;
+    ``prices`` are of the least. ``effort``: the sum of squared relative tendon tensions and joint
+    torques; where it is the objective, palms, lateral reactions and wrists count a little, too, so
+    that there is one plan: it may so be a few tenths of a percent above the least. ``joints``: the
     angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
     joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
     would take off the effort, where the objective is ``min_effort``. ``certificate`` is null where
@@ -79,6 +86,7 @@ class PlanReply(StanceReply, kw_only=True):
     effort: float | None = None
     load_factor: float | None = None
     load_factor_unbounded: bool = False
+    load_factor_status: LoadFactorStatus = "not_asked"
     survival_probability: float | None = None
     limiting: LimitName | None = None
     hands: list[Hand] | None = None
@@ -120,6 +128,7 @@ class BriefPlanReply(StanceReply, kw_only=True):
     body_wrench: Vector | UnsetType = UNSET
     load_factor: float | UnsetType | None = UNSET
     load_factor_unbounded: bool | UnsetType = UNSET
+    load_factor_status: LoadFactorStatus | UnsetType = UNSET
     joints: dict[str, Vector] | UnsetType | None = UNSET
     warnings: list[str] | UnsetType = UNSET
     findings: list[Finding] | UnsetType = UNSET

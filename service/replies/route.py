@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from planner import LimitName
+from planner import LimitName, LoadFactorStatus
 from service.replies.reply import Reply
 
 __all__ = ["RouteReply", "RouteStage"]
@@ -23,6 +23,7 @@ class RouteStage(Struct, kw_only=True):
     utilisation: float | None
     load_factor: float | None
     load_factor_unbounded: bool
+    load_factor_status: LoadFactorStatus
     joint_utilisation: float | None
     limiting: LimitName | None
     reason: str
@@ -32,7 +33,8 @@ class RouteReply(Reply, kw_only=True):
     """A climb, planned stage by stage.
 
     ``status``: of the stage that is worst off. ``crux``: the index of the hardest stage, whose
-    ``utilisation`` and ``limiting`` these are. ``load_factor``: the least of all stages.
+    ``utilisation`` and ``limiting`` these are. ``load_factor``: the least of all stages;
+    ``load_factor_status``, here and there: as of a plan.
     """
 
     name: str
@@ -41,6 +43,7 @@ class RouteReply(Reply, kw_only=True):
     utilisation: float | None
     load_factor: float | None
     load_factor_unbounded: bool
+    load_factor_status: LoadFactorStatus
     limiting: LimitName | None
     stages: list[RouteStage]
     warnings: list[str]

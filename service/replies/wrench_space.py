@@ -101,8 +101,8 @@ class RobustCapability(Struct, kw_only=True):
 
     Closed anew at so many ``draws`` of its place, to either side by at most ``position`` along each
     axis of H [m] and ``angle`` about each [rad]; ``without``: at so many of them it cannot be, or
-    holds nothing. ``worst``: the least ``extent`` at the others; ``tenth``: what it exceeds at nine
-    in ten of them; null if there are none.
+    holds nothing, which counts as reaching zero far. ``tenth``, ``hundredth``: the ``extent`` that
+    it exceeds at nine in ten places, and at 99 in a hundred. ``worst``, deprecated, is the latter.
     """
 
     draws: int
@@ -112,6 +112,7 @@ class RobustCapability(Struct, kw_only=True):
     seed: int
     worst: dict[str, float | None]
     tenth: dict[str, float | None]
+    hundredth: dict[str, float | None]
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):

@@ -174,18 +174,18 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
 
 def print_robust(robust: RobustCapability, out: Console) -> None:
     """Print what is left of each component where the hand is a little elsewhere."""
-    names = ("worst least", "worst most", "9 in 10 least", "9 in 10 most")
+    names = ("99 in 100 least", "99 in 100 most", "9 in 10 least", "9 in 10 most")
     table = table_of("axis", numbers=names)
     for axis in AXES:
-        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.worst, robust.tenth)]
+        ends = [(way[f"-{axis}"], way[f"+{axis}"]) for way in (robust.hundredth, robust.tenth)]
         table.add_row(f"{axis} {unit_of(axis)}", *_ends_of(ends))
     title = (
-        f"what is left of that at {robust.draws - robust.without} of {robust.draws} places "
+        f"what is left of that at {robust.draws} places "
         f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
     )
     show(title, table, out)
     if robust.without:
-        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing")
+        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing: 0 there")
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
@@ -304,7 +304,9 @@ def _path_sentence(path: TensionPath) -> str:
 def _load_factor(reply: PlanReply) -> str:
     if reply.load_factor_unbounded:
         return "unbounded"
-    return "none" if reply.load_factor is None else f"{reply.load_factor:.3f}"
+    if reply.load_factor is None:
+        return "not found in time" if reply.load_factor_status == "not_finished" else "none"
+    return f"{reply.load_factor:.3f}"
 
 
 def _ends_of(ways: Iterable[tuple[float | None, float | None]]) -> Iterator[str]:

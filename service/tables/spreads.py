@@ -46,10 +46,10 @@ def spread_sentence(spread: Spread) -> str:
 
 def robust_sentence(robust: RobustLoadFactor) -> str:
     """Say what is left of the load factor where the hands are a little elsewhere."""
-    said = "there is none in any"
-    if robust.worst is not None and robust.tenth is not None:
-        said = f"nine in ten above {robust.tenth:.3f}, the worst {robust.worst:.3f}"
-        said += f", leaving out {robust.without} draws without any" if robust.without else ""
+    low, high = robust.tenth_interval
+    said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
+    said += f"99 in 100 above {robust.hundredth:.3f}"
+    said += f"; {robust.without} hold nothing" if robust.without else ""
     said += _refused(robust.refused)
     return (
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "

@@ -59,6 +59,7 @@ def test_the_readme_is_short_and_its_two_commands_are_a_line_each():
 def test_the_first_release_of_the_changelog_is_the_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    # what is not released yet stands above it
     assert next(heading for heading in headings if heading != "Unreleased") == version
 
 

@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog, nnls
 
 from planner.explanation.infeasibility import HELD_WRENCH, HardRowSystem
-from planner.explanation.irreducible_infeasible_set import irreducible_set, sufficient_alone
+from planner.explanation.irreducible_infeasible_set import (
+    blocks_up_to,
+    irreducible_set,
+    sufficient_alone,
+)
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 from planner.solving import plan
@@ -234,3 +238,74 @@ def test_of_random_stances_those_are_told_that_would_do_alone(status, seeds):
         assert set(proof.sufficient) == alone, label
     assert told
     assert not all(told)
+
+
+# How far a set blocks ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [1.5e4, 2e4, 4e4, 1e5, 3e5])
+def test_rows_that_are_all_but_parallel_block_up_to_the_loads_where_they_meet(size):
+    """z₁ + z₂ = 1 with z₂ ≤ 0 and z₁ + (1 − 1/size) z₂ ≤ 0 has loads from z₁ = size on."""
+    slope = 1.0 - 1.0 / size
+    parts = system(
+        [[0.0, 1.0], [-1.0, -slope], [1.0, slope]],
+        [2e9, 0.0, 0.0],
+        ["far", "low", "high"],
+        goal=1.0,
+    )
+    names = irreducible_set(parts, parts.constraints)
+    assert names is not None
+    found = blocks_up_to(parts, names)
+    assert UNLIMITED <= found <= size * (1.0 + 1e-6)
+    assert not loads_within(parts, names, 0.999 * found)
+    assert loads_within(parts, names, 1.01 * size)
+
+
+def test_rows_that_contradict_each_other_block_whatever_the_loads():
+    parts = system([[1.0], [-1.0]], [1.0, -2.0], ["most", "least"], goal=1.5)
+    names = irreducible_set(parts, parts.constraints)
+    assert names is not None
+    assert blocks_up_to(parts, names) > 1e3 * UNLIMITED
+
+
+def loads_within(parts: HardRowSystem, names, most: float) -> bool:
+    """Whether constraints have loads up to a size, as HiGHS says."""
+    tied, rows = parts.rows_of(names)
+    found = linprog(
+        np.zeros(parts.G.shape[1]),
+        A_ub=parts.H[rows] if rows.any() else None,
+        b_ub=parts.h[rows] / most if rows.any() else None,
+        A_eq=parts.G[tied],
+        b_eq=parts.goal[tied] / most,
+        bounds=(-1.0, 1.0),
+        options={"primal_feasibility_tolerance": 1e-10, "presolve": False},
+    )
+    assert found.status in (0, 2)
+    return found.status == 0
+
+
+@pytest.mark.parametrize("status", ["infeasible", "overloaded"])
+@few_and_all
+def test_certificates_say_up_to_which_loads_their_set_blocks(status, seeds):
+    """Beyond the box in which it was found, HiGHS finds none up to there, either."""
+    for label, question, answer in explained(status, seeds):
+        proof = answer.certificate
+        assert proof is not None, label
+        assert proof.irreducible is not None, label
+        up_to = proof.irreducible_up_to
+        assert up_to is None or up_to >= 1e6, label
+        most = min(up_to or np.inf, 1e8)
+        parts = named_rows(question, proof.utilisation)
+        rows = [name in proof.irreducible for name in parts.names]
+        tied = [name in proof.irreducible for name in parts.owners]
+        scale = 1e3
+        found = linprog(
+            np.zeros(parts.A.shape[1]),
+            A_ub=scale * parts.A[rows] / np.abs(parts.A[rows]).max(axis=1, initial=1.0)[:, None],
+            b_ub=parts.b[rows] / np.abs(parts.A[rows]).max(axis=1, initial=1.0),
+            A_eq=scale * np.vstack([parts.B, parts.E[tied]]),
+            b_eq=np.concatenate([parts.wrench - parts.o, parts.e[tied]]),
+            bounds=(-0.99 * most / scale, 0.99 * most / scale),
+            options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        )
+        assert found.status == 2, f"{label}: {found.message}"

@@ -51,11 +51,12 @@ def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, cr
 
 def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is_told():
     question, plan = answered()
-    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(3)]
+    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(4)]
     plans = [
         replace(plan, utilisation=0.5, load_factor=2.0),
         replace(plan, utilisation=7.5, load_factor=None),
         replace(plan, utilisation=0.1, load_factor=None, load_factor_unbounded=True),
+        replace(plan, utilisation=0.1, load_factor=None, load_factor_status="not_finished"),
     ]
     route = SimpleNamespace(name="up", limits=Limits())
     upper, lower = draw_route(SimpleNamespace(plans=plans, stages=stages, route=route, crux=1)).axes
@@ -66,6 +67,7 @@ def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is
     assert [(text.get_text(), text.get_position()[0]) for text in lower.texts] == [
         ("none", 1),
         ("unbounded", 2),
+        ("not finished", 3),
     ]
 
 

@@ -17,7 +17,7 @@ from scipy.sparse import csc_matrix
 from hand_models.base import stores
 from hand_models.rock import Cylinder
 from planner import deadline
-from planner.programs import conic, program, solvers, stance_program
+from planner.programs import TensionTrade, conic, program, solvers, stance_program
 from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
 from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import SETTINGS, StanceProgram
@@ -49,6 +49,7 @@ Draw = Callable[..., np.ndarray]
 
 KINDS: dict[str, Callable[[StanceData, Draw], StanceProgram]] = {
     "Unique": lambda data, draw: program.Unique(data),
+    "LessTension": lambda data, draw: program.LessTension(data, TensionTrade(0.3, 1.3)),
     "Margin": lambda data, draw: program.Margin(data),
     "Curved": lambda data, draw: program.Curved(
         data, draw(*2 * data.rows.unit.shape), [draw(len(hand.unit)) for hand in data.hands]
@@ -137,6 +138,7 @@ def real_programs(data: StanceData) -> dict[str, StanceProgram]:
     up = np.eye(6)[:, 2:3]
     return {
         "Unique": program.Unique(data),
+        "LessTension": program.LessTension(data, TensionTrade(0.3, 1.1)),
         "Margin": program.Margin(data),
         "Curved": program.Curved(data, root, loads),
         "TieBreak": program.TieBreak(data, 1.1),

@@ -106,6 +106,18 @@ def test_a_cap_on_the_utilisation_can_make_the_crux_too_hard(route):
     assert capped.plans[capped.crux].status == "overloaded"
 
 
+@pytest.mark.parametrize("cap", [1.0, 0.8, 0.3])
+def test_margin_is_the_cap_minus_the_utilisation(route, tmp_path: Path, cap):
+    light = replace(route, load=Load(mass=LIGHT), limits=Limits(utilisation=cap))
+    found = evaluate(light)
+    with write_report(found, tmp_path)["table"].open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    for row, answer in zip(rows, found.plans, strict=True):
+        assert float(row["margin"]) == pytest.approx(cap - answer.utilisation)
+        assert (float(row["margin"]) >= -1e-6) == (answer.status == "optimal")
+        assert row["load_factor_status"] == answer.load_factor_status == "found"
+
+
 def test_the_table_tells_every_stage_and_the_summary_its_crux(result, tmp_path: Path):
     files = write_report(result, tmp_path / "new" / "folder")
     with files["table"].open(encoding="utf-8") as stream:

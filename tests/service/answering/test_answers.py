@@ -306,11 +306,12 @@ def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere(
     )
     reply = answering.wrench_space(request)
     robust = reply.robust
-    assert (robust.draws, robust.without, robust.seed) == (50, 0, 0)
-    assert set(robust.worst) == set(robust.tenth) == set(reply.capability)
+    assert (robust.draws, robust.without, robust.seed) == (128, 0, 0)
+    assert set(robust.hundredth) == set(robust.tenth) == set(reply.capability)
+    assert robust.worst == robust.hundredth
     for axis, nominal in reply.capability.items():
-        assert robust.worst[axis] <= robust.tenth[axis]
-        assert robust.worst[axis] < nominal.extent
+        assert robust.hundredth[axis] <= robust.tenth[axis]
+        assert robust.hundredth[axis] < nominal.extent
     plain = answering.wrench_space(msgspec.structs.replace(request, want=[]))
     assert "robust" not in msgspec.to_builtins(plain)
 
@@ -319,9 +320,11 @@ def test_a_plan_tells_its_load_factor_where_the_hands_are_a_little_elsewhere():
     asked = flat_request() | {"want": ["load_factor", "robust"]}
     reply = answering.plan(plan_request(asked))
     robust = reply.robust
-    assert (robust.draws, robust.position, robust.angle, robust.seed) == (50, 0.002, 0.02, 0)
-    assert robust.worst <= robust.tenth < reply.load_factor
-    assert robust.without >= sum(robust.refused.values())
+    assert (robust.draws, robust.position, robust.angle, robust.seed) == (2048, 0.002, 0.02, 0)
+    assert robust.worst == robust.hundredth <= robust.tenth < reply.load_factor
+    low, high = robust.tenth_interval
+    assert low <= robust.tenth <= high
+    assert robust.without >= max(robust.refused.values(), default=0)
     assert departures("PlanRequest", asked) == []
     assert departures("PlanReply", msgspec.to_builtins(reply)) == []
     plain = answering.plan(plan_request(flat_request()))

@@ -107,9 +107,11 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(
     run(["plan", path, "--robust"])
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 50 draws:\n" in out
-    told = f"nine in ten above {robust['tenth']:.3f}, the worst {robust['worst']:.3f}"
-    assert told in out
+    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 2048 draws:" in out
+    low, high = robust["tenth_interval"]
+    told = f"nine in ten above {robust['tenth']:.3f} ({low:.3f} to {high:.3f})"
+    assert told in out.replace("\n", " ")
+    assert f"99 in 100 above {robust['hundredth']:.3f}" in out.replace("\n", " ")
     run(["plan", path])
     assert "off its place" not in capfd.readouterr().out
 
@@ -398,9 +400,9 @@ def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(
     assert run(arguments) == DONE
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "of 50 places within 2 mm and 20 mrad" in out
+    assert "at 128 places within 2 mm and 20 mrad" in out
     assert run([*arguments, "--json"]) == DONE
-    assert f"{-result(capfd)['robust']['worst']['-fx']:.2f}" in out
+    assert f"{-result(capfd)['robust']['hundredth']['-fx']:.2f}" in out
 
 
 def test_a_wrench_space_of_a_hand_that_is_not_there(

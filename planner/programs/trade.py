@@ -1,0 +1,62 @@
+"""How much of the least utilisation a plan gives away for less tension, and at what price.
+
+Least utilisation alone pulls a tendon to its strength for a ten-thousandth of it. So a plan is
+meant that minimises
+
+    u + w Σ (tension / maximum)²   with   u ≤ u* + r,   r = min(`given_away` u*, cap − u*) ≥ 0,
+
+u* being the least utilisation: near the cap, and beyond, nothing is given away. The plan is unique,
+and changes continuously with u* and the rows, as the objective is strictly convex and r continuous.
+Where no tendon pulls for next to nothing it is the plan of least utilisation itself, of these the
+one of least Σ (tension / maximum)². No plan within u* + r has a sum that is less by more than r/w.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+from hand_models.parameters import ParameterTable
+
+__all__ = ["TensionTrade", "tension_trade"]
+
+
+class TensionTrade(NamedTuple):
+    """What a plan may give away.
+
+    Attributes
+    ----------
+    weight : float
+        w of the sum of squared relative tensions.
+    most : float
+        Largest utilisation of the plan.
+    whole : float
+        What is given away at most, far from the cap.
+    """
+
+    weight: float
+    most: float
+    whole: float = 0.0
+
+
+def tension_trade(least: float, cap: float) -> TensionTrade:
+    """Return what a plan may give away.
+
+    Parameters
+    ----------
+    least : float
+        The least utilisation.
+    cap : float
+        On the utilisation, that the question asks for.
+    """
+    given_away, weight = _numbers()
+    whole = given_away * abs(least)
+    return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
+
+
+@cache
+def _numbers() -> tuple[float, float]:
+    text = resources.files("planner.parameters").joinpath("plans.toml").read_text("utf-8")
+    table = ParameterTable.read(text, "plans.toml")
+    return table.positive("tension", "given_away"), table.positive("tension", "weight")

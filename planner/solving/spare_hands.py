@@ -1,0 +1,117 @@
+"""Hands that add nothing to a plan, whose tendons stay as closing has left them.
+
+A hand adds nothing where the least utilisation without it, u', is no more than what the plan gives
+away. With the utilisation multipliers of all hands a bound of u' is known at once,
+
+    u' ≥ (u* − v) / (1 − Σ λ),
+
+λ of the hand's limits and v its own part of the dual objective, so that hardly a program is solved
+for hands that do add something. In the plan of least tension the tension t of a hand that adds
+nothing is measured from f times its closing tension instead of zero, and weighs 1 / (1 − f) times
+as much,
+
+    f = (r / r₀) min((u* + r − u') / r₀, 1),
+
+with r the utilisation that may be given away, r₀ of it far from the cap. So tensions change
+continuously with u', and with the cap; with f = 1 they are those of closing where the body's
+balance lets them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from hand_models.hand import FINGERS
+from planner import deadline, programs
+from planner.programs import LOAD_UNIT, Outcome, StanceData, TensionTrade
+
+__all__ = ["SpareHand", "at_closing", "spare_hands"]
+
+STIFFEST: Final = 100.0
+"""Largest of 1 / (1 − f): a newton off closing is then as dear as ten in other hands."""
+
+BODY: Final = 6
+"""Rows of a balance that has no given wrenches of hands, with which nothing is taken away."""
+
+
+class SpareHand(NamedTuple):
+    """A hand that adds nothing.
+
+    Attributes
+    ----------
+    place : int
+        Of the hand, among all.
+    without : float
+        The least utilisation without it.
+    part : float
+        f.
+    """
+
+    place: int
+    without: float
+    part: float
+
+
+def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[SpareHand, ...]:
+    """Return the hands that add nothing; none where nothing may be given away.
+
+    Parameters
+    ----------
+    data : StanceData
+    exact : Outcome
+        Of the least utilisation, with exact multipliers.
+    trade : TensionTrade
+    """
+    room = trade.most - exact.value
+    if room <= 0.0 or len(data.hands) < 2 or len(data.wrench) > BODY:
+        return ()
+    assert exact.balance_dual is not None
+    found = []
+    for i, hand in enumerate(data.hands):
+        limits, hard = exact.limit_duals[i], exact.hard_duals[i]
+        share = 1.0 - float(np.add.reduce(limits))
+        own = float(limits @ hand.l0 - hard @ hand.h + exact.balance_dual @ hand.g)
+        if share > 0.0 and exact.value - own > share * trade.most:
+            continue
+        if deadline.expired():
+            break
+        others = StanceData((*data.hands[:i], *data.hands[i + 1 :]), data.wrench)
+        without = programs.margin(others)
+        if without.solved and without.value < trade.most:
+            far = min((trade.most - without.value) / trade.whole, 1.0)
+            found.append(SpareHand(i, without.value, far * room / trade.whole))
+    return tuple(found)
+
+
+def at_closing(
+    data: StanceData,
+    trade: TensionTrade,
+    spare: Sequence[SpareHand],
+    closing: Sequence[float],
+) -> Outcome:
+    """Return the plan of less tension in which spare hands stay near their closing tensions.
+
+    Parameters
+    ----------
+    data : StanceData
+    trade : TensionTrade
+    spare : sequence of SpareHand
+    closing : sequence of float
+        Closing tension of every hand [N].
+    """
+    hands = list(data.hands)
+    centres = [np.zeros(len(hand.unit)) for hand in hands]
+    for i, _, part in spare:
+        centres[i][: len(FINGERS)] = part * closing[i] / LOAD_UNIT
+        stiffness = 1.0 / max(1.0 - part, 1.0 / STIFFEST)
+        hands[i] = hands[i].about(centres[i], stiffness)
+    outcome = programs.less_tension(StanceData(tuple(hands), data.wrench), trade)
+    loads = [
+        y + centre * hand.unit
+        for y, centre, hand in zip(outcome.loads, centres, data.hands, strict=False)
+    ]
+    return replace(outcome, loads=tuple(loads)) if outcome.solved else outcome
