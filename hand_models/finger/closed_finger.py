@@ -21,7 +21,6 @@ from hand_models.finger.model import (
     SettledFinger,
 )
 from hand_models.finger.path_state import (
-    CAUGHT,
     JOINTS,
     OFF,
     Around,
@@ -29,6 +28,7 @@ from hand_models.finger.path_state import (
     Drive,
     OpenFinger,
     State,
+    held_share,
     take,
 )
 from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
@@ -190,7 +190,7 @@ def _closed(
     rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:
     """Yield fingers as they are at the ends of their paths."""
-    share, places = around.share, around.place
+    share, places = held_share(state, around), around.place
     joints, _ = fan_out(state.q, model.joint_spacing)
     angles = np.cumsum(state.q, axis=1)
     tilts = np.angle(around.push) - 0.5 * np.pi
@@ -199,7 +199,7 @@ def _closed(
             yield Refused(0.0, np.nan)
             continue
         mode, stop = state.mode[row], state.stop[row]
-        caught = (state.spines[row] == CAUGHT) & (share[row] > 0.0)
+        caught = share[row] > 0.0
         stops, bears = _stops(mode != OFF, caught, stop)
         caught &= bears
         contacts = []

@@ -51,6 +51,7 @@ from hand_models.finger.path_state import (
     Drive,
     State,
     choose,
+    held_share,
     put,
     take,
     times,
@@ -145,13 +146,13 @@ def _increment(
 ) -> tuple[State, Flags]:
     """Return where fingers come to next, and which of them are at their ends."""
     stride, slack = state.stride, shape.closes
-    caught = (state.spines == CAUGHT) & (around.share > 0.0)
+    caught = held_share(state, around) > 0.0
     # how far a phalanx may be off the rock
     near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
     least = np.where(caught, np.minimum(state.least, near), np.inf)
     # spines hold no longer than rock is within their travel
     mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
-    kept = np.where(state.spines == CAUGHT, least, state.least)
+    kept = np.where(caught | (state.spines == CAUGHT), least, state.least)
     state = state._replace(least=kept)
     begun = state._replace(mode=mode)
     now = contact_states(drive, begun, around, least, shape.length, slack)
@@ -159,7 +160,7 @@ def _increment(
     damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
     move, grow = turn[..., 0], turn[..., 1]
     # spines that were pulled off, and where
-    pulled = (spines == PULLED) & (state.spines != PULLED)
+    pulled = now.off > state.off
     least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
     lost = (spines == PULLED) & (around.gap > least + LIFTED * shape.length)
     spines = np.where(lost, LOST, spines).astype(np.int8)
@@ -206,7 +207,8 @@ def _increment(
         mode=mode,
         stop=stop,
         spines=spines,
-        been=(state.been | (mode == ON)) & (spines == CAUGHT),
+        been=(state.been | (mode == ON)) & (around.share > now.off),
+        off=now.off,
         least=least,
         normals=normals,
         touches=touches,
@@ -215,7 +217,7 @@ def _increment(
         step=step,
         left=np.where(stop != 0, 0.0, left),
     )
-    stays = state._replace(damping=tougher, step=step, spines=spines, least=least)
+    stays = state._replace(damping=tougher, step=step, spines=spines, off=now.off, least=least)
     return choose(waits, stays, after), rests
 
 
