@@ -148,12 +148,9 @@ def _increment(
     stride, slack = state.stride, shape.closes
     caught = held_share(state, around) > 0.0
     # how far a phalanx may be off the rock
-    near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
-    least = np.where(caught, np.minimum(state.least, near), np.inf)
+    least = np.where(caught, state.least, np.inf)
     # spines hold no longer than rock is within their travel
     mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
-    kept = np.where(caught | (state.spines == CAUGHT), least, state.least)
-    state = state._replace(least=kept)
     begun = state._replace(mode=mode)
     now = contact_states(drive, begun, around, least, shape.length, slack)
     mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
@@ -161,7 +158,11 @@ def _increment(
     move, grow = turn[..., 0], turn[..., 1]
     # spines that were pulled off, and where
     pulled = now.off > state.off
-    least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
+    # the least gap is that of the path, to which an increment first brings back the joints
+    near = np.where(mode == HELD, np.inf, np.maximum(around.gap, now.gap).clip(0.0))
+    least = np.where(caught, np.minimum(state.least, near), state.least)
+    least = np.where(~caught & (spines == CAUGHT), np.inf, least)
+    least = np.where(pulled, np.maximum(around.gap, 0.0), least)
     lost = (spines == PULLED) & (around.gap > least + LIFTED * shape.length)
     spines = np.where(lost, LOST, spines).astype(np.int8)
     curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
@@ -185,8 +186,8 @@ def _increment(
     ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
     until = np.where(ends, -force / rate, np.inf).min(axis=1)
     more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
-    more = np.where(waits | turns_back | (size > most), 0.0, more)
-    part = np.minimum(1.0, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
+    more = np.where(waits | turns_back | (size > most) | (now.clear < 1.0), 0.0, more)
+    part = np.minimum(now.clear, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
     step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
     normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
     left = now.torque + more[:, None] * now.slope

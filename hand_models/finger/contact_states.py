@@ -45,6 +45,10 @@ RESTS: Final = 1e-10
 GIVES: Final = 1.0 / 4800.0
 """By how much gaps may grow before their spines hold, in parts of a tile's length."""
 
+NEARS: Final = 1.0 / 2400.0
+"""Gap, in parts of a tile's length, up to which a phalanx may come to the rock in an increment in
+which others move as well: one after the other, so that the least gaps are those of the path."""
+
 SWITCHES: Final = 20
 """Of contacts and stops, at an increment."""
 
@@ -101,6 +105,8 @@ class Linearised(NamedTuple):
         Of joints [rad] and of contacts [N]: now, and per newton of s.
     size : ndarray, shape (n,)
         The largest turn [rad].
+    clear : ndarray, shape (n,)
+        Part of the turn up to which no other phalanx comes to the rock, at most 1.
     gap : ndarray, shape (n, 3)
         After it, as far as the stride allows [m].
     """
@@ -119,6 +125,7 @@ class Linearised(NamedTuple):
     turn: Array
     normals: Array
     size: Array
+    clear: Array
     gap: Array
 
 
@@ -182,7 +189,11 @@ def _tried(
     apart = around.gap - np.where(mode == HELD, least, 0.0)
     turn, normals = _solve(drive, state, around, forces, damped, active, apart)
     size = np.abs(turn[..., 0]).max(axis=1)
-    part = np.minimum(1.0, state.stride / np.maximum(size, RESTS))[:, None]
+    # gaps that close, by no more than the first of them has room
+    change = times(around.d_gap, turn[..., 0])
+    nears = ~active & (change < 0.0) & (around.gap > NEARS * length)
+    clear = np.where(nears, around.gap / -change, 1.0).min(axis=1).clip(0.0, 1.0)
+    part = np.minimum(clear, state.stride / np.maximum(size, RESTS))[:, None]
     # contacts that would pull more than they hold, or push across a gap
     share = held_share(state, around)
     caught = share > 0.0
@@ -190,11 +201,10 @@ def _tried(
     over = np.where(caught & (part < 1.0), 0.0, over)
     pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
     # gaps that would close, or grow beyond what spines let them
-    change = times(around.d_gap, turn[..., 0])
     gap = around.gap + part * change
     # damped joints may be slow in leaving where they should not be
     slow = (state.damping > STIFF * drive.torque)[:, None]
-    closes = ~active & (gap < -slack) & ((change < 0.0) | ~slow)
+    closes = ~active & ~nears & (gap < -slack) & ((change < 0.0) | ~slow)
     grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
     balance = forces.torque - times(damped, turn[..., 0])
     balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
@@ -234,6 +244,7 @@ def _tried(
         turn,
         normals,
         size,
+        clear,
         gap,
     )
 
