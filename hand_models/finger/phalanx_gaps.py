@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import Complexes, Flags, Outlines, stretch_minima
+from hand_models.sections import BLOCK, Complexes, Flags, Outlines, stretch_minima
 
 __all__ = [
     "NEAREST",
@@ -45,11 +45,16 @@ __all__ = [
     "nearest_points",
 ]
 
-NEAREST: Final = 96
-"""How many points of rock are looked at for a phalanx: on flat rock, all along it and beyond."""
+BLOCKS: Final = 16
+"""How many blocks of points of rock are looked at for a phalanx: on flat rock, all along it and
+beyond."""
 
-POINTS: Final = 48
-"""Of rock, for the length of a tile."""
+NEAREST: Final = BLOCKS * BLOCK
+"""How many points that are."""
+
+POINTS: Final = 96
+"""Points of rock for the length of a tile: so near each other that the round end of a phalanx slides
+over them as over the rock between."""
 
 FINENESS: Final = 4800.0
 """Of the gap, in parts of the length of a tile."""
@@ -309,7 +314,7 @@ def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
 def nearest_points(
     rock: Outlines, shape: PhalanxShape, q: Array, depth: Array, turn: float = 0.0
 ) -> NearPoints:
-    """Return the points that phalanges of fingers may press on, of the `NEAREST` to each.
+    """Return the points that phalanges of fingers may press on, of the `BLOCKS` nearest to each.
 
     Parameters
     ----------
@@ -323,20 +328,16 @@ def nearest_points(
         How far joints may turn from there [rad].
     """
     joints, u = fan_out(q, shape.end)
-    x, y = rock.points.real[:, None] - joints.real[..., None], rock.points.imag[:, None]
-    y = y - joints.imag[..., None]
-    along, above = x * u.real[..., None], y * u.real[..., None]
-    along += y * u.imag[..., None]
-    above -= x * u.imag[..., None]
-    along -= np.clip(along, shape.near, shape.end, out=x)
-    along *= along
-    above *= above
-    along += above
-    nearest = np.argpartition(along, NEAREST - 1, axis=-1)[..., :NEAREST]
+    seen = (rock.centres[:, None] - joints[..., None]) * u.conj()[..., None]
+    away = np.abs(seen - np.clip(seen.real, shape.near, shape.end)) - rock.radii[:, None]
+    nearest = np.argpartition(away, BLOCKS - 1, axis=-1)[..., :BLOCKS]
     # in their own order, so that sums do not depend on what other fingers are there
     nearest.sort(axis=-1)
-    nearest += rock.points.shape[-1] * np.arange(len(q))[:, None, None]
-    points, lengths = rock.points.take(nearest), rock.lengths.take(nearest)
+    nearest += rock.centres.shape[-1] * np.arange(len(q))[:, None, None]
+    points, lengths = (
+        values.reshape(-1, BLOCK).take(nearest, axis=0).reshape(*u.shape, NEAREST)
+        for values in (rock.points, rock.lengths)
+    )
     # two points may come nearer to each other by the way of each
     arms = 2.0 * q.shape[-1] * (shape.end + shape.radius + depth)
     return shape.may_press(points, lengths, joints, u, depth + turn * arms)
