@@ -14,7 +14,7 @@ from hand_models.sections.section import Complexes, Section
 __all__ = ["BLOCK", "Outlines"]
 
 BLOCK: Final = 16
-"""Points that are looked for together: 4 mm of rock for a finger's phalanges."""
+"""Points that are looked for together: 2 mm of rock for a finger's phalanges."""
 
 FAR: Final = 1e3
 """Where points are that stand for no rock [m]."""
@@ -41,17 +41,18 @@ class Outlines(NamedTuple):
     centres : ndarray of complex, shape (n, p / `BLOCK`)
     radii : ndarray, shape (n, p / `BLOCK`)
         Circles around each `BLOCK` points in order [m].
+    longest : ndarray, shape (n, p / `BLOCK`)
+        The largest of their lengths [m].
     """
 
     points: Complexes
     lengths: Array
     centres: Complexes
     radii: Array
+    longest: Array
 
     @classmethod
-    def of(
-        cls, sections: Sequence[Section | None], reach: float, spacing: float, least: int
-    ) -> Outlines:
+    def of(cls, sections: Sequence[Section | None], reach: float, spacing: float) -> Outlines:
         """Gather sections, one for each finger; None where there is no rock.
 
         Parameters
@@ -61,11 +62,9 @@ class Outlines(NamedTuple):
             How far from the origin rock counts [m].
         spacing : float
             Of the points, at most [m].
-        least : int
-            How many points there are at least.
         """
         taken = [_points(section, reach, spacing) for section in sections]
-        blocks = math.ceil(max([least, *(len(points) for points, _ in taken)]) / BLOCK)
+        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / BLOCK)
         points = np.full((len(taken), blocks * BLOCK), complex(FAR))
         lengths = np.full(points.shape, NOTHING)
         for i, each in enumerate(taken):
@@ -74,7 +73,8 @@ class Outlines(NamedTuple):
         in_blocks = points.reshape(len(taken), blocks, BLOCK)
         centres = in_blocks.mean(axis=-1)
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
-        return cls(points, lengths, centres, radii)
+        longest = lengths.reshape(in_blocks.shape).max(axis=-1)
+        return cls(points, lengths, centres, radii, longest)
 
 
 def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:

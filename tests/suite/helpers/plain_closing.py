@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.finger import FingerModel, OpenFinger
-from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out, nearest_points
+from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
 from hand_models.sections import Outlines
 from hand_models.tile import engaged_share, pull_strength
 
@@ -88,7 +88,7 @@ class PlainFinger:
         self.model, self.surface = model, opened.surface
         self.shape = PhalanxShape.of(model)
         reach = model.reach + model.tile_length
-        self.rock = Outlines.of([opened.section], reach, self.shape.spacing, NEAREST)
+        self.rock = Outlines.of([opened.section], reach, self.shape.spacing)
         loss = model.losses(opened.base_tile)
         self.closing = opened.tension
         self.pull, self.drag = loss * model.pulley_radii, loss * model.engagement
