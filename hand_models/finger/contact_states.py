@@ -45,6 +45,10 @@ RESTS: Final = 1e-10
 GIVES: Final = 1.0 / 4800.0
 """By how much gaps may grow before their spines hold, in parts of a tile's length."""
 
+STEADY: Final = 1e-3
+"""Turn at one tension up to which joints are in balance, so that what pulls spines off is no error of
+an increment [rad]."""
+
 NEARS: Final = 1.0 / 2400.0
 """Gap, in parts of a tile's length, up to which a phalanx may come to the rock in an increment in
 which others move as well: one after the other, so that the least gaps are those of the path."""
@@ -198,7 +202,7 @@ def _tried(
     share = held_share(state, around)
     caught = share > 0.0
     over = _over(drive, share, active, forces.shears, normals[..., 0])
-    over = np.where(caught & (part < 1.0), 0.0, over)
+    over = np.where(caught & ((part < 1.0) | (size > STEADY)[:, None]), 0.0, over)
     pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
     # gaps that would close, or grow beyond what spines let them
     gap = around.gap + part * change
