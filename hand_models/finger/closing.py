@@ -14,8 +14,9 @@ and λ_i of its stop. With g_j(q) the gap between phalanx j and the rock:
 - a tile whose phalanx has come to the rock is dragged by the tendon with T_j = φ_j M_j τ_j f; those
   whose spines reach across a gap are as well, last of all, at the closing tension (Section 3.2);
 - spines hold as long as (T_j, N_j)/φ_j is within the surface's limit curve, and M_j τ_j f is, at
-  the closing tension, at least μ times their pull. Beyond that they are pulled off, and neither
-  drag nor hold until the phalanx has been off the rock and touches again.
+  the closing tension, at least μ times their pull. Beyond that they are pulled off, all ψ_j = φ_j
+  of them, and neither drag nor hold until the phalanx has been off the rock and touches again.
+  Others catch as the tile comes nearer than that: their share is φ_j − ψ_j, in place of φ_j above.
 
 So closing is a complementarity problem in f, and at last in the share of the drag across gaps. It
 is followed in increments: from the springs at rest and no tension (fingers in whose way there is

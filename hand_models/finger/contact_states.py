@@ -46,8 +46,8 @@ GIVES: Final = 1.0 / 4800.0
 """By how much gaps may grow before their spines hold, in parts of a tile's length."""
 
 STEADY: Final = 1e-3
-"""Turn at one tension up to which joints are in balance, so that what pulls spines off is no error of
-an increment [rad]."""
+"""Turn at one tension up to which joints are in balance, so that what pulls spines off is no error
+of an increment [rad]."""
 
 NEARS: Final = 1.0 / 2400.0
 """Gap, in parts of a tile's length, up to which a phalanx may come to the rock in an increment in

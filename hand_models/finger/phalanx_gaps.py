@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import BLOCK, Complexes, Flags, Outlines, stretch_minima
+from hand_models.sections import BLOCK, Complexes, Outlines, stretch_minima
 
 __all__ = [
     "Beside",
@@ -45,8 +45,8 @@ __all__ = [
 ]
 
 POINTS: Final = 192
-"""Points of rock for the length of a tile: so near each other that the round end of a phalanx slides
-over them as over the rock between."""
+"""Points of rock for the length of a tile, so near each other that the round end of a phalanx
+slides over them as over the rock between."""
 
 FINENESS: Final = 4800.0
 """Of the gap, in parts of the length of a tile."""
@@ -225,7 +225,7 @@ class PhalanxShape(NamedTuple):
         least = near.least(size + self.alone(near.lengths)) + within
         chosen = size <= least[near.phalanx]
         chosen |= from_tile <= (near.least(from_tile) + within)[near.phalanx]
-        count = near.sums(chosen.astype(np.intp))
+        count = np.bincount(near.phalanx[chosen], minlength=len(near.first))
         return NearPoints(
             near.points[chosen],
             near.lengths[chosen],
@@ -322,15 +322,16 @@ def nearest_points(
     # blocks that may hold points which press, or are nearest to the tile
     blocks = (rock.centres[:, None] - joints[..., None]) * u.conj()[..., None]
     radii, chosen = rock.radii[:, None] + shape.lift, np.zeros(blocks.shape, dtype=bool)
-    for end, sinks in ((shape.end, shape.alone(rock.longest)[:, None]), (shape.far, 0.0)):
+    alone = shape.alone(rock.longest)[:, None]
+    for end, sinks in ((shape.end, alone), (shape.far, 0.0 * alone)):
         away = np.abs(blocks - np.clip(blocks.real, shape.near, end))
         most = (away + radii + sinks).min(axis=-1) + within
         chosen |= away - radii <= most[..., None]
-    phalanx, block = chosen.reshape(-1, chosen.shape[-1]).nonzero()
-    block += phalanx // q.shape[-1] * chosen.shape[-1]
-    points, lengths = (
-        values.reshape(-1, BLOCK)[block].ravel() for values in (rock.points, rock.lengths)
-    )
+    blocks_each = rock.centres.shape[-1]
+    phalanx, block = np.divmod(np.flatnonzero(chosen), blocks_each)
+    block += phalanx // q.shape[-1] * blocks_each
+    points = rock.points.reshape(-1, BLOCK)[block].ravel()
+    lengths = rock.lengths.reshape(-1, BLOCK)[block].ravel()
     count = BLOCK * np.bincount(phalanx, minlength=q.size)
     phalanx = np.repeat(phalanx, BLOCK)
     near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
