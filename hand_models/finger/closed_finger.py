@@ -21,7 +21,6 @@ from hand_models.finger.model import (
     SettledFinger,
 )
 from hand_models.finger.path_state import (
-    CAUGHT,
     JOINTS,
     OFF,
     Around,
@@ -29,9 +28,10 @@ from hand_models.finger.path_state import (
     Drive,
     OpenFinger,
     State,
+    held_share,
     take,
 )
-from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out
+from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out
 from hand_models.sections import Complexes, Face, Flags, Outlines, Section
 
 __all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
@@ -110,7 +110,7 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     """
     shape = PhalanxShape.of(model)
     sections = [closing.section for closing in closings]
-    rock = Outlines.of(sections, model.reach + model.tile_length, shape.spacing, NEAREST)
+    rock = Outlines.of(sections, model.reach + model.tile_length, shape.spacing)
     drive = Drive.of(model, closings)
     lower, straight = drive.lower, np.clip(0.0, drive.lower, drive.upper)
     blocked = _in_rock(rock, shape, drive, sections, straight)
@@ -161,7 +161,7 @@ def _axes(shape: PhalanxShape, q: Array) -> Complexes:
 def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
     places, most = _axes(shape, q), JOINTS * shape.end
-    rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing, NEAREST)
+    rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing)
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
@@ -190,7 +190,7 @@ def _closed(
     rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:
     """Yield fingers as they are at the ends of their paths."""
-    share, places = around.share, around.place
+    share, places = held_share(state, around), around.place
     joints, _ = fan_out(state.q, model.joint_spacing)
     angles = np.cumsum(state.q, axis=1)
     tilts = np.angle(around.push) - 0.5 * np.pi
@@ -199,7 +199,7 @@ def _closed(
             yield Refused(0.0, np.nan)
             continue
         mode, stop = state.mode[row], state.stop[row]
-        caught = (state.spines[row] == CAUGHT) & (share[row] > 0.0)
+        caught = share[row] > 0.0
         stops, bears = _stops(mode != OFF, caught, stop)
         caught &= bears
         contacts = []

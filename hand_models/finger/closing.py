@@ -14,8 +14,9 @@ and λ_i of its stop. With g_j(q) the gap between phalanx j and the rock:
 - a tile whose phalanx has come to the rock is dragged by the tendon with T_j = φ_j M_j τ_j f; those
   whose spines reach across a gap are as well, last of all, at the closing tension (Section 3.2);
 - spines hold as long as (T_j, N_j)/φ_j is within the surface's limit curve, and M_j τ_j f is, at
-  the closing tension, at least μ times their pull. Beyond that they are pulled off, and neither
-  drag nor hold until the phalanx has been off the rock and touches again.
+  the closing tension, at least μ times their pull. Beyond that they are pulled off, all ψ_j = φ_j
+  of them, and neither drag nor hold until the phalanx has been off the rock and touches again.
+  Others catch as the tile comes nearer than that: their share is φ_j − ψ_j, in place of φ_j above.
 
 So closing is a complementarity problem in f, and at last in the share of the drag across gaps. It
 is followed in increments: from the springs at rest and no tension (fingers in whose way there is
@@ -51,6 +52,7 @@ from hand_models.finger.path_state import (
     Drive,
     State,
     choose,
+    held_share,
     put,
     take,
     times,
@@ -145,22 +147,23 @@ def _increment(
 ) -> tuple[State, Flags]:
     """Return where fingers come to next, and which of them are at their ends."""
     stride, slack = state.stride, shape.closes
-    caught = (state.spines == CAUGHT) & (around.share > 0.0)
+    caught = held_share(state, around) > 0.0
     # how far a phalanx may be off the rock
-    near = np.where(state.mode == HELD, np.inf, np.maximum(around.gap, 0.0))
-    least = np.where(caught, np.minimum(state.least, near), np.inf)
+    least = np.where(caught, state.least, np.inf)
     # spines hold no longer than rock is within their travel
     mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
-    kept = np.where(state.spines == CAUGHT, least, state.least)
-    state = state._replace(least=kept)
     begun = state._replace(mode=mode)
     now = contact_states(drive, begun, around, least, shape.length, slack)
     mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
     damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
     move, grow = turn[..., 0], turn[..., 1]
     # spines that were pulled off, and where
-    pulled = (spines == PULLED) & (state.spines != PULLED)
-    least = np.where(pulled, np.maximum(around.gap, 0.0), state.least)
+    pulled = now.off > state.off
+    # the least gap is that of the path, to which an increment first brings back the joints
+    near = np.where(mode == HELD, np.inf, np.maximum(around.gap, now.gap).clip(0.0))
+    least = np.where(caught, np.minimum(state.least, near), state.least)
+    least = np.where(~caught & (spines == CAUGHT), np.inf, least)
+    least = np.where(pulled, np.maximum(around.gap, 0.0), least)
     lost = (spines == PULLED) & (around.gap > least + LIFTED * shape.length)
     spines = np.where(lost, LOST, spines).astype(np.int8)
     curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
@@ -184,8 +187,8 @@ def _increment(
     ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
     until = np.where(ends, -force / rate, np.inf).min(axis=1)
     more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
-    more = np.where(waits | turns_back | (size > most), 0.0, more)
-    part = np.minimum(1.0, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
+    more = np.where(waits | turns_back | (size > most) | (now.clear < 1.0), 0.0, more)
+    part = np.minimum(now.clear, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
     step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
     normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
     left = now.torque + more[:, None] * now.slope
@@ -206,7 +209,8 @@ def _increment(
         mode=mode,
         stop=stop,
         spines=spines,
-        been=(state.been | (mode == ON)) & (spines == CAUGHT),
+        been=(state.been | (mode == ON)) & (around.share > now.off),
+        off=now.off,
         least=least,
         normals=normals,
         touches=touches,
@@ -215,7 +219,7 @@ def _increment(
         step=step,
         left=np.where(stop != 0, 0.0, left),
     )
-    stays = state._replace(damping=tougher, step=step, spines=spines, least=least)
+    stays = state._replace(damping=tougher, step=step, spines=spines, off=now.off, least=least)
     return choose(waits, stays, after), rests
 
 

@@ -28,6 +28,7 @@ from hand_models.finger.path_state import (
     Codes,
     Drive,
     State,
+    held_share,
     largest,
     put,
     take,
@@ -44,13 +45,21 @@ RESTS: Final = 1e-10
 GIVES: Final = 1.0 / 4800.0
 """By how much gaps may grow before their spines hold, in parts of a tile's length."""
 
+STEADY: Final = 1e-3
+"""Turn at one tension up to which joints are in balance, so that what pulls spines off is no error
+of an increment [rad]."""
+
+NEARS: Final = 1.0 / 2400.0
+"""Gap, in parts of a tile's length, up to which a phalanx may come to the rock in an increment in
+which others move as well: one after the other, so that the least gaps are those of the path."""
+
 SWITCHES: Final = 20
 """Of contacts and stops, at an increment."""
 
 LONGEST: Final = 4
 """Of the circles of contact states that are told [switches]."""
 
-DIGITS: Final = 3 ** np.arange(3 * JOINTS)
+DIGITS: Final = 3 ** np.arange(4 * JOINTS)
 """Of the codes of a contact state, each of which is one of three."""
 
 SLOWER: Final = 4.0
@@ -85,6 +94,7 @@ class Linearised(NamedTuple):
     Attributes
     ----------
     mode, stop, spines : ndarray of int, shape (n, 3)
+    off : ndarray, shape (n, 3)
         As of `State`.
     settled : ndarray of bool, shape (n,)
         Whether nothing of that is to be switched any more.
@@ -99,6 +109,8 @@ class Linearised(NamedTuple):
         Of joints [rad] and of contacts [N]: now, and per newton of s.
     size : ndarray, shape (n,)
         The largest turn [rad].
+    clear : ndarray, shape (n,)
+        Part of the turn up to which no other phalanx comes to the rock, at most 1.
     gap : ndarray, shape (n, 3)
         After it, as far as the stride allows [m].
     """
@@ -106,6 +118,7 @@ class Linearised(NamedTuple):
     mode: Codes
     stop: Codes
     spines: Codes
+    off: Array
     settled: Flags
     active: Flags
     caught: Flags
@@ -116,6 +129,7 @@ class Linearised(NamedTuple):
     turn: Array
     normals: Array
     size: Array
+    clear: Array
     gap: Array
 
 
@@ -139,7 +153,7 @@ def contact_states(
     """
     rows = np.arange(len(state.s))
     found = own = _tried(drive, state, around, least, length, slack)
-    codes = np.stack([_code(state), _code(own)])
+    codes = np.stack([_code(state, around), _code(own, around)])
     for left in range(SWITCHES - 1, 0, -1):
         # those that go round in a circle, and are now as they will be when the tries are used up
         ends = own.settled.copy()
@@ -151,16 +165,19 @@ def contact_states(
             break
         rows, own, codes = rows[go], take(own, go), codes[-LONGEST:, go]
         drive, around, least = take(drive, go), take(around, go), least[go]
-        state = take(state, go)._replace(mode=own.mode, stop=own.stop, spines=own.spines)
+        state = take(state, go)._replace(
+            mode=own.mode, stop=own.stop, spines=own.spines, off=own.off
+        )
         own = _tried(drive, state, around, least, length, slack)
         put(found, rows, own)
-        codes = np.concatenate([codes, _code(own)[None]])
+        codes = np.concatenate([codes, _code(own, around)[None]])
     return found
 
 
-def _code(state: State | Linearised) -> Indices:
+def _code(state: State | Linearised, around: Around) -> Indices:
     """Return a number for each contact state."""
-    digits = np.concatenate([state.mode, state.stop + 1, state.spines], axis=1)
+    holds = around.share > state.off
+    digits = np.concatenate([state.mode, state.stop + 1, state.spines, holds], axis=1)
     return np.asarray(digits @ DIGITS)
 
 
@@ -168,25 +185,30 @@ def _tried(
     drive: Drive, state: State, around: Around, least: Array, length: float, slack: float
 ) -> Linearised:
     """Return what becomes of fingers in their contact states, and these after the next switch."""
-    mode, stop, spines, gives = state.mode, state.stop, state.spines, GIVES * length
+    mode, stop, spines, off = state.mode, state.stop, state.spines, state.off
+    gives = GIVES * length
     forces = forces_on(drive, state, around)
     damped = forces.stiffness + state.damping[:, None, None] * EYE
     active, held = mode != OFF, stop != 0
     apart = around.gap - np.where(mode == HELD, least, 0.0)
     turn, normals = _solve(drive, state, around, forces, damped, active, apart)
     size = np.abs(turn[..., 0]).max(axis=1)
-    part = np.minimum(1.0, state.stride / np.maximum(size, RESTS))[:, None]
+    # gaps that close, by no more than the first of them has room
+    change = times(around.d_gap, turn[..., 0])
+    nears = ~active & (change < 0.0) & (around.gap > NEARS * length)
+    clear = np.where(nears, around.gap / -change, 1.0).min(axis=1).clip(0.0, 1.0)
+    part = np.minimum(clear, state.stride / np.maximum(size, RESTS))[:, None]
     # contacts that would pull more than they hold, or push across a gap
-    caught = (spines == CAUGHT) & (around.share > 0.0)
-    over = _over(drive, around, active, caught, forces.shears, normals[..., 0])
-    over = np.where(caught & (part < 1.0), 0.0, over)
+    share = held_share(state, around)
+    caught = share > 0.0
+    over = _over(drive, share, active, forces.shears, normals[..., 0])
+    over = np.where(caught & ((part < 1.0) | (size > STEADY)[:, None]), 0.0, over)
     pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
     # gaps that would close, or grow beyond what spines let them
-    change = times(around.d_gap, turn[..., 0])
     gap = around.gap + part * change
     # damped joints may be slow in leaving where they should not be
     slow = (state.damping > STIFF * drive.torque)[:, None]
-    closes = ~active & (gap < -slack) & ((change < 0.0) | ~slow)
+    closes = ~active & ~nears & (gap < -slack) & ((change < 0.0) | ~slow)
     grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
     balance = forces.torque - times(damped, turn[..., 0])
     balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
@@ -202,16 +224,20 @@ def _tried(
         # of contacts one at a time, the worst
         one = largest(over)
         spines = np.where(one & caught, PULLED, spines).astype(np.int8)
+        off = np.where(one & caught, around.share, off)
         mode = np.where((one & ~caught) | (one & (mode == HELD)) | pushes, OFF, mode)
         mode = np.where(largest(cannot), OFF, mode)
         one = largest(np.where(closes, -gap, np.where(grows, gap - least, 0.0)))
         mode = np.where(one, np.where(closes, ON, HELD), mode).astype(np.int8)
-        spines = np.where(one & closes & (spines == LOST), CAUGHT, spines).astype(np.int8)
+        again = one & closes & (spines == LOST)
+        spines = np.where(again, CAUGHT, spines).astype(np.int8)
+        off = np.where(again, 0.0, off)
         stop = np.where(frees, 0, np.where(high, 1, np.where(low, -1, stop))).astype(np.int8)
     return Linearised(
         mode,
         stop,
         spines,
+        off,
         settled,
         active,
         caught,
@@ -222,17 +248,16 @@ def _tried(
         turn,
         normals,
         size,
+        clear,
         gap,
     )
 
 
 def forces_on(drive: Drive, state: State, around: Around) -> Forces:
     """Return the torques of springs, tendons and drag in their contact states."""
-    mode, caught, f = (
-        state.mode,
-        state.spines == CAUGHT,
-        np.minimum(state.s, drive.closing)[:, None],
-    )
+    mode, f = state.mode, np.minimum(state.s, drive.closing)[:, None]
+    share = held_share(state, around)
+    caught = share > 0.0
     closing = (state.s < drive.closing)[:, None]
     catching = CATCHING * drive.closing[:, None]
     dragged = state.been | (mode == ON)
@@ -241,12 +266,12 @@ def forces_on(drive: Drive, state: State, around: Around) -> Forces:
     across = (state.s - drive.closing)[:, None].clip(0.0) / catching
     part = np.where(dragged, 1.0, across) * bears
     drag = np.where(caught, drive.drag * part, 0.0)
-    shears = drag * around.share * f
+    shears = drag * share * f
     d_shears = (drag * f)[..., None] * around.d_share
     # per newton of s
     late = caught & bears & ~dragged
     grows = np.where(closing, drag, np.where(late, drive.drag * f / catching, 0.0))
-    grows = grows * around.share
+    grows = grows * share
     normals = np.where(mode != OFF, state.normals, 0.0)
     stiffness = (
         EYE * drive.stiffness[:, None, :]
@@ -292,17 +317,10 @@ def _solve(
     return found[:, :JOINTS, :2], found[:, JOINTS:, :2]
 
 
-def _over(
-    drive: Drive,
-    around: Around,
-    active: Flags,
-    caught: Flags,
-    shears: Array,
-    normals: Array,
-) -> Array:
+def _over(drive: Drive, share: Array, active: Flags, shears: Array, normals: Array) -> Array:
     """Return by how much contacts pull more than they hold [N], not above 0 where they hold."""
     pull = np.maximum(-normals, 0.0)
-    share = np.maximum(around.share, ROUNDING)
+    caught, share = share > 0.0, np.maximum(share, ROUNDING)
     most, least, angle, friction = (drive.limits[:, i, None] for i in range(4))
     shear, pulls = shears / share, pull / share
     strength = pull_strength(most, least, angle, np.arctan2(pulls, shear))

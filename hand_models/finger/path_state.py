@@ -33,6 +33,7 @@ __all__ = [
     "OpenFinger",
     "State",
     "choose",
+    "held_share",
     "largest",
     "put",
     "take",
@@ -50,8 +51,8 @@ OFF, ON, HELD = range(3)
 """Where a phalanx may be: off the rock, on it, or held by its spines at the least gap."""
 
 CAUGHT, PULLED, LOST = range(3)
-"""What spines may be, where the rock is within their travel: on it, pulled off where they were, and
-off with their phalanx."""
+"""States of a tile's spines: all that reach the rock hold; some were pulled off; some were, and the
+tile has left the place since."""
 
 FIRST_STRIDE, MOST_STRIDE, LEAST_STRIDE = 0.06, 0.3, 1e-4
 """How far joints turn in an increment [rad]: through the air, at most, and after it was too far."""
@@ -215,6 +216,8 @@ class State(NamedTuple):
         `LOST`.
     been : ndarray of bool, shape (n, 3)
         Whether phalanges have come to the rock since spines have caught.
+    off : ndarray, shape (n, 3)
+        ψ, share of spines that were pulled off and have not caught again.
     least : ndarray, shape (n, 3)
         m, the least gap since spines have caught or, if they were pulled off, then [m].
     normals : ndarray, shape (n, 3)
@@ -235,6 +238,7 @@ class State(NamedTuple):
     stop: Codes
     spines: Codes
     been: Flags
+    off: Array
     least: Array
     normals: Array
     touches: Array
@@ -254,6 +258,7 @@ class State(NamedTuple):
             stop=np.zeros(q.shape, dtype=np.int8),
             spines=np.full(q.shape, CAUGHT, dtype=np.int8),
             been=np.zeros(q.shape, dtype=bool),
+            off=np.zeros(q.shape),
             least=np.full(q.shape, np.inf),
             normals=np.zeros(q.shape),
             touches=np.full(q.shape, np.nan),
@@ -262,6 +267,11 @@ class State(NamedTuple):
             step=np.zeros(q.shape),
             left=np.zeros(q.shape),
         )
+
+
+def held_share(state: State, around: Around) -> Array:
+    """Return the share of each tile's spines that hold on the rock, φ less ψ, shape (n, 3)."""
+    return engaged_share(1.0 - around.share + state.off, 1.0)
 
 
 def take(rows: Rows, fingers: Indices | Flags) -> Rows:

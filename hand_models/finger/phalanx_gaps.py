@@ -33,10 +33,9 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import Complexes, Flags, Outlines, stretch_minima
+from hand_models.sections import BLOCK, Complexes, Outlines, stretch_minima
 
 __all__ = [
-    "NEAREST",
     "Beside",
     "NearPoints",
     "PhalanxShape",
@@ -45,11 +44,9 @@ __all__ = [
     "nearest_points",
 ]
 
-NEAREST: Final = 96
-"""How many points of rock are looked at for a phalanx: on flat rock, all along it and beyond."""
-
-POINTS: Final = 48
-"""Of rock, for the length of a tile."""
+POINTS: Final = 192
+"""Points of rock for the length of a tile, so near each other that the round end of a phalanx
+slides over them as over the rock between."""
 
 FINENESS: Final = 4800.0
 """Of the gap, in parts of the length of a tile."""
@@ -108,13 +105,6 @@ class NearPoints(NamedTuple):
     lengths: Array
     phalanx: Indices
     first: Indices
-
-    @classmethod
-    def among(cls, points: Complexes, lengths: Array, chosen: Flags) -> NearPoints:
-        """Choose among points of phalanges, each of shape (..., p)."""
-        count = np.count_nonzero(chosen, axis=-1).ravel()
-        phalanx = np.repeat(np.arange(len(count)), count)
-        return cls(points[chosen], lengths[chosen], phalanx, np.cumsum(count) - count)
 
     def of_poses(self, count: int) -> NearPoints:
         """Return those of so many poses of all phalanges, one after the other."""
@@ -217,28 +207,31 @@ class PhalanxShape(NamedTuple):
             (push / np.maximum(np.abs(push), TINY)).reshape(u.shape),
         )
 
-    def may_press(
-        self, points: Complexes, lengths: Array, joint: Complexes, u: Complexes, within: Array
-    ) -> NearPoints:
-        """Choose the points of which `beside` depends, as of phalanges (...).
+    def may_press(self, seen: Complexes, near: NearPoints, within: Array) -> NearPoints:
+        """Choose the points on which `beside` depends.
 
         Parameters
         ----------
-        points, lengths : ndarray, shape (..., p)
-        joint, u : ndarray of complex, shape (...)
-        within : ndarray, shape (...)
-            How far tiles are pressed in, and phalanges may still be moved, at most [m].
+        seen : ndarray of complex, shape (p,)
+            Points, in the axes of their phalanges [m].
+        near : NearPoints
+            The same.
+        within : ndarray
+            How far the tile of each phalanx is pressed in, and it may still be moved, at most [m].
         """
-        seen = (points - joint[..., None]) * u.conj()[..., None]
         away, from_tile = self._from_axis(seen)
         size = np.abs(away)
-        first = size.argmin(axis=-1)[..., None]
-        # the bed sinks no lower than with the nearest point alone
-        alone = self._alone(np.take_along_axis(lengths, first, axis=-1))
-        least = np.take_along_axis(size, first, axis=-1) + alone
-        chosen = size <= least + within[..., None]
-        chosen |= from_tile <= from_tile.min(axis=-1, keepdims=True) + within[..., None]
-        return NearPoints.among(points, lengths, chosen)
+        # the bed sinks no lower than with any point alone
+        least = near.least(size + self.alone(near.lengths)) + within
+        chosen = size <= least[near.phalanx]
+        chosen |= from_tile <= (near.least(from_tile) + within)[near.phalanx]
+        count = np.bincount(near.phalanx[chosen], minlength=len(near.first))
+        return NearPoints(
+            near.points[chosen],
+            near.lengths[chosen],
+            near.phalanx[chosen],
+            np.cumsum(count) - count,
+        )
 
     def _from_axis(self, seen: Complexes) -> tuple[Complexes, Array]:
         """Return the way to points from the axis; and how far from under the tile they are [m]."""
@@ -249,7 +242,7 @@ class PhalanxShape(NamedTuple):
         distance = np.abs(from_tile)
         return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
 
-    def _alone(self, lengths: Array) -> Array:
+    def alone(self, lengths: Array) -> Array:
         """Return how far beds sink that are nothing but one point each [m]."""
         return np.asarray(np.minimum(self._root / np.sqrt(lengths), self.far))
 
@@ -262,7 +255,7 @@ class PhalanxShape(NamedTuple):
         """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
         root = self._root
         first = stretch_minima(depths, near.first)
-        level = depths[first] + self._alone(near.lengths[first])
+        level = depths[first] + self.alone(near.lengths[first])
         for _ in range(MOST_STEPS):
             sunk = np.maximum(level[near.phalanx] - depths, 0.0)
             load = near.lengths * sunk
@@ -309,7 +302,7 @@ def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
 def nearest_points(
     rock: Outlines, shape: PhalanxShape, q: Array, depth: Array, turn: float = 0.0
 ) -> NearPoints:
-    """Return the points that phalanges of fingers may press on, of the `NEAREST` to each.
+    """Return the points that phalanges of fingers may press on.
 
     Parameters
     ----------
@@ -323,20 +316,24 @@ def nearest_points(
         How far joints may turn from there [rad].
     """
     joints, u = fan_out(q, shape.end)
-    x, y = rock.points.real[:, None] - joints.real[..., None], rock.points.imag[:, None]
-    y = y - joints.imag[..., None]
-    along, above = x * u.real[..., None], y * u.real[..., None]
-    along += y * u.imag[..., None]
-    above -= x * u.imag[..., None]
-    along -= np.clip(along, shape.near, shape.end, out=x)
-    along *= along
-    above *= above
-    along += above
-    nearest = np.argpartition(along, NEAREST - 1, axis=-1)[..., :NEAREST]
-    # in their own order, so that sums do not depend on what other fingers are there
-    nearest.sort(axis=-1)
-    nearest += rock.points.shape[-1] * np.arange(len(q))[:, None, None]
-    points, lengths = rock.points.take(nearest), rock.lengths.take(nearest)
     # two points may come nearer to each other by the way of each
     arms = 2.0 * q.shape[-1] * (shape.end + shape.radius + depth)
-    return shape.may_press(points, lengths, joints, u, depth + turn * arms)
+    within = depth + turn * arms
+    # blocks that may hold points which press, or are nearest to the tile
+    blocks = (rock.centres[:, None] - joints[..., None]) * u.conj()[..., None]
+    radii, chosen = rock.radii[:, None] + shape.lift, np.zeros(blocks.shape, dtype=bool)
+    alone = shape.alone(rock.longest)[:, None]
+    for end, sinks in ((shape.end, alone), (shape.far, 0.0 * alone)):
+        away = np.abs(blocks - np.clip(blocks.real, shape.near, end))
+        most = (away + radii + sinks).min(axis=-1) + within
+        chosen |= away - radii <= most[..., None]
+    blocks_each = rock.centres.shape[-1]
+    phalanx, block = np.divmod(np.flatnonzero(chosen), blocks_each)
+    block += phalanx // q.shape[-1] * blocks_each
+    points = rock.points.reshape(-1, BLOCK)[block].ravel()
+    lengths = rock.lengths.reshape(-1, BLOCK)[block].ravel()
+    count = BLOCK * np.bincount(phalanx, minlength=q.size)
+    phalanx = np.repeat(phalanx, BLOCK)
+    near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
+    seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
+    return shape.may_press(seen, near, within.ravel())

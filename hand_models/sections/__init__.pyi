@@ -1,5 +1,5 @@
 from .boundary import stretch_minima as stretch_minima
-from .outlines import Outlines as Outlines
+from .outlines import BLOCK as BLOCK, Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .section import (
     LEVEL as LEVEL,

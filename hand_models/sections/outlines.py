@@ -11,7 +11,10 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.sections.section import Complexes, Section
 
-__all__ = ["Outlines"]
+__all__ = ["BLOCK", "Outlines"]
+
+BLOCK: Final = 16
+"""Points that are looked for together: 2 mm of rock for a finger's phalanges."""
 
 FAR: Final = 1e3
 """Where points are that stand for no rock [m]."""
@@ -32,18 +35,24 @@ class Outlines(NamedTuple):
     Attributes
     ----------
     points : ndarray of complex, shape (n, p)
-        s + i t of places on the rock, in any order [m].
+        s + i t of places on the rock, chain by chain [m].
     lengths : ndarray, shape (n, p)
         Of the rock's boundary that each stands for [m].
+    centres : ndarray of complex, shape (n, p / `BLOCK`)
+    radii : ndarray, shape (n, p / `BLOCK`)
+        Circles around each `BLOCK` points in order [m].
+    longest : ndarray, shape (n, p / `BLOCK`)
+        The largest of their lengths [m].
     """
 
     points: Complexes
     lengths: Array
+    centres: Complexes
+    radii: Array
+    longest: Array
 
     @classmethod
-    def of(
-        cls, sections: Sequence[Section | None], reach: float, spacing: float, least: int
-    ) -> Outlines:
+    def of(cls, sections: Sequence[Section | None], reach: float, spacing: float) -> Outlines:
         """Gather sections, one for each finger; None where there is no rock.
 
         Parameters
@@ -53,21 +62,24 @@ class Outlines(NamedTuple):
             How far from the origin rock counts [m].
         spacing : float
             Of the points, at most [m].
-        least : int
-            How many points there are at least.
         """
         taken = [_points(section, reach, spacing) for section in sections]
-        shape = len(taken), max([least, *(len(each.points) for each in taken)])
-        made = cls(np.full(shape, complex(FAR)), np.full(shape, NOTHING))
+        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / BLOCK)
+        points = np.full((len(taken), blocks * BLOCK), complex(FAR))
+        lengths = np.full(points.shape, NOTHING)
         for i, each in enumerate(taken):
-            for values, own in zip(made, each, strict=True):
+            for values, own in zip((points, lengths), each, strict=True):
                 values[i, : len(own)] = own
-        return made
+        in_blocks = points.reshape(len(taken), blocks, BLOCK)
+        centres = in_blocks.mean(axis=-1)
+        radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
+        longest = lengths.reshape(in_blocks.shape).max(axis=-1)
+        return cls(points, lengths, centres, radii, longest)
 
 
-def _points(section: Section | None, reach: float, spacing: float) -> Outlines:
-    """Return places along the boundary within reach, at its corners as well."""
-    found = [Outlines(np.zeros(0, dtype=complex), np.zeros(0))]
+def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:
+    """Return places along the boundary within reach, at its corners as well, and their lengths."""
+    found: list[tuple[Complexes, Array]] = [(np.zeros(0, dtype=complex), np.zeros(0))]
     for chain in () if section is None else section.outline(reach, spacing):
         begin, step = chain[:-1], np.diff(chain)
         size = np.abs(step)
@@ -82,14 +94,14 @@ def _points(section: Section | None, reach: float, spacing: float) -> Outlines:
             found.append(_parts(chain[first : last + 1], size[first:last], spacing))
     points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
     kept = np.abs(points) <= reach
-    return Outlines(points[kept], lengths[kept])
+    return points[kept], lengths[kept]
 
 
-def _parts(chain: Complexes, size: Array, spacing: float) -> Outlines:
-    """Return the ends of equal parts of a chain whose pieces have these lengths [m]."""
+def _parts(chain: Complexes, size: Array, spacing: float) -> tuple[Complexes, Array]:
+    """Return the ends of equal parts of a chain whose pieces have these lengths, and theirs [m]."""
     at = np.append(0.0, np.cumsum(size))
     count = max(math.ceil(at[-1] / spacing - ROUNDING), 1)
     places = np.linspace(0.0, at[-1], count + 1)
     lengths = np.full(count + 1, at[-1] / count)
     lengths[[0, -1]] *= 0.5
-    return Outlines(np.interp(places, at, chain), lengths)
+    return np.interp(places, at, chain), lengths

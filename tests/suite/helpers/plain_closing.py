@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.finger import FingerModel, OpenFinger
-from hand_models.finger.phalanx_gaps import NEAREST, PhalanxShape, fan_out, nearest_points
+from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
 from hand_models.sections import Outlines
 from hand_models.tile import engaged_share, pull_strength
 
@@ -88,7 +88,7 @@ class PlainFinger:
         self.model, self.surface = model, opened.surface
         self.shape = PhalanxShape.of(model)
         reach = model.reach + model.tile_length
-        self.rock = Outlines.of([opened.section], reach, self.shape.spacing, NEAREST)
+        self.rock = Outlines.of([opened.section], reach, self.shape.spacing)
         loss = model.losses(opened.base_tile)
         self.closing = opened.tension
         self.pull, self.drag = loss * model.pulley_radii, loss * model.engagement
@@ -98,8 +98,8 @@ class PlainFinger:
         self.q = np.clip(np.zeros(3), self.lower, self.upper)
         if min(self.beside(self.q).gap) < 0.0:
             self.q = self.lower.copy()
-        # of the spines: those that can hold; have come to the rock; the least gap; pulled off there
-        self.able = np.ones(3, dtype=bool)
+        # of the spines: share pulled off; have come to the rock; the least gap; pulled off there
+        self.off = np.zeros(3)
         self.been = np.zeros(3, dtype=bool)
         self.least = np.full(3, math.inf)
         self.pulled_at = np.full(3, math.inf)
@@ -143,8 +143,12 @@ class PlainFinger:
         modes, sides = np.array(self.modes), np.array(self.sides)
         part = np.where(self.been | (modes == ROCK), 1.0, late)
         # off the rock, a phalanx whose joint is at a limit is drawn in by nothing
-        bears = self.able & ((modes != AIR) | (sides == FREE))
-        return np.asarray(np.where(bears, part, 0.0) * self.drag * beside.share * tension)
+        bears = (modes != AIR) | (sides == FREE)
+        return np.asarray(np.where(bears, part, 0.0) * self.drag * self.holding(beside) * tension)
+
+    def holding(self, beside: Beside) -> np.ndarray:
+        """Return the share of each tile's spines that hold."""
+        return np.asarray((beside.share - self.off).clip(0.0))
 
     def torque(self, beside: Beside, q: np.ndarray, tension: float, late: float) -> np.ndarray:
         """Of tendon, springs and drag; the normal forces are still to be found."""
@@ -159,12 +163,12 @@ class PlainFinger:
         self.steps += 1
         self.back_to_the_rock()
         here = self.beside(self.q)
-        within = self.able & (here.share > 0.0)
+        within = self.holding(here) > 0.0
         held = np.array(self.modes) == HELD
         self.least = np.where(
             within & ~held, np.minimum(self.least, here.gap.clip(0.0)), self.least
         )
-        self.least = np.where(self.able & ~within, math.inf, self.least)
+        self.least = np.where((self.off == 0.0) & ~within, math.inf, self.least)
         # spines hold no longer than rock is within their travel
         self.modes = tuple(np.where(held & ~within, AIR, self.modes).tolist())
         turned = [self.beside(self.q + TURN * e) for e in np.eye(3)]
@@ -196,7 +200,7 @@ class PlainFinger:
             over = self.overloaded(here, normals, modes, within, tension, late)
             if over is not None:
                 # its spines are pulled off: it all is different then
-                self.able[over] = self.been[over] = False
+                self.off[over], self.been[over] = here.share[over], False
                 self.pulled_at[over], self.off_since[over] = max(here.gap[over], 0.0), False
                 return LARGEST
             if np.abs(turn).max() <= LARGEST:
@@ -214,13 +218,13 @@ class PlainFinger:
     def after(self, beside: Beside) -> None:
         """Note what has become of the spines."""
         on = np.array(self.modes) == ROCK
-        lost = ~self.able & (beside.gap > self.pulled_at + LIFTED * self.model.tile_length)
+        lost = (self.off > 0.0) & (beside.gap > self.pulled_at + LIFTED * self.model.tile_length)
         self.off_since |= lost
         again = on & self.off_since
-        self.able |= again
+        self.off = np.where(again, 0.0, self.off)
         self.off_since &= ~again
         self.least = np.where(again, 0.0, self.least)
-        self.been = (self.been | on) & self.able
+        self.been = (self.been | on) & (self.holding(beside) > 0.0)
 
     def back_to_the_rock(self) -> None:
         """Take back by how much linearised steps have left the rock, or entered it."""
@@ -324,7 +328,7 @@ class PlainFinger:
         late: float,
     ) -> int | None:
         """Return the phalanx whose spines are pulled off, the worst first; None if all hold."""
-        s, worst, which = self.surface, 1e-9, None
+        s, worst, which, shares = self.surface, 1e-9, None, self.holding(here)
         shears = self.shears(here, tension, late)
         # what the pull needs of drag may come later, and last of all
         drags = self.shears(here, self.closing, 1.0)
@@ -333,7 +337,7 @@ class PlainFinger:
             if mode != HELD or pull < 1e-8 or not within[j]:
                 continue
             limits = s.shear_limit, s.pull_off_limit, s.pull_off_angle
-            strength = here.share[j] * float(pull_strength(*limits, math.atan2(pull, shears[j])))
+            strength = shares[j] * float(pull_strength(*limits, math.atan2(pull, shears[j])))
             beyond = max(math.hypot(pull, shears[j]) - strength, s.friction * pull - drags[j])
             if beyond > worst:
                 worst, which = beyond, j
