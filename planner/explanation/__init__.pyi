@@ -26,10 +26,12 @@ from .sentences import (
     NO_FACTOR as NO_FACTOR,
     UNPROVEN as UNPROVEN,
     constraint_words as constraint_words,
-    joint_sentences as joint_sentences,
     limit_sentence as limit_sentence,
-    off_sentences as off_sentences,
     overload_sentence as overload_sentence,
     shortfall_sentence as shortfall_sentence,
+)
+from .stance_warnings import (
+    joint_sentences as joint_sentences,
+    off_sentences as off_sentences,
     warnings as warnings,
 )

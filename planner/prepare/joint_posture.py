@@ -18,7 +18,7 @@ import scipy
 from hand_models.base import Array, InvalidInputError, Pose, within, wrench_transport
 from planner.prepare.stance_constraints import JointLoads
 from planner.question import Question, Stance, Weights
-from planner.robots import UnreachableError, held_up, solve_limbs
+from planner.robots import UnreachableError, carriers, held_up, solve_limbs
 
 __all__ = ["Posture", "posture"]
 
@@ -100,11 +100,11 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
     }
     with within("load"):
         linear, angular = load.motion(stance)
-        carriers = robot.carriers(whole, load.payloads)
+        frames = carriers(robot, whole, load.payloads)
     statics = robot.statics(whole, -linear, np.concatenate([np.zeros(3), angular]))
     torques, jacobians = statics.joint_torque, _jacobians_at(stance, whole)
     places = []
-    for payload, (pose, motions) in zip(load.payloads, carriers, strict=True):
+    for payload, (pose, motions) in zip(load.payloads, frames, strict=True):
         places.append(pose.apply(np.array(payload.com)))
         wrench = held_up(payload.mass, places[-1], linear, angular)
         local = wrench_transport(pose.inverse()) @ wrench

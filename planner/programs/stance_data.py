@@ -4,8 +4,7 @@ Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wr
 `WRENCH_UNIT`, limit rows over their capacities: one physical scaling for all programs.
 
 `ScaledRows` are all of a hand's data but its part of the balance: the same wherever the hand is.
-What names alone decide (which rows are efforts, which capacity measures a load) is found once for
-each list of names.
+What names alone decide is found once for each list of names.
 """
 
 from __future__ import annotations
@@ -382,10 +381,7 @@ class StanceData:
     def by_rows(
         self, values: Array, *, limits: bool = True
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
-        """Return values of rows apart: the balance's, each hand's limits', each one's hard rows'.
-
-        ``limits``: whether the rows of limits are among them.
-        """
+        """Return values of rows apart: balance, each hand's limits (with ``limits``), hard rows."""
         of_limits = [len(hand.l0) for hand in self.hands] if limits else []
         sizes = [len(self.wrench), *of_limits, *(len(hand.h) for hand in self.hands)]
         balance, *others = parted(values, sizes)

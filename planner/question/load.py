@@ -9,7 +9,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
 from planner.question.stance import Stance, checked_body_wrench
-from planner.robots import Payload, held_up
+from planner.robots import Payload, check_carrier, held_up
 
 __all__ = ["Load", "Weights"]
 
@@ -121,7 +121,7 @@ class Load:
         body, places = stance.body.inverse(), []
         for i, payload in enumerate(self.payloads):
             with within(f"payloads[{i}]"):
-                stance.robot.check_carrier(payload)
+                check_carrier(stance.robot, payload)
                 if payload.link == stance.robot.description.body:
                     places.append(np.array(payload.com))
                 elif payload.limb in hands:

@@ -4,7 +4,12 @@ from .inverse_kinematics import (
     solve_limbs as solve_limbs,
 )
 from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
-from .payload import Payload as Payload, held_up as held_up
+from .payload import (
+    Payload as Payload,
+    carriers as carriers,
+    check_carrier as check_carrier,
+    held_up as held_up,
+)
 from .robot import (
     Robot as Robot,
     robosimian as robosimian,

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
-from hand_models.base import Array, InvalidInputError, check_positive, finite_vector
+from hand_models.base import Array, InvalidInputError, Pose, check_positive, finite_vector, within
+from planner.robots.build import pose_of
+from planner.robots.robot import Robot
 
-__all__ = ["Payload", "held_up"]
+__all__ = ["Payload", "carriers", "check_carrier", "held_up"]
 
 
 @dataclass(frozen=True)
@@ -66,3 +70,57 @@ def held_up(mass: float, place: Array, linear: Array, angular: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         force = mass * (linear + np.cross(angular, place))
         return np.concatenate([force, np.cross(place, force)])
+
+
+def check_carrier(robot: Robot, payload: Payload) -> None:
+    """Refuse a payload whose limb or link the robot does not have.
+
+    Raises
+    ------
+    InvalidInputError
+        The field is relative to the payload.
+    """
+    if payload.limb is not None:
+        if payload.limb not in robot.chains:
+            known = ", ".join(robot.limbs)
+            raise InvalidInputError(
+                f"unknown limb {payload.limb!r}; known are {known}", field="limb"
+            )
+    elif payload.link is None or not robot.model.existFrame(payload.link, pin.FrameType.BODY):
+        links = [each.name for each in robot.model.frames if each.type == pin.FrameType.BODY]
+        raise InvalidInputError(
+            f"unknown link {payload.link!r}; known are {', '.join(links)}", field="link"
+        )
+
+
+def carriers(
+    robot: Robot, angles: Mapping[str, Array], payloads: Sequence[Payload]
+) -> list[tuple[Pose, dict[str, Array]]]:
+    """Return the frames in which payloads are, in B, and the Jacobians of these, by limb.
+
+    Shape (6, n) each, as those of the hands; zero of limbs that do not carry it.
+
+    Raises
+    ------
+    InvalidInputError
+        If a payload's limb or link is unknown; the field is relative to the load.
+    """
+    if not payloads:
+        return []
+    model, data, found, from_root = robot.model, robot.data, [], robot.root.inverse()
+    pin.computeJointJacobians(model, data, robot.configuration(angles))
+    for i, payload in enumerate(payloads):
+        with within(f"payloads[{i}]"):
+            check_carrier(robot, payload)
+        if payload.limb is not None:
+            frame = robot.chains[payload.limb].frame
+        else:
+            frame = model.getFrameId(payload.link, pin.FrameType.BODY)
+        pose = from_root @ pose_of(pin.updateFramePlacement(model, data, frame))
+        jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL)
+        moved = {
+            limb: jacobian[:, chain.columns] @ chain.coupling
+            for limb, chain in robot.chains.items()
+        }
+        found.append((pose, moved))
+    return found

@@ -22,14 +22,12 @@ from hand_models.base import (
     finite_vector,
     in_file,
     stored,
-    within,
     wrench_transport,
 )
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
 from planner.robots.build import build_model, pose_of
 from planner.robots.capsules import Capsules, capsules_of
-from planner.robots.payload import Payload
 from planner.robots.robot_file import RobotDescription, RobotFile
 
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
@@ -236,60 +234,6 @@ class Robot:
             pose = self._from_root @ pose_of(pin.updateFramePlacement(model, data, chain.frame))
             jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
             found[limb] = pose, jacobian[:, chain.columns] @ chain.coupling
-        return found
-
-    def check_carrier(self, payload: Payload) -> None:
-        """Refuse a payload whose limb or link the robot does not have.
-
-        Raises
-        ------
-        InvalidInputError
-            The field is relative to the payload.
-        """
-        if payload.limb is not None:
-            if payload.limb not in self.chains:
-                raise InvalidInputError(
-                    f"unknown limb {payload.limb!r}; known are {', '.join(self.limbs)}",
-                    field="limb",
-                )
-        elif payload.link is None or not self.model.existFrame(payload.link, pin.FrameType.BODY):
-            bodies = [each.name for each in self.model.frames if each.type == pin.FrameType.BODY]
-            raise InvalidInputError(
-                f"unknown link {payload.link!r}; known are {', '.join(bodies)}", field="link"
-            )
-
-    def carriers(
-        self, angles: Angles, payloads: Sequence[Payload]
-    ) -> list[tuple[Pose, dict[str, Array]]]:
-        """Return the frames in which payloads are, in B, and the Jacobians of these, by limb.
-
-        Shape (6, n) each, as those of the hands; zero of limbs that do not carry it.
-
-        Raises
-        ------
-        InvalidInputError
-            If a payload's limb or link is unknown; the field is relative to the load.
-        """
-        model, data, found = self.model, self.data, []
-        pin.computeJointJacobians(model, data, self.configuration(angles))
-        for i, payload in enumerate(payloads):
-            with within(f"payloads[{i}]"):
-                self.check_carrier(payload)
-            if payload.limb is not None:
-                frame = self.chains[payload.limb].frame
-            else:
-                frame = model.getFrameId(payload.link, pin.FrameType.BODY)
-            pose = self._from_root @ pose_of(pin.updateFramePlacement(model, data, frame))
-            jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL)
-            found.append(
-                (
-                    pose,
-                    {
-                        limb: jacobian[:, chain.columns] @ chain.coupling
-                        for limb, chain in self.chains.items()
-                    },
-                )
-            )
         return found
 
     def statics(

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import signal
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 import msgspec
@@ -28,12 +30,12 @@ from service.commands.stances import read_request
 from service.processes import kill_children
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving import (
+    MODES,
     ended_in_time,
     listening,
     open_session,
     start_zenoh_log,
     zenoh_config,
-    zenoh_options,
 )
 from service.tables import draw_plan, note, remark, say, show, verbosity
 from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
@@ -58,6 +60,27 @@ ZENOH_THREADS: Final = (
 """By default, where ``ZENOH_RUNTIME`` does not say otherwise."""
 
 DEMO_STANCE: Final = "wall-300-joints"
+
+
+def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a click command zenoh's flags, and pass it their ``config``."""
+
+    @click.option("-m", "--mode", type=click.Choice(MODES), help="Zenoh session mode.")
+    @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
+    @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
+    @click.option(
+        "-c", "--config", "file", type=click.Path(path_type=Path), help="Zenoh JSON5 configuration."
+    )
+    @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
+    @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
+    @wraps(command)
+    def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
+        names = ("mode", "connect", "listen", "file", "settings")
+        flags = {name: given.pop(name) for name in names}
+        config = zenoh_config(**flags, multicast=not no_multicast_scouting)
+        return command(config=config, **given)
+
+    return with_config
 
 
 @click.command()

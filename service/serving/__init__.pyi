@@ -1,5 +1,6 @@
 from .client import CruxClient as CruxClient
 from .config import (
+    MODES as MODES,
     TIMEOUT as TIMEOUT,
     closed as closed,
     ended_in_time as ended_in_time,
@@ -8,7 +9,6 @@ from .config import (
     open_session as open_session,
     start_zenoh_log as start_zenoh_log,
     zenoh_config as zenoh_config,
-    zenoh_options as zenoh_options,
 )
 from .log_lines import JsonLines as JsonLines, LogThread as LogThread
 from .server import PlanService as PlanService

@@ -10,15 +10,13 @@ import socket
 import struct
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import wraps
 from ipaddress import ip_address
 from pathlib import Path
 from socket import AF_INET, AF_INET6
-from typing import Any, Final
+from typing import Final
 
-import click
 import msgspec
 import zenoh
 
@@ -36,7 +34,6 @@ __all__ = [
     "patient",
     "start_zenoh_log",
     "zenoh_config",
-    "zenoh_options",
 ]
 
 log = logging.getLogger(__name__)
@@ -381,24 +378,3 @@ def _complaint(error: Exception) -> str:
 def _shown(text: str) -> str:
     """Return what was given, not too long."""
     return repr(text) if len(text) <= SHOWN else f"{text[:SHOWN]!r}…"
-
-
-def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a click command zenoh's flags, and pass it their ``config``."""
-
-    @click.option("-m", "--mode", type=click.Choice(MODES), help="Zenoh session mode.")
-    @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
-    @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
-    @click.option(
-        "-c", "--config", "file", type=click.Path(path_type=Path), help="Zenoh JSON5 configuration."
-    )
-    @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
-    @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
-    @wraps(command)
-    def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
-        names = ("mode", "connect", "listen", "file", "settings")
-        flags = {name: given.pop(name) for name in names}
-        config = zenoh_config(**flags, multicast=not no_multicast_scouting)
-        return command(config=config, **given)
-
-    return with_config

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import InvalidInputError, Pose
 from planner.prepare import posture, prepare_stance
 from planner.question import Load, Question, Stance
-from planner.robots import Payload, Robot, robosimian
+from planner.robots import Payload, Robot, check_carrier, robosimian
 from planner.solving import KnownStance, plan
 from service.answering import question
 from service.commands.stances import read_request
@@ -266,4 +266,4 @@ def test_a_known_stance_keeps_what_its_limbs_carry():
 def test_the_bundled_robot_has_the_links_that_payloads_name():
     robot = robosimian()
     for link in LINKS:
-        robot.check_carrier(Payload(1.0, link=link))
+        check_carrier(robot, Payload(1.0, link=link))

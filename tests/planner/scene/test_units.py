@@ -343,7 +343,7 @@ def test_robots_of_other_sizes_are_left_alone():
 def test_plans_tell_it_in_words_and_structured():
     asked = replace(Question(on_wall()), load=Load(mass=0.11))
     answer = plan(asked)
-    (found,) = answer.findings
+    (found,) = [each for each in answer.findings if each.kind == "unit"]
     assert (found.kind, found.field, found.value, found.unit) == ("unit", "load.mass", 0.11, "kg")
     assert found.message in answer.warnings
     assert "is it in kg?" in found.message
@@ -354,12 +354,12 @@ def test_a_known_stance_tells_it_of_each_wrench():
     own = needed(asked)
     known = KnownStance(asked)
     assert known.plan(own).findings == ()
-    (found,) = known.plan(own / 1000.0).findings
+    (found,) = [each for each in known.plan(own / 1000.0).findings if each.kind == "unit"]
     assert found.field == "body_wrench"
     assert "or in kN?" in found.message
     assert known.plan(own).findings == ()
     alone = plan(replace(asked, body_wrench=own / 1000.0))
-    assert alone.findings == (found,)
+    assert found in alone.findings
     assert found.message in alone.warnings
 
 

@@ -238,7 +238,10 @@ def test_what_is_no_number_of_bytes_is_refused(given: object) -> None:
 def test_a_service_that_is_busy_keeps_to_it(form: Format) -> None:
     request = wall_request() | {"id": "\u0001" * 256, "max_reply_bytes": LEAST_REPLY_BYTES}
     query = SimpleNamespace(
-        payload=zenoh.ZBytes(form.encode(request)), source_info=None, encoding=form.value
+        payload=zenoh.ZBytes(form.encode(request)),
+        attachment=None,
+        source_info=None,
+        encoding=form.value,
     )
     question = take(query, PLAN, 0.0, 10.0)
     assert len(question.refusal(BusyError("x" * 500, 1.0)).payload) <= LEAST_REPLY_BYTES

@@ -174,7 +174,7 @@ INVALID = [
         ("load", "angular_acceleration"),
         [0.0, 1.0, 0.0],
         "load.angular_acceleration",
-        "needs the stance's joints, and neither mass nor com",
+        "needs the stance's joints, and no com",
     ),
     (("limits",), {"joint_torque": 100.0}, "limits.joint_torque", "nothing of joints"),
     (

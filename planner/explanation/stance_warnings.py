@@ -1,0 +1,124 @@
+"""Warnings about a stance, whatever its plan: idle fingers, joints, the centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.hand import FINGERS, SettledHand
+from planner.prepare import HandBatch, Posture
+from planner.question import Question, Stance
+
+__all__ = ["joint_sentences", "off_sentences", "warnings"]
+
+SWINGS: Final = 1e-3
+"""Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
+the rounding of angles."""
+
+OFF_CENTRE: Final = 0.05
+"""Distance of the centre of mass from where it is taken, from which on that is a warning [m]: on a
+vertical wall 0.12 m changed the load factor of four hands by a sixth."""
+
+
+def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
+    """Return what is odd about the hands and rock of a stance that is planned all the same."""
+    found: list[str] = []
+    settled, holding, count = batch.hands, batch.touch.holding, len(FINGERS)
+    for h, (place, hand) in enumerate(zip(stance.hands, settled, strict=True)):
+        most = hand.surface.strongest_tile
+        if most is not None:
+            found.append(
+                f"{place.limb}: a tile is taken to hold {hand.surface.shear_limit:g} N in shear; "
+                f"all its spines break at {most:g} N"
+            )
+        by_finger = holding[count * h : count * (h + 1)]
+        if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
+            found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
+        end, reach = min(hand.rock_ends), hand.hand.finger.reach
+        if end < reach:
+            found.append(
+                f"{place.limb}: its rock ends {end:.2g} m from the base of a finger, which reaches "
+                f"{reach:.2g} m; the plan may depend on rock that is not given"
+            )
+    first = {place.hold: i for i, place in reversed([*enumerate(stance.hands)])}
+    for i in sorted(first.values()):
+        found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
+    return tuple(found)
+
+
+def off_sentences(where: Posture | None) -> tuple[str, ...]:
+    """Return which hands no joint angles put exactly where they hold, and how near some come."""
+    off = {} if where is None else where.off
+    return tuple(
+        f"{limb}: no joint angles put its hand exactly there; the nearest, which are taken, put it "
+        f"{way:.2g} m away and turn it by {turned:.2g} rad"
+        for limb, (way, turned) in off.items()
+    )
+
+
+def joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
+    """Return what is taken from the URDF for want of a rating, and which limbs would swing.
+
+    Where joints are not known, how far the centre of mass may be from where it is taken.
+    """
+    if where is None:
+        return _com_sentences(question)
+    found, robot, own = [], question.stance.robot, question.limits.joint_torque
+    given = robot.limbs if own is not None and not isinstance(own, Mapping) else own or ()
+    taken = [limb for limb in robot.limbs if not robot.chains[limb].rated and limb not in given]
+    if taken:
+        efforts = np.concatenate([robot.chains[limb].torque_limits for limb in taken])
+        least, most = float(efforts.min()), float(efforts.max())
+        range_ = f"{least:g}" if least == most else f"{least:g} to {most:g}"
+        found.append(
+            f"{', '.join(taken)}: what the joints bear is the effort of the robot's URDF, {range_} "
+            "N·m; torque_limit in the robot's file, or limits.joint_torque, takes its place"
+        )
+    for limb, loads in where.idle(question.stance).items():
+        passive = loads.passive
+        for name, torque in zip(passive.names, passive.gravity.tolist(), strict=True):
+            if abs(torque) > SWINGS:
+                found.append(
+                    f"{limb}: joint {name} has no motor and does not stay where it is, its limb's "
+                    f"weight turns it with {abs(torque):.2g} N·m"
+                )
+    return tuple(found)
+
+
+def _com_sentences(question: Question) -> tuple[str, ...]:
+    stance = question.stance
+    if question.body_wrench is not None or question.load.com is not None:
+        return ()
+    body, robot = stance.body.inverse(), stance.robot
+    hands = {hand.limb: body.apply(hand.pose.position) for hand in stance.hands}
+    away = float(np.linalg.norm(robot.com_reaching(hands) - robot.com))
+    if away <= OFF_CENTRE:
+        return ()
+    return (
+        f"the joints are not known: the centre of mass is taken where the robot's file has it, and "
+        f"may be some {away:.1f} m from there with the hands where they are, which can change a "
+        "load factor by half; give stance.joints ('solve' finds them), or load.com",
+    )
+
+
+def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
+    """Yield what of a hand holds no rock; ``by_finger``: how many tiles and nails hold it."""
+    tiles = sum(by_finger)
+    bare = {tile.finger for tile in hand.tiles if tile.contact == "frame"}
+    without = [name for name, holds in zip(FINGERS, by_finger, strict=True) if not holds]
+    pressing = [name for name in without if name in bare]
+    idle = [name for name in without if name not in bare]
+    if not tiles and not bare and not hand.palm.engaged:
+        yield "touches nothing, so it carries nothing"
+    elif not tiles and not bare:
+        yield "no finger touches rock, only the palm does"
+    if pressing:
+        yield f"no spine of {', '.join(pressing)} is on rock, bare phalanges press on it"
+    if (tiles or bare) and idle and not hand.grasp.fingernail:
+        yield f"{', '.join(idle)} {'touch' if len(idle) > 1 else 'touches'} no rock"
+    if hand.grasp.fingernail and 0 < tiles < len(FINGERS):
+        yield f"{tiles} of {len(FINGERS)} nails hook"
+    if hand.grasp.palm and not hand.palm.engaged and tiles:
+        yield "no palm tile is within its spines' travel of the rock"
