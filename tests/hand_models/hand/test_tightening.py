@@ -122,7 +122,7 @@ def test_how_fingers_end_is_what_their_contacts_say():
 
 def test_where_the_rock_is_a_little_elsewhere_fingers_end_as_told():
     """Hands on rough rock, one of whose fingers loses a tile within a tenth of a millimetre."""
-    settled = HAND.settle(random_profile(np.random.default_rng(21)), ROCK, PINCH)
+    settled = HAND.settle(random_profile(np.random.default_rng(20)), ROCK, PINCH)
     told = nearby_closures(settled)
     pose = settled.seating.pose
     there = [
