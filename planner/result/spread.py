@@ -44,7 +44,7 @@ class DrawnPlan(Struct, frozen=True):
 
 
 class Quantiles(Struct, frozen=True):
-    """A number over the draws that have it: its 5, 50 and 95 % quantiles (linear between draws).
+    """A number over draws: its 5, 50 and 95 % quantiles (linear between draws).
 
     Of fewer than 20 draws: the least, the median and the largest.
     """
@@ -94,8 +94,10 @@ class Spread(Struct, frozen=True):
         That cap.
     refused : dict of str to int
         In how many draws a hand cannot be, by limb; those that always can are left out.
-    utilisation, load_factor : Quantiles or None
+    utilisation : Quantiles or None
         Over the draws that have one.
+    load_factor : Quantiles or None
+        Over all draws; one without a plan counts as 0. None where no draw has one.
     hangs_on : list of Influence
         The drawn quantities with which most of the load factor's variation goes, the first three,
         the largest share first. A share is the squared rank correlation
@@ -141,6 +143,11 @@ class Spread(Struct, frozen=True):
             The quantities by name, and what each is in every draw.
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
+        some = any(factor is not None for factor in factors)
+        carried = [
+            0.0 if u is None and factor is None else factor
+            for u, factor in zip(used, factors, strict=True)
+        ]
         return cls(
             draws=len(plans),
             holds=sum(each.holds for each in plans),
@@ -148,7 +155,7 @@ class Spread(Struct, frozen=True):
             cap=cap,
             refused=dict(refused),
             utilisation=Quantiles.of(used),
-            load_factor=Quantiles.of(factors),
+            load_factor=Quantiles.of(carried) if some else None,
             hangs_on=_influences(factors, drawn),
             utilisations=used,
             load_factors=factors,
