@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 __all__ = ["DISTRIBUTION", "installed_version", "to_install"]
@@ -13,6 +12,9 @@ DISTRIBUTION: Final = "crux-climb"
 
 def installed_version(package: str = DISTRIBUTION) -> str | None:
     """Return the version of a distribution; None where it is not installed."""
+    # which takes long to load, and ``--help`` does without it
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version(package)
     except PackageNotFoundError:
