@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -107,11 +108,26 @@ KERNELS = {"Zen": "Haswell"}
 
 
 def libraries() -> dict[str, str]:
-    """Return what decides the last digits: versions installed, and kernels for the processor."""
+    """Return what decides the last digits: versions installed, kernels, and the processor.
+
+    The same kernels end in other digits on other processors: numpy and libm have ways of their own
+    for some.
+    """
     versions = {name: version(name) for name in ("clarabel", "cvxpy", "numpy", "scipy")}
     own = [each for each in threadpool_info() if "scipy_openblas" in each.get("prefix", "")]
     kernels = {KERNELS.get(each["architecture"], each["architecture"]) for each in own}
-    return {**versions, "kernels": ", ".join(sorted(kernels))}
+    return {**versions, "kernels": ", ".join(sorted(kernels)), "processor": _processor()}
+
+
+def _processor() -> str:
+    """Return vendor, family and model of the processor, as far as the system says them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    known = dict(line.split(":", 1) for line in lines if ":" in line)
+    said = {name.strip(): value.strip() for name, value in known.items()}
+    return " ".join(said.get(name, "") for name in ("vendor_id", "cpu family", "model")).strip()
 
 
 def recorded_here() -> bool:
