@@ -8,6 +8,7 @@ that a reader would believe.
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +24,11 @@ SIZES: Final = {"short": 2, "int": 4, "uint": 4, "float": 4, "double": 8, "ushor
     f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)
 }
 """Bytes of a PLY's types; those of one byte, and what is no type, are left out."""
+
+RELATIVE: Final = re.compile(
+    rb"^[ \t]*f[ \t](?:[^\n]*[ \t])?(?:-|0+(?:[ \t/\r\n]|$))", re.MULTILINE
+)
+"""A face of an OBJ one of whose vertices is not counted from the first, which is 1."""
 
 MOST_PROPERTIES: Final = 1000
 """Properties of a PLY's elements: reading takes as long as the square of their number."""
@@ -68,6 +74,8 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
         content = path.read_bytes()
         if ending == ".ply":
             _check_counts(content)
+        elif ending == ".obj":
+            content = _absolute(content)
         # from memory, and so without a folder in which it would look for what the file names
         found = trimesh.load(
             io.BytesIO(content), file_type=ending[1:], process=False, skip_materials=True
@@ -95,12 +103,47 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
     vertices = [np.array(part.vertices, dtype=float).reshape(-1, 3) for part in parts]
     begins = np.cumsum([0, *map(len, vertices)])
     faces = [
-        start + np.array(getattr(part, "faces", ()), dtype=np.intp).reshape(-1, 3)
-        for start, part in zip(begins, parts, strict=False)
+        start + _corners(np.array(getattr(part, "faces", ())), len(own), path)
+        for start, part, own in zip(begins, parts, vertices, strict=False)
     ]
     if not parts:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
     return np.vstack(vertices), np.vstack(faces)
+
+
+def _corners(faces: Array, count: int, path: Path) -> Indices:
+    """Return faces of so many vertices, shape (m, 3); refuse one that names no vertex."""
+    wrong = faces[(faces < 0) | (faces >= count)]
+    if len(wrong):
+        raise InvalidInputError(
+            f"a triangle's corner is vertex {wrong[0]:.0f}, counted from 0, of {count:,} vertices "
+            f"of {path}",
+            field="file",
+        )
+    return faces.astype(np.intp).reshape(-1, 3)
+
+
+def _absolute(content: bytes) -> bytes:
+    """Return an OBJ whose faces count vertices from the first, not back from the last so far.
+
+    The loader would count back from the last of all.
+    """
+    if RELATIVE.search(content) is None:
+        return content
+    lines, count = content.splitlines(), 0
+    for i, line in enumerate(lines):
+        kind, *entries = line.split() or [b""]
+        if kind == b"v":
+            count += 1
+        elif kind == b"f":
+            corners = [int(entry.split(b"/")[0]) for entry in entries]
+            if 0 in corners:
+                raise InvalidInputError("a face has vertex 0, and an OBJ counts from 1")
+            named = [corner if corner > 0 else count + 1 + corner for corner in corners]
+            if min(named, default=1) < 1:
+                raise InvalidInputError(f"a face has vertex {min(corners)} of {count} so far")
+            lines[i] = b"f " + b" ".join(b"%d" % corner for corner in named)
+    return b"\n".join(lines)
 
 
 def _check_counts(content: bytes) -> None:

@@ -90,7 +90,9 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
             f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}",
             field="file",
         ) from None
-    if min(sizes + counts + rows) < 0 or sum(counts) > MOST_COLUMNS:
+    if min(sizes + counts + rows) < 0:
+        raise InvalidInputError(f"a number of its header is below zero: {path}", field="file")
+    if not 0 < sum(counts) <= MOST_COLUMNS:
         raise InvalidInputError(
             f"a point has at least one number, and {MOST_COLUMNS:,} at most, the header of {path} "
             f"names {sum(counts):,}",

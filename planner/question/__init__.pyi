@@ -19,4 +19,5 @@ from .stance import (
     HandOnHold as HandOnHold,
     Stance as Stance,
     checked_body_wrench as checked_body_wrench,
+    known_limbs as known_limbs,
 )

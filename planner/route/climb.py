@@ -18,7 +18,17 @@ from hand_models.base import Array, InvalidInputError, Pose, within
 from hand_models.parameters import Draw
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
-from planner.question import SOLVE, HandOnHold, Limits, Load, Objective, Question, Stance, Want
+from planner.question import (
+    SOLVE,
+    HandOnHold,
+    Limits,
+    Load,
+    Objective,
+    Question,
+    Stance,
+    Want,
+    known_limbs,
+)
 from planner.result import Finding, LoadFactorStatus, Plan
 from planner.robots import UnreachableError
 from planner.solving import plan
@@ -273,6 +283,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
                 "the start stance says nothing of joints; give stance.joints, or 'solve' there",
                 field=f"moves[{number - 1}].joints",
             )
+        known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")
         joints_told |= {each: f"moves[{number - 1}].joints.{each}" for each in given}
         if joints is not None:
             if move.body is not None:

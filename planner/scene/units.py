@@ -53,6 +53,9 @@ WIDE: Final = 20.0
 FAR_OUT: Final = 2.0
 """How many times the limbs' reach a centre of mass may be from the body's origin."""
 
+HEAVY: Final = 5.0
+"""How many times the robot's weight a payload may be: 10 kg in g are far more."""
+
 LONG: Final = 100.0
 """How many palms a limb may be long."""
 
@@ -160,6 +163,21 @@ def _load(question: Question) -> Iterator[Finding]:
                 "is it in m, in B?"
             )
             yield _finding("load.com", message, away, "m")
+    for i, payload in enumerate(load.payloads):
+        field, part = f"load.payloads[{i}]", payload.mass / robot.mass
+        if part > HEAVY:
+            message = (
+                f"{payload.mass:.4g} kg are {part:.2g} times what the robot weighs, "
+                f"{robot.mass:.4g} kg: is it in kg?"
+            )
+            yield _finding(f"{field}.mass", message, payload.mass, "kg")
+        away = math.hypot(*payload.com)
+        if away > FAR_OUT * robot.reach:
+            message = (
+                f"it is {away:.3g} m from the origin of what carries it, and limbs reach "
+                f"{robot.reach:.2g} m: is it in m, in that frame?"
+            )
+            yield _finding(f"{field}.com", message, away, "m")
     most = _number("strongest_gravity")
     for name, arm, unit in (
         ("acceleration", 1.0, "m/s²"),

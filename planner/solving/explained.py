@@ -156,10 +156,10 @@ def explained_plan(
 
 def _spare_findings(prepared: PreparedStance, found: Solution) -> Iterator[Finding]:
     """Yield which hands add nothing to the plan."""
-    if found.least is None or found.effort is not None or found.reading is None:
+    if found.effort is not None or found.reading is None:
         return
     loads, closing = found.reading.loads, prepared.batch.closing_tensions
-    for i, without, _ in found.least.spare:
+    for i, without, _ in found.spare:
         message = (
             f"{prepared.limbs[i]} adds nothing: without it the least utilisation would be "
             f"{without:.4g}, with it {found.outcome.value:.4g}"

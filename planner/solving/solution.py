@@ -13,6 +13,7 @@ from planner.prepare import PreparedStance, Sets
 from planner.programs import SLACK, Outcome, StanceData, tension_trade
 from planner.solving import dual_bounds
 from planner.solving.prepared_checks import PreparedChecks, Reading, read_loads
+from planner.solving.spare_hands import SpareHand, less_tense
 from planner.solving.unique_plan import LeastUtilisation, is_least, least_utilisation
 
 __all__ = [
@@ -52,6 +53,8 @@ class Solution(NamedTuple):
         What the deadline came before.
     least : LeastUtilisation or None
         What the plan was found from, of fixed wrists.
+    spare : tuple of SpareHand
+        Hands that add nothing to the plan of least tension.
     """
 
     sets: Sets
@@ -65,6 +68,7 @@ class Solution(NamedTuple):
     effort: Outcome | None = None
     unfinished: tuple[Unfinished, ...] = ()
     least: LeastUtilisation | None = None
+    spare: tuple[SpareHand, ...] = ()
 
     @property
     def wrong(self) -> tuple[str, ...]:
@@ -126,7 +130,7 @@ def _solve_fixed(
     with checks:
         found = least_utilisation(sets.data, cap, prepared.batch.closing_tensions, before)
     bound = found.bound if found.proven else None
-    first = Solution(sets, found.outcome, cap, bound=bound, least=found)
+    first = Solution(sets, found.outcome, cap, bound=bound, least=found, spare=found.spare)
     if found.proven:
         if found.meant is None:
             first = _less_tense(prepared, checks.result(), first)
@@ -173,7 +177,9 @@ def solve_at_vertex(
 def _less_tense(prepared: PreparedStance, checks: PreparedChecks, found: Solution) -> Solution:
     """Return the plan of less tension for a little utilisation, or else for none."""
     sets, least = found.sets, found.outcome.value
-    tidy = programs.less_tension(sets.data, tension_trade(least, found.cap))
+    trade = tension_trade(least, found.cap)
+    tidy, spare = less_tense(sets.data, found.outcome, trade, prepared.batch.closing_tensions)
+    found = found._replace(spare=spare)
     if not (tidy.solved or deadline.expired()):
         tidy = programs.least_tensions(sets.data, least)
     if tidy.solved:
@@ -181,7 +187,8 @@ def _less_tense(prepared: PreparedStance, checks: PreparedChecks, found: Solutio
     else:
         found = found.late(*late("tie_break"))
     if not tidy.solved or found.wrong:
-        found = found._replace(reading=read_loads(prepared, checks, sets, found.outcome.loads))
+        reading = read_loads(prepared, checks, sets, found.outcome.loads)
+        found = found._replace(reading=reading, spare=())
     return found
 
 

@@ -29,10 +29,15 @@ from hand_models.hand import FINGERS
 from planner import deadline, programs
 from planner.programs import LOAD_UNIT, Outcome, StanceData, TensionTrade
 
-__all__ = ["SpareHand", "at_closing", "spare_hands"]
+__all__ = ["SpareHand", "at_closing", "less_tense", "spare_hands"]
 
 STIFFEST: Final = 100.0
 """Largest of 1 / (1 − f): a newton off closing is then as dear as ten in other hands."""
+
+BOUND: Final = 1e-6
+"""How far, relatively, u* − v must be above the bound's least for no program to be solved.
+
+Where a hand alone sets u*, Σ λ is one and both are zero but for rounding."""
 
 BODY: Final = 6
 """Rows of a balance that has no given wrenches of hands, with which nothing is taken away."""
@@ -63,19 +68,20 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
     ----------
     data : StanceData
     exact : Outcome
-        Of the least utilisation, with exact multipliers.
+        Of the least utilisation.
     trade : TensionTrade
     """
     room = trade.most - exact.value
     if room <= 0.0 or len(data.hands) < 2 or len(data.wrench) > BODY:
         return ()
-    assert exact.balance_dual is not None
+    if exact.balance_dual is None:  # the solver gave no multipliers
+        return ()
     found = []
     for i, hand in enumerate(data.hands):
         limits, hard = exact.limit_duals[i], exact.hard_duals[i]
         share = 1.0 - float(np.add.reduce(limits))
         own = float(limits @ hand.l0 - hard @ hand.h + exact.balance_dual @ hand.g)
-        if share > 0.0 and exact.value - own > share * trade.most:
+        if exact.value - own > share * trade.most + BOUND * max(1.0, exact.value):
             continue
         if deadline.expired():
             break
@@ -115,3 +121,25 @@ def at_closing(
         for y, centre, hand in zip(outcome.loads, centres, data.hands, strict=False)
     ]
     return replace(outcome, loads=tuple(loads)) if outcome.solved else outcome
+
+
+def less_tense(
+    data: StanceData, least: Outcome, trade: TensionTrade, closing: Sequence[float]
+) -> tuple[Outcome, tuple[SpareHand, ...]]:
+    """Return the plan of less tension as a solver finds it, and the hands that add nothing to it.
+
+    Parameters
+    ----------
+    data : StanceData
+    least : Outcome
+        Of the least utilisation.
+    trade : TensionTrade
+    closing : sequence of float
+        Closing tension of every hand [N].
+    """
+    spare = spare_hands(data, least, trade)
+    if spare:
+        resting = at_closing(data, trade, spare, closing)
+        if resting.solved:
+            return resting, spare
+    return programs.less_tension(data, trade), ()

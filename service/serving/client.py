@@ -14,6 +14,7 @@ import zenoh
 from msgspec import UNSET
 from zenoh.handlers import Callback
 
+from hand_models.base import InvalidInputError
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
@@ -88,6 +89,8 @@ class CruxClient:
 
     Raises
     ------
+    InvalidInputError
+        If the time to wait is no such time.
     NoServiceError
         If no session can be opened, or no service comes in that time.
     """
@@ -102,6 +105,10 @@ class CruxClient:
         wait: float | None = None,
     ) -> None:
         begun = time.monotonic()
+        if wait is not None and not 0.0 <= wait <= threading.TIMEOUT_MAX:
+            raise InvalidInputError(
+                f"must be from 0 to {threading.TIMEOUT_MAX:g} s, got {wait:g}", field="wait"
+            )
         self.robot = robot
         self.timeout = timeout
         self.form = form

@@ -128,3 +128,51 @@ def test_counts_of_an_stl_are_compared_with_its_size(tmp_path):
     path.write_bytes(bytes(80) + (2**32 - 1).to_bytes(4, "little") + bytes(100))
     with pytest.raises(InvalidInputError, match=r"^file: "):
         read_mesh(path)
+
+
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+OTHERS = "v 5 5 5\nv 6 5 5\nv 5 6 5\n"
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [
+        ("f 1 2 3\n", "f 4 5 6\n"),
+        ("f -3 -2 -1\n", "f -3 -2 -1\n"),
+        ("f -3/-1/-1 -2/-1/-1 -1/-1/-1\n", "f 4//1 -2//1 6//1\n"),
+        ("f  1\t-2 3 \r\n", "  f 4 5 -1\n"),
+    ],
+)
+def test_vertices_of_an_obj_that_are_counted_back_are_the_last_so_far(faces, tmp_path):
+    file = tmp_path / "rock.obj"
+    file.write_text(CORNERS + faces[0] + OTHERS + faces[1])
+    vertices, triangles = read_mesh(file)
+    np.testing.assert_array_equal(
+        vertices[triangles],
+        [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[5, 5, 5], [6, 5, 5], [5, 6, 5]]],
+    )
+
+
+@pytest.mark.parametrize("face", ["0 1 2", "1 2 0", "-4 1 2", "1/1 2/1 0/1", "1 2 99999999"])
+def test_a_face_of_an_obj_with_no_vertex_is_refused(face, tmp_path):
+    file = tmp_path / "rock.obj"
+    file.write_text(f"{CORNERS}f {face}\n{OTHERS}")
+    with pytest.raises(InvalidInputError) as caught:
+        read_mesh(file)
+    assert caught.value.field == "file"
+
+
+@pytest.mark.parametrize("corner", [-1, -3, 3, 1000, 2**31 - 1])
+@pytest.mark.parametrize("ending", [".ply", ".off"])
+def test_a_triangle_with_no_vertex_is_refused(ending, corner, tmp_path):
+    file = tmp_path / f"rock{ending}"
+    head = {
+        ".ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n",
+        ".off": "OFF\n3 1 0\n",
+    }
+    file.write_text(f"{head[ending]}0 0 0\n1 0 0\n0 1 0\n3 0 1 {corner}\n")
+    with pytest.raises(InvalidInputError) as caught:
+        read_mesh(file)
+    assert caught.value.field == "file"
+    assert "vert" in caught.value.message

@@ -126,6 +126,8 @@ def test_a_limb_may_be_given_and_the_others_found(climbed, solved):
         (1, "front_right", lambda q: q + 9.0, "moves[1].joints.front_right[", "goes from"),
         (0, "rear_right", lambda q: q - 9.0, "moves[0].joints.rear_right[", "goes from"),
         (0, "nobody", lambda _: [0.0] * 7, "moves[0].joints.nobody", "unknown limb"),
+        (0, "nobody", lambda _: "solve", "moves[0].joints.nobody", "unknown limb"),
+        (1, "", lambda _: "solve", "moves[1].joints.", "unknown limb"),
         (1, "rear_left", lambda _: "guess", "moves[1].joints.rear_left", "'solve'"),
         (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from where its joints put it"),
         (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from where its joints put it"),

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.base import Pose
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from planner.question import ForceCap, HandOnHold, Limits, Load, Question
-from planner.robots import RobotFile, robosimian, robot_of
+from planner.robots import Payload, RobotFile, robosimian, robot_of
 from planner.scene import unit_findings, wrench_findings
 from planner.solving import KnownStance, plan
 from service.answering.questions import question
@@ -49,6 +49,11 @@ def asking(**changes):
 
 def load(**changes):
     return lambda asked: replace(asked, load=Load(**changes))
+
+
+def carried(mass, com=(0.0, 0.0, 0.0), **where):
+    """A payload, on the torso unless it is said where."""
+    return load(payloads=(Payload(mass, com=com, **(where or {"link": "torso"})),))
 
 
 def limits(**changes):
@@ -100,6 +105,10 @@ WRONG = {
     "mass in mg": (load(mass=1.1e8), "load.mass"),
     "com in mm": (load(com=(0.33, -0.82, -132.9)), "load.com"),
     "com in cm": (load(com=(0.0, 3.0, -13.3)), "load.com"),
+    "payload in g": (carried(2000.0), "load.payloads[0].mass"),
+    "payload of a limb in g": (carried(900.0, limb="front_left"), "load.payloads[0].mass"),
+    "payload's place in mm": (carried(2.0, (0.0, 0.0, 120.0)), "load.payloads[0].com"),
+    "payload's place in cm": (carried(2.0, (3.0, -4.0, 12.0)), "load.payloads[0].com"),
     "acceleration in mm/s²": (load(acceleration=(0.0, 0.0, 500.0)), "load.acceleration"),
     "acceleration in cm/s²": (load(acceleration=(40.0, 0.0, 0.0)), "load.acceleration"),
     "turning in deg/s²": (
@@ -206,6 +215,9 @@ SOUND = {
     "a loaded one": load(mass=400.0),
     "a lorry": load(mass=3000.0),
     "a pack on its back": load(mass=150.0, com=(0.0, 0.0, 0.4)),
+    "a pack": carried(60.0, (0.0, 0.0, 0.3)),
+    "a sensor": carried(0.02, (0.3, 0.0, 0.1)),
+    "a lamp on a hand": carried(0.3, (0.0, 0.1, 0.1), limb="front_left"),
     "a boom": load(mass=120.0, com=(1.2, 0.0, 0.2)),
     "gentle motion": load(acceleration=(0.05, 0.0, 0.1)),
     "a leap": load(acceleration=(3.0, 0.0, 20.0)),

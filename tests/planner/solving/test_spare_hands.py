@@ -7,12 +7,16 @@ import pytest
 
 from hand_models.base import Pose
 from hand_models.rock import Sphere
+from planner import programs
+from planner.programs import tension_trade
 from planner.question import Limits, Load, Question, Stance
 from planner.result import Plan
 from planner.solving import KnownStance, plan
+from planner.solving.spare_hands import spare_hands
 from planner.streaming import WrenchStream
 from tests.suite.helpers import peer
-from tests.suite.helpers.stances import CALIBRATION_LOAD, PLACES, ask, on_wall
+from tests.suite.helpers.random_questions import requested
+from tests.suite.helpers.stances import CALIBRATION_LOAD, PLACES, ask, on_wall, program_data
 
 LIMBS = tuple(PLACES)
 AIR = Pose(np.array([0.0, 0.0, 0.5]), np.eye(3))
@@ -110,6 +114,36 @@ def test_a_known_stance_and_a_stream_leave_it_alike():
         np.testing.assert_allclose(mine, tensions(answer, "rear_left"), atol=0.05)
 
 
+@pytest.mark.parametrize(
+    "seeds",
+    [(0, 3, 7, 19, 24, 41), pytest.param(range(120), marks=pytest.mark.slow)],
+    ids=["few", "all"],
+)
+def test_neither_order_nor_rounding_names_hands_or_moves_tensions(seeds):
+    """Where one hand alone sets the utilisation, its multipliers add up to one but for rounding."""
+    named_ones = 0
+    for seed in seeds:
+        asked = replace(requested(seed), explain=False, want=frozenset())
+        answer = plan(asked)
+        if answer.status != "optimal":
+            continue
+        hands = asked.stance.hands
+        heavier = replace(asked.stance, gravity=asked.stance.gravity * (1.0 + 1e-9))
+        turned = replace(asked, stance=replace(asked.stance, hands=hands[::-1]))
+        for other in (plan(turned), plan(replace(asked, stance=heavier))):
+            assert limbs_named(other) == limbs_named(answer)
+            for hand in answer.hands:
+                np.testing.assert_allclose(
+                    tensions(other, hand.limb), tensions(answer, hand.limb), atol=0.01
+                )
+        named_ones += bool(limbs_named(answer))
+    assert named_ones >= 2
+
+
+def limbs_named(answer: Plan) -> set[str]:
+    return {text.split(" adds nothing")[0] for text in answer.warnings if "adds nothing" in text}
+
+
 def test_tensions_follow_the_cap_to_where_nothing_is_given_away():
     """Steps of an eighth are about an eighth as long: a jump would stay as it is."""
     question = ask(with_one_in_the_air("rear_left"), load=replace(CALIBRATION_LOAD, mass=50.0))
@@ -128,3 +162,13 @@ def test_tensions_follow_the_cap_to_where_nothing_is_given_away():
 
 def capped(question: Question, cap: float) -> Question:
     return replace(question, limits=Limits(utilisation=cap))
+
+
+def test_without_multipliers_no_hand_is_named():
+    """Where Clarabel fails, another solver may give loads alone."""
+    data = program_data(ask(with_one_in_the_air("rear_left"), load=Load(50.0)))
+    least = programs.margin(data)
+    trade = tension_trade(least.value, 1.0)
+    assert [each.place for each in spare_hands(data, least, trade)] == [LIMBS.index("rear_left")]
+    bare = replace(least, balance_dual=None, limit_duals=(), hard_duals=())
+    assert spare_hands(data, bare, trade) == ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
+from hand_models import InvalidInputError
 from service import CruxClient, NoServiceError
 from service.commands.cli import run
 from service.commands.stances import read_request
@@ -153,6 +155,13 @@ def test_how_long_is_waited_is_a_number_of_seconds(
 ) -> None:
     assert run(["query", "wall-300", "--wait", wait]) == BAD_INPUT
     assert "--wait" in complaint(capfd)
+
+
+@pytest.mark.parametrize("wait", [-1.0, -1e-9, math.nan, math.inf, -math.inf, 1e308])
+def test_how_long_a_client_waits_is_checked_before_it_does(wait: float) -> None:
+    with pytest.raises(InvalidInputError, match="must be from 0 to") as caught:
+        CruxClient(zenoh.Config(), wait=wait)
+    assert caught.value.field == "wait"
 
 
 def test_a_client_of_another_robot_s_service_waits_in_vain(served: Served) -> None:
