@@ -101,11 +101,11 @@ def test_what_a_detail_does_not_tell_is_not_named() -> None:
 @pytest.mark.parametrize(
     "want",
     [
-        ["robust"],
+        pytest.param(["robust"], marks=pytest.mark.slow),
         ["model"],
         ["clearance", "prices"],
         ["model", "prices"],
-        ["prices", "robust", "clearance"],
+        pytest.param(["prices", "robust", "clearance"], marks=pytest.mark.slow),
     ],
 )
 def test_what_was_asked_for_in_addition_is_named_with_its_size(

@@ -262,9 +262,13 @@ def test_a_process_that_stands_ready_takes_the_place_of_one_that_ends(
     (spare,) = (pid for pid, does in before.items() if does == "spare")
     killed = next(pid for pid, does in before.items() if does == purpose)
     os.kill(killed, signal.SIGKILL)
-    health = site.wait_until(client, lambda health: all_new({killed}, health) and all_up(health))
+
+    def replaced(health: dict) -> bool:
+        purposes = sorted(each["purpose"] for each in health["processes"])
+        return all_new({killed}, health) and all_up(health) and purposes == sorted(before.values())
+
+    health = site.wait_until(client, replaced)
     after = {p["pid"]: p["purpose"] for p in health["processes"]}
-    assert sorted(after.values()) == sorted(before.values())
     assert after.get(spare) == (None if purpose == "spare" else purpose)
     assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
     assert "pid" in client.ask({"echo": 1})
