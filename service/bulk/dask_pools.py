@@ -26,7 +26,7 @@ LOCAL: Final = "dask:local"
 """A cluster of this machine's own, for as long as the work lasts."""
 
 PATIENCE: Final = 15.0
-"""How long to wait for a scheduler, or for its first worker [s]."""
+"""How long to wait for a scheduler, for its first worker, or for a result to come over [s]."""
 
 LOOK: Final = 1.0
 """How often it is looked whether the scheduler is still there, while nothing comes [s]."""
@@ -167,6 +167,9 @@ class DaskPool:
         """Submit a chunk."""
         future = self._client.submit(answer_chunk, self._setting, chunk, pure=False)
         self._open[number] = future
+        self._await(number, future)
+
+    def _await(self, number: int, future: Future[bytes]) -> None:
         future.add_done_callback(lambda done: self._done.put((number, done)))
 
     def collect(self) -> list[tuple[int, bytes | Lost]]:
@@ -184,8 +187,18 @@ class DaskPool:
             except Empty:
                 self._tell_if_alone()
                 continue
-            if self._open.pop(number, None) is not None:
-                return [(number, self._found(future))]
+            if number not in self._open:
+                continue
+            try:
+                if future.status == "pending":
+                    raise TimeoutError
+                found = self._found(future)
+            except TimeoutError:
+                # its worker has left with the result: another works it out again
+                self._await(number, future)
+                continue
+            del self._open[number]
+            return [(number, found)]
 
     def _tell_if_alone(self) -> None:
         """Say once that there is no worker to wait for."""
@@ -207,11 +220,11 @@ class DaskPool:
         from distributed import KilledWorker
 
         if future.status == "finished":
-            answers: bytes = future.result()
+            answers: bytes = future.result(timeout=PATIENCE)
             return answers
         if future.cancelled():
             raise CruxError(f"the Dask scheduler at {self._address} is gone")
-        error = future.exception()
+        error = future.exception(timeout=PATIENCE)
         if isinstance(error, KilledWorker):
             return Lost(f"{self.deaths} Dask workers died of it")
         if isinstance(error, MemoryError):
