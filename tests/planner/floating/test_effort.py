@@ -135,8 +135,9 @@ def test_another_solver_finds_nothing_less_on_the_model_itself():
         callback=lambda x: passed.append(x.copy()),
     )
     values = [model.values(x)[0] for x in passed]
+    # SLSQP keeps limits to about 1e-5 only
     held = [
-        v[0] for v in values if np.abs(v[parts[0]]).max() <= 1e-6 and v[parts[1]].min() >= -1e-6
+        v[0] for v in values if np.abs(v[parts[0]]).max() <= 1e-6 and v[parts[1]].min() >= -5e-5
     ]
     assert len(held) >= 3
     assert min(held) >= answer.effort - 1e-5

@@ -58,7 +58,9 @@ LIMITING = pytest.mark.xfail(
 CASES = [
     *((name, "fixed", CALIBRATION_LOAD) for name in FADING),
     pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]),
-    pytest.param("base tiles of pinches", "floating", CALIBRATION_LOAD, marks=pytest.mark.slow),
+    pytest.param(
+        "base tiles of pinches", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]
+    ),
     ("two rows of the palm", "floating", CALIBRATION_LOAD),
 ]
 

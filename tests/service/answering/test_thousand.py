@@ -85,6 +85,11 @@ def least(question: Question):
     )
 
 
+def may_use(lowest: float, cap: float) -> float:
+    """What a plan may use: a thousandth more than the least, but no more than the cap for it."""
+    return max(lowest, min(1.001 * lowest, cap))
+
+
 def wrong_with(question: Question, answer: Plan) -> str | None:
     """What is wrong with an answer, by other means than its own."""
     if answer.status == "failed" or not answer.verified:
@@ -110,7 +115,7 @@ def wrong_with(question: Question, answer: Plan) -> str | None:
     if question.objective == "min_effort" and lowest <= cap:
         if not lowest - slack <= answer.utilisation <= max(cap, lowest) + slack:
             return f"uses {answer.utilisation}, between {lowest} and {cap} is right"
-    elif not abs(answer.utilisation - lowest) <= slack:
+    elif not lowest - slack <= answer.utilisation <= may_use(lowest, cap) + slack:
         return f"uses {answer.utilisation}, HiGHS {lowest}"
     if (answer.status == "optimal") != (answer.utilisation <= cap + 1e-6):
         return f"{answer.status} at {answer.utilisation} of {cap}"
