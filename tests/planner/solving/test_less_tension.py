@@ -73,6 +73,12 @@ def squares(answer: Plan) -> float:
     return float(((tensions(answer) / STRONGEST) ** 2).sum())
 
 
+def adding_nothing(answer: Plan) -> set[str]:
+    """Return the limbs whose hands are left at their closing tensions."""
+    found = [each for each in answer.findings if each.kind == "hand_adds_nothing"]
+    return {answer.hands[int(each.field[len("stance.hands[") : -1])].limb for each in found}
+
+
 def least_squares_within(question: Question, most: float) -> float:
     """Σ (tension / maximum)² of the least, in SI units by a program of its own."""
     sets = peer.spaces(question)
@@ -120,7 +126,9 @@ def check(question: Question, answer: Plan) -> None:
     cap = question.limits.utilisation
     assert is_meant(answer.utilisation, least, cap, TOLERANCE)
     strength = question.limits.tendon_tension or STRONGEST
-    pulled = float(((tensions(answer) / strength) ** 2).sum())
+    spare = adding_nothing(answer)
+    kept = [limb not in spare for limb in sorted(hand.limb for hand in answer.hands)]
+    pulled = float(((tensions(answer)[kept] / strength) ** 2).sum())
     most = most_meant(least, cap)
     if most - least < TOLERANCE:
         # nothing is given away, and at the very least HiGHS' digits may leave no plan
