@@ -1,6 +1,6 @@
 """How long set-points for a changing wrench take, what they are made of, and their declaration.
 
-``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
+``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 from itertools import cycle

@@ -19,9 +19,9 @@ from planner.prepare import HandSets, Sets, assemble
 from planner.programs import program, solvers
 from planner.question import Question
 from planner.solving import plan
-from tests.benchmarks.measured_stances import question_of, twin_of
-from tests.benchmarks.plain_programs import Clarabel, scaled, unique
-from tests.benchmarks.race import TURN, WARM, Way, race
+from benchmarks.measured_stances import question_of, twin_of
+from benchmarks.plain_programs import Clarabel, scaled, unique
+from benchmarks.race import TURN, WARM, Way, race
 from tests.suite.helpers.crawlers import crawler_in, crawler_question
 
 __all__ = ["Curve", "draw", "growth", "steps"]

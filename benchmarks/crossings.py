@@ -1,6 +1,6 @@
 """How many modules one plan passes, and how often it goes from one to another.
 
-``python -m tests.benchmarks.crossings``, from a checkout. Of a new stance of a shape that is known,
+``python -m benchmarks.crossings``, from a checkout. Of a new stance of a shape that is known,
 from the closed hands on.
 """
 

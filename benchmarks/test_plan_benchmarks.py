@@ -1,6 +1,6 @@
 """How long a plan takes, and its solver against its peers on the same data.
 
-``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
+``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 from dataclasses import replace

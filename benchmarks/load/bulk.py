@@ -21,7 +21,7 @@ import msgspec
 from rich.console import Console
 
 from planner.processes import resident
-from tests.load.asking import new_stances, new_wrenches, spoilt
+from benchmarks.load.asking import new_stances, new_wrenches, spoilt
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.random_requests import random_request
 from tests.suite.helpers.requests import HEAVY, wall_request

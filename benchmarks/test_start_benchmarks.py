@@ -1,6 +1,6 @@
 """Processor time of whole commands, from their start: their ratios are what the table tells.
 
-``python -m pytest tests/benchmarks/test_start_benchmarks.py --benchmark-enable -n 0 -m slow``
+``python -m pytest benchmarks/test_start_benchmarks.py --benchmark-enable -n 0 -m slow``
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from rich.table import Table
 from hand_models.base import stores
 from planner import processes as proc
 from service.answering import dispatch
-from tests.load.asking import (
+from benchmarks.load.asking import (
     PLAN,
     Asked,
     Client,
@@ -36,8 +36,8 @@ from tests.load.asking import (
     random_plans,
     spoilt,
 )
-from tests.load.bulk import bulk
-from tests.load.others import greedy, starve, starved, unread
+from benchmarks.load.bulk import bulk
+from benchmarks.load.others import greedy, starve, starved, unread
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.served import Served, free_endpoint
 
@@ -65,7 +65,7 @@ def served(*flags: str) -> Iterator[Served]:
 def other(command: str, endpoint: str) -> Iterator[None]:
     """A process of this module until this is left."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.load", command, endpoint],
+        [sys.executable, "-m", "benchmarks.load", command, endpoint],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         env=os.environ | {"PYTHONPATH": str(ROOT)},

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table as Grid
 
-from tests.benchmarks.race import Race
+from benchmarks.race import Race
 
 __all__ = [
     "BEGIN",

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.benchmarks.random_plans import answer
+from benchmarks.random_plans import answer
 
 MINUTES = 3.0
 """What the test may take."""
@@ -19,7 +19,7 @@ MOST = 25
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_as_many_random_stances_as_fit_in_a_few_minutes_are_planned_in_few_iterations():
-    """The command ``python -m tests.benchmarks --only stances --stances 10000`` plans all."""
+    """The command ``python -m benchmarks --only stances --stances 10000`` plans all."""
     end = time.perf_counter() + 60.0 * MINUTES
     iterations = []
     for seed in range(10_000):

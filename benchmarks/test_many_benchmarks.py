@@ -8,7 +8,7 @@ import pytest
 
 from planner.processes import cores
 from service.processes import Planners
-from tests.benchmarks.measured_stances import request
+from benchmarks.measured_stances import request
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ import click
 import msgspec
 from rich.console import Console
 
-from tests.load.asking import PLAN, WRENCH_SPACE, Client, Tally, new_stances
+from benchmarks.load.asking import PLAN, WRENCH_SPACE, Client, Tally, new_stances
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.served import Served, free_endpoint
@@ -178,7 +178,7 @@ def starved(seconds: float, pairs: int, busy: int, half_planes: int) -> None:
             for i in range(pairs):
                 without.append(polite(server.endpoint, seconds, 100 * i))
                 console.print(f"without: {without[-1].told()}")
-                more = ("-m", "tests.load", "starve", server.endpoint)
+                more = ("-m", "benchmarks.load", "starve", server.endpoint)
                 with process(*more, "--half-planes", str(half_planes)):
                     with_.append(polite(server.endpoint, seconds, 100 * i + 50))
                 console.print(f"beside it: {with_[-1].told()}")
@@ -202,7 +202,7 @@ def unread(seconds: float, pairs: int, clients: int) -> None:
     for i in range(pairs):
         for stopped, found in ((False, reading), (True, not_reading)):
             server = Served(free_endpoint())
-            command = ("-m", "tests.load", "greedy", server.endpoint, str(clients))
+            command = ("-m", "benchmarks.load", "greedy", server.endpoint, str(clients))
             with process(*command) as others:
                 time.sleep(3.0)
                 if stopped:

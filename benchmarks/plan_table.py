@@ -18,12 +18,12 @@ from planner.solving import plan
 from service.answering import dispatch
 from service.answering.questions import question
 from service.wire import PLAN
-from tests.benchmarks.cvxpy_users import Parametrised, Query, rebuilt
-from tests.benchmarks.measured_stances import payload, question_of, request
-from tests.benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
-from tests.benchmarks.race import TURN, WARM, Way, race
-from tests.benchmarks.results import Line, Table, lines, span
-from tests.benchmarks.whole_blocks import WholeBlocks
+from benchmarks.cvxpy_users import Parametrised, Query, rebuilt
+from benchmarks.measured_stances import payload, question_of, request
+from benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
+from benchmarks.race import TURN, WARM, Way, race
+from benchmarks.results import Line, Table, lines, span
+from benchmarks.whole_blocks import WholeBlocks
 
 __all__ = ["plan_tables"]
 

@@ -12,11 +12,11 @@ from planner.programs import WRENCH_UNIT, program
 from planner.result import SetPoints
 from planner.solving import KnownStance
 from planner.streaming import WrenchStream
-from tests.benchmarks.measured_stances import question_of
-from tests.benchmarks.plain_programs import Clarabel, scaled, unique
-from tests.benchmarks.race import TURN, WARM, race
-from tests.benchmarks.results import Table, lines
-from tests.benchmarks.whole_blocks import WholeBlocks
+from benchmarks.measured_stances import question_of
+from benchmarks.plain_programs import Clarabel, scaled, unique
+from benchmarks.race import TURN, WARM, race
+from benchmarks.results import Table, lines
+from benchmarks.whole_blocks import WholeBlocks
 
 __all__ = ["known_tables"]
 

@@ -1,4 +1,4 @@
-"""The command that measures everything: ``python -m tests.benchmarks``, from a checkout.
+"""The command that measures everything: ``python -m benchmarks``, from a checkout.
 
 Needs what ``pip install -e '.[test,bench]'`` brings. Everything is measured on this machine in this
 run: ways to the same answer take turns, times are medians, ratios medians of each round's ratio.
@@ -18,16 +18,16 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from tests.benchmarks.batch_table import batch_tables, batches, rates
-from tests.benchmarks.centroidal_table import CASES, centroidal_tables
-from tests.benchmarks.growth import draw, growth, steps as growth_steps
-from tests.benchmarks.known_table import known_tables
-from tests.benchmarks.placement_table import placement_tables
-from tests.benchmarks.plan_table import plan_tables
-from tests.benchmarks.race import Race
-from tests.benchmarks.random_plans import answers, iteration_tables
-from tests.benchmarks.results import Table, into, markdown, print_tables
-from tests.benchmarks.set_table import set_tables
+from benchmarks.batch_table import batch_tables, batches, rates
+from benchmarks.centroidal_table import CASES, centroidal_tables
+from benchmarks.growth import draw, growth, steps as growth_steps
+from benchmarks.known_table import known_tables
+from benchmarks.placement_table import placement_tables
+from benchmarks.plan_table import plan_tables
+from benchmarks.race import Race
+from benchmarks.random_plans import answers, iteration_tables
+from benchmarks.results import Table, into, markdown, print_tables
+from benchmarks.set_table import set_tables
 
 
 class Size(NamedTuple):

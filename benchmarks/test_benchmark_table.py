@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from tests.benchmarks.race import race
-from tests.benchmarks.results import BEGIN, END, Line, Table, into, markdown, span, times
+from benchmarks.race import race
+from benchmarks.results import BEGIN, END, Line, Table, into, markdown, span, times
 from tests.suite.helpers.checkout import ROOT
 
 
@@ -63,7 +63,7 @@ def test_the_command_measures_every_part(tmp_path):
     page.write_text(f"# crux\n\n{BEGIN}\n{END}\n")
     options = ["--quick", "--workers", "1", "--page", str(page), "--plot", str(plot)]
     done = subprocess.run(
-        [sys.executable, "-m", "tests.benchmarks", *options],
+        [sys.executable, "-m", "benchmarks", *options],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -1,6 +1,6 @@
 """How long scanned rock takes: to be taken up, cut, and closed on.
 
-``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
+``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import math

@@ -1,6 +1,6 @@
 """How long it takes to find what a stance can hold, and one direction of it by another solver.
 
-``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
+``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import numpy as np

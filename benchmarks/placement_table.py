@@ -23,8 +23,8 @@ from hand_models.rock import Mesh
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.rock.triangles import TriangleCells
 from hand_models.sections import Section
-from tests.benchmarks.race import race
-from tests.benchmarks.results import Line, Table, span, times
+from benchmarks.race import race
+from benchmarks.results import Line, Table, span, times
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import fractal_wall
 

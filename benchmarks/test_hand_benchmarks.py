@@ -1,6 +1,6 @@
 """How long a hand takes, from its hold to its wrench space and the views of that.
 
-``pytest tests/benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
+``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
 import dataclasses

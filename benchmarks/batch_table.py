@@ -10,9 +10,9 @@ from contextlib import ExitStack
 from planner import deadline
 from planner.solving import plan
 from service.processes import Planners
-from tests.benchmarks.measured_stances import question_of, request
-from tests.benchmarks.race import WARM, Race, Way, race
-from tests.benchmarks.results import Line, Table, times
+from benchmarks.measured_stances import question_of, request
+from benchmarks.race import WARM, Race, Way, race
+from benchmarks.results import Line, Table, times
 
 __all__ = ["batch_tables", "batches", "rates"]
 
