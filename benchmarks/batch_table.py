@@ -7,12 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 
-from planner import deadline
-from planner.solving import plan
-from service.processes import Planners
 from benchmarks.measured_stances import question_of, request
 from benchmarks.race import WARM, Race, Way, race
 from benchmarks.results import Line, Table, times
+from planner import deadline
+from planner.solving import plan
+from service.processes import Planners
 
 __all__ = ["batch_tables", "batches", "rates"]
 

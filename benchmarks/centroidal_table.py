@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.programs import solvers
 from benchmarks.race import race
 from benchmarks.results import Line, Table, span, times
+from planner.programs import solvers
 from tests.suite.helpers import centroidal_peer
 from tests.suite.helpers.friction_contacts import EDGES, our_margin, random_case, stance_of
 

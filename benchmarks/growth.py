@@ -14,14 +14,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
+from benchmarks.measured_stances import question_of, twin_of
+from benchmarks.plain_programs import Clarabel, scaled, unique
+from benchmarks.race import TURN, WARM, Way, race
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandSets, Sets, assemble
 from planner.programs import program, solvers
 from planner.question import Question
 from planner.solving import plan
-from benchmarks.measured_stances import question_of, twin_of
-from benchmarks.plain_programs import Clarabel, scaled, unique
-from benchmarks.race import TURN, WARM, Way, race
 from tests.suite.helpers.crawlers import crawler_in, crawler_question
 
 __all__ = ["Curve", "draw", "growth", "steps"]

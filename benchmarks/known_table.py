@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.prepare import assemble
-from planner.programs import WRENCH_UNIT, program
-from planner.result import SetPoints
-from planner.solving import KnownStance
-from planner.streaming import WrenchStream
 from benchmarks.measured_stances import question_of
 from benchmarks.plain_programs import Clarabel, scaled, unique
 from benchmarks.race import TURN, WARM, race
 from benchmarks.results import Table, lines
 from benchmarks.whole_blocks import WholeBlocks
+from planner.prepare import assemble
+from planner.programs import WRENCH_UNIT, program
+from planner.result import SetPoints
+from planner.solving import KnownStance
+from planner.streaming import WrenchStream
 
 __all__ = ["known_tables"]
 

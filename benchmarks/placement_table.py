@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from benchmarks.race import race
+from benchmarks.results import Line, Table, span, times
 from hand_models import Grasp, SettledHand
 from hand_models.fixed_wrist import (
     PULL_OFF,
@@ -23,8 +25,6 @@ from hand_models.rock import Mesh
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.rock.triangles import TriangleCells
 from hand_models.sections import Section
-from benchmarks.race import race
-from benchmarks.results import Line, Table, span, times
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
 from tests.suite.helpers.rocks import fractal_wall
 

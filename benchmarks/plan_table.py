@@ -9,6 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.cvxpy_users import Parametrised, Query, rebuilt
+from benchmarks.measured_stances import payload, question_of, request
+from benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
+from benchmarks.race import TURN, WARM, Way, race
+from benchmarks.results import Line, Table, lines, span
+from benchmarks.whole_blocks import WholeBlocks
 from hand_models.parameters import bundled_draws
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
@@ -18,12 +24,6 @@ from planner.solving import plan
 from service.answering import dispatch
 from service.answering.questions import question
 from service.wire import PLAN
-from benchmarks.cvxpy_users import Parametrised, Query, rebuilt
-from benchmarks.measured_stances import payload, question_of, request
-from benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
-from benchmarks.race import TURN, WARM, Way, race
-from benchmarks.results import Line, Table, lines, span
-from benchmarks.whole_blocks import WholeBlocks
 
 __all__ = ["plan_tables"]
 

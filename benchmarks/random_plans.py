@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.plain_programs import Clarabel, Conic, scaled, si, unique
+from benchmarks.results import Line, Table
 from planner.prepare import Sets, assemble
 from planner.programs import LOAD_UNIT, program
 from planner.solving import plan
-from benchmarks.plain_programs import Clarabel, Conic, scaled, si, unique
-from benchmarks.results import Line, Table
 from tests.suite.helpers.stances import random_question
 
 __all__ = ["Answer", "answer", "answers", "iteration_tables"]

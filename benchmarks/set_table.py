@@ -9,12 +9,12 @@ import numpy as np
 from pycapacity.algorithms import hyper_plane_shift_method
 from scipy.spatial import KDTree
 
-from hand_models.fixed_wrist import wrench_space
-from hand_models.fixed_wrist.tension_box import parallelepiped
-from hand_models.wrench_spaces import SCALE
 from benchmarks.paper_search import searched
 from benchmarks.race import race
 from benchmarks.results import Table, lines
+from hand_models.fixed_wrist import wrench_space
+from hand_models.fixed_wrist.tension_box import parallelepiped
+from hand_models.wrench_spaces import SCALE
 from tests.suite.helpers.hands import pinch
 from tests.suite.helpers.zonotopes import half_spaces
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from benchmarks.measured_stances import request
 from planner.processes import cores
 from service.processes import Planners
-from benchmarks.measured_stances import request
 
 pytestmark = pytest.mark.slow
 

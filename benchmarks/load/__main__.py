@@ -20,9 +20,6 @@ import zenoh
 from rich.console import Console
 from rich.table import Table
 
-from hand_models.base import stores
-from planner import processes as proc
-from service.answering import dispatch
 from benchmarks.load.asking import (
     PLAN,
     Asked,
@@ -38,6 +35,9 @@ from benchmarks.load.asking import (
 )
 from benchmarks.load.bulk import bulk
 from benchmarks.load.others import greedy, starve, starved, unread
+from hand_models.base import stores
+from planner import processes as proc
+from service.answering import dispatch
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.served import Served, free_endpoint
 

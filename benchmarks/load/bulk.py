@@ -20,8 +20,8 @@ import click
 import msgspec
 from rich.console import Console
 
-from planner.processes import resident
 from benchmarks.load.asking import new_stances, new_wrenches, spoilt
+from planner.processes import resident
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.random_requests import random_request
 from tests.suite.helpers.requests import HEAVY, wall_request

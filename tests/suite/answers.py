@@ -5,13 +5,25 @@ from __future__ import annotations
 import json
 import platform
 from importlib.metadata import version
+from math import floor, inf, log10
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_info
 
-__all__ = ["libraries", "read_answers", "recorded_here", "told", "write_answers"]
+from tests.suite.comparison import kind_of, scales
+from tests.suite.problems import Problem
+
+__all__ = [
+    "fields",
+    "libraries",
+    "read_answers",
+    "recorded_here",
+    "rounded",
+    "told",
+    "write_answers",
+]
 
 ANSWERS = Path(__file__).parent / "answers"
 
@@ -135,21 +147,53 @@ def recorded_here() -> bool:
     return bool(json.loads(LIBRARIES.read_text(encoding="utf-8")) == libraries())
 
 
+def fields(answer: Any, path: str = "") -> set[str]:
+    """Return the paths of all fields of an answer, without the places in lists."""
+    if isinstance(answer, list):
+        return {field for part in answer for field in fields(part, path)}
+    if not isinstance(answer, dict):
+        return set()
+    below = {f"{path}.{name}".lstrip("."): part for name, part in answer.items()}
+    return set(below).union(*(fields(part, field) for field, part in below.items()))
+
+
+def rounded(problem: Problem, answer: dict[str, Any]) -> dict[str, Any]:
+    """Return an answer with the digits that are compared, without fields that are not.
+
+    Numbers are rounded to a tenth of what may differ, or less.
+    """
+    answer = _compared(problem, answer, ())
+    return _rounded(problem, answer, (), scales(answer))
+
+
+def _compared(problem: Problem, value: Any, path: tuple[str, ...]) -> Any:
+    if isinstance(value, list):
+        return [_compared(problem, part, path) for part in value]
+    if not isinstance(value, dict):
+        return value
+    names = (name for name in value if problem.allowed((*path, name)) < inf)
+    return {name: _compared(problem, value[name], (*path, name)) for name in names}
+
+
+def _rounded(problem: Problem, value: Any, path: tuple[str, ...], sizes: dict[str, float]) -> Any:
+    if isinstance(value, list):
+        return [_rounded(problem, part, path, sizes) for part in value]
+    if isinstance(value, dict):
+        return {n: _rounded(problem, part, (*path, n), sizes) for n, part in value.items()}
+    if not isinstance(value, float):
+        return value
+    size = problem.allowed(path) * sizes[kind_of(path)]
+    return round(value, 1 - floor(log10(size))) + 0.0
+
+
 def read_answers(kind: str) -> dict[str, dict[str, Any]]:
     """Return the recorded answers to problems of a kind, by name."""
-    file = ANSWERS / f"{kind}.jsonl"
-    if not file.exists():
-        return {}
-    lines = map(json.loads, file.read_text(encoding="utf-8").splitlines())
-    return {line["name"]: line["answer"] for line in lines}
+    file = ANSWERS / f"{kind}.json"
+    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
 
 
 def write_answers(kind: str, answers: dict[str, dict[str, Any]]) -> None:
-    """Write the answers to problems of a kind, in the order given, one a line."""
-    lines = (
-        json.dumps({"name": name, "answer": answer}, ensure_ascii=False, separators=(",", ":"))
-        for name, answer in answers.items()
-    )
-    text = "".join(f"{line}\n" for line in lines)
-    (ANSWERS / f"{kind}.jsonl").write_text(text, encoding="utf-8")
+    """Write the answers to problems of a kind, in the order given, a number a line."""
+    text = json.dumps(answers, ensure_ascii=False, indent=0)
+    (ANSWERS / f"{kind}.json").write_text(f"{text}\n", encoding="utf-8")
     LIBRARIES.write_text(json.dumps(libraries(), indent=1) + "\n", encoding="utf-8")

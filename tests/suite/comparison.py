@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-__all__ = ["Difference", "differences", "worst"]
+__all__ = ["MISSING", "Difference", "differences", "kind_of", "scales", "worst"]
 
 KINDS = {
     "shear": "force",
@@ -31,6 +31,8 @@ SETS = {
 
 MISSING = "(missing)"
 
+Path = tuple[str | int, ...]
+
 
 class Difference(NamedTuple):
     """What differs between two answers.
@@ -48,6 +50,11 @@ class Difference(NamedTuple):
         """Of the fields that it is in."""
         return re.split(r"[.\[]", self.path)
 
+    @property
+    def field(self) -> str:
+        """Path without the places in lists."""
+        return re.sub(r"\[\d+\]", "", self.path).lstrip(".")
+
     def __str__(self) -> str:
         return f"{self.path}: expected {self.expected!r}, got {self.got!r} ({self.size:.1e})"
 
@@ -60,20 +67,22 @@ def differences(expected: Any, got: Any) -> list[Difference]:
     expected, got : dict
         Of `answers.told`.
     """
-    scales: dict[str, float] = defaultdict(lambda: SMALLEST)
-    for path, value in _leaves(expected):
+    return list(_apart(expected, got, (), scales(expected)))
+
+
+def scales(answer: Any) -> dict[str, float]:
+    """Return the largest number of each kind in an answer, `SMALLEST` at least."""
+    largest: dict[str, float] = defaultdict(lambda: SMALLEST)
+    for path, value in _leaves(answer):
         if _is_number(value):
-            kind = _kind(path)
-            scales[kind] = max(scales[kind], abs(value))
-    return list(_apart(expected, got, (), scales))
+            kind = kind_of(path)
+            largest[kind] = max(largest[kind], abs(value))
+    return largest
 
 
 def worst(found: list[Difference]) -> float:
     """Return the size of the largest difference; zero where there is none."""
     return max((each.size for each in found), default=0.0)
-
-
-Path = tuple[str | int, ...]
 
 
 def _apart(expected: Any, got: Any, path: Path, scales: dict[str, float]) -> Iterator[Difference]:
@@ -95,7 +104,7 @@ def _apart(expected: Any, got: Any, path: Path, scales: dict[str, float]) -> Ite
                 yield from _apart(*pair, (*path, i), scales)
     elif _is_number(expected) and _is_number(got):
         if expected != got:
-            size = abs(expected - got) / scales[_kind(path)]
+            size = abs(expected - got) / scales[kind_of(path)]
             yield Difference(_dotted(path), expected, got, size)
     elif type(expected) is not type(got) or expected != got:
         yield Difference(_dotted(path), expected, got, math.inf)
@@ -121,7 +130,7 @@ def _unmatched(
 def _split(row: Any, path: Path, scales: dict[str, float]) -> tuple[tuple[Any, ...], np.ndarray]:
     """Return what a row says in words, with where it says so, and its scaled numbers."""
     leaves = [((*path, *below), value) for below, value in _leaves(row)]
-    numbers = [value / scales[_kind(place)] for place, value in leaves if _is_number(value)]
+    numbers = [value / scales[kind_of(place)] for place, value in leaves if _is_number(value)]
     names = tuple(
         (place[len(path) :], None if _is_number(value) else value) for place, value in leaves
     )
@@ -143,7 +152,8 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _kind(path: Path) -> str:
+def kind_of(path: Path) -> str:
+    """Return the name that a number at a path is measured by."""
     name = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
     return KINDS.get(name, name)
 

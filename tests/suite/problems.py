@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cache
@@ -60,10 +60,11 @@ class Problem:
         ``least``: the least tolerance of any number.
         """
         found = sorted(differences(expected, got), key=lambda each: -each.size)
-        return [each for each in found if not each.size <= max(least, self._allowed(each))]
+        return [each for each in found if not each.size <= max(least, self.allowed(each.names))]
 
-    def _allowed(self, difference: Difference) -> float:
-        sizes = [self.loose[name][0] for name in ("*", *difference.names) if name in self.loose]
+    def allowed(self, names: Iterable[str]) -> float:
+        """Return how far a number in fields of these names may be off, relative to its kind."""
+        sizes = [self.loose[name][0] for name in ("*", *names) if name in self.loose]
         return max([self.tolerance, *(math.inf if size is None else size for size in sizes)])
 
     @property

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.suite.adapter import ask
-from tests.suite.answers import read_answers, told, write_answers
+from tests.suite.answers import read_answers, rounded, told, write_answers
 from tests.suite.comparison import Difference, differences, worst
 from tests.suite.problems import Problem, problems
 
@@ -114,5 +114,5 @@ def record(pattern: str, quick: bool) -> None:
                 news = f"{changes[0].size:.1e}" if before else "new"
                 click.echo(f"{each.label}: {status_of(found)}, {news}")
                 tell(each, changes if before else [])
-                known[each.name] = found
+                known[each.name] = rounded(each, found)
         write_answers(kind, {name: known[name] for name in order if name in known})

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from tests.suite.answers import read_answers, told
-from tests.suite.comparison import differences, worst
+from tests.suite.answers import fields, read_answers, rounded, told
+from tests.suite.comparison import MISSING, differences, worst
 from tests.suite.problems import Problem, problem, problems
 
 TOLERANCE = 1e-9
@@ -153,3 +153,18 @@ def test_problems_are_found_by_name() -> None:
     assert problem(one.label) is one
     assert one.request["stance"]["hands"]
     assert {each.kind for each in problems("holds")} == {"holds"}
+
+
+def test_a_record_has_the_digits_that_are_compared() -> None:
+    strict = Problem("kind", "name", {}, loose={"prices": (None, "tie"), "effort": (1e-4, "flat")})
+    answer = {"wrench": [1234.56789012345, 1e-13], "prices": [1.0], "effort": 0.123456789, "n": 4}
+    kept = rounded(strict, answer)
+    assert kept == {"wrench": [1234.5678901, 0.0], "effort": 0.123457, "n": 4}
+    assert strict.changes(kept, answer) == []
+
+
+def test_fields_are_named_without_places() -> None:
+    answer = {"hands": [{"limb": "a"}, {"palm": {"force": [1.0, 2.0]}}]}
+    assert fields(answer) == {"hands", "hands.limb", "hands.palm", "hands.palm.force"}
+    (found,) = differences({"hands": [{"limb": "a"}]}, {"hands": [{"limb": "a", "new": 1}]})
+    assert (found.expected, found.field) == (MISSING, "hands.new")
