@@ -23,10 +23,13 @@ from planner.prepare.stance_constraints import NOTHING, StanceConstraints
 from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
 from planner.question import Question
 
-__all__ = ["PreparedStance", "assemble", "checked_question", "prepare_stance"]
+__all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
 
 FREE: Final = np.zeros((0, 6))
 """What is given of a hand's wrench where nothing is given of any."""
+
+NO_WRENCH: Final = 1e-9
+"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
 
 NO_AIMS: Final = np.zeros(0)
 """The values of that."""
@@ -72,6 +75,11 @@ class PreparedStance:
         """Limbs whose hands' wrists float."""
         pairs = zip(self.limbs, self.hands.wrists, strict=True)
         return [limb for limb, wrist in pairs if wrist is not None]
+
+    @property
+    def needs_hands(self) -> bool:
+        """Whether anything is asked of the hands."""
+        return bool(np.abs(self.hands.wrench[:6]).max() > NO_WRENCH)
 
     @cached_property
     def at_rest(self) -> Sets:

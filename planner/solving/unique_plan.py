@@ -33,12 +33,10 @@ from planner.programs import (
 )
 from planner.solving import dual_bounds
 from planner.solving.active_set import ApartError, Optimum, Point, Rows, optimum
+from planner.solving.dual_bounds import OPTIMAL, is_least
 from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
-__all__ = ["LeastUtilisation", "active_set_optimum", "is_least", "least_utilisation"]
-
-OPTIMAL: Final = 1e-5
-"""How far, relatively, the utilisation may be above its proven lower bound."""
+__all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
 
 SURE: Final = (1e-6, 1.0)
 """How many times a row's multiplier may be less than its room for the row to be active at first."""
@@ -51,11 +49,6 @@ LARGE: Final = 64
 
 FREE: Final = 1e-6
 """How much more than one the multipliers of limits add up to where u is not free."""
-
-
-def is_least(value: float, bound: float) -> bool:
-    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
-    return value - bound <= OPTIMAL * max(1.0, value)
 
 
 class LeastUtilisation(NamedTuple):
