@@ -10,17 +10,7 @@ import numpy as np
 from hand_models.base import Array
 from planner import deadline
 from planner.programs.conic import LATE, Outcome, Reached
-from planner.programs.program import (
-    Curved,
-    Effort,
-    LessTension,
-    LoadFactor,
-    Margin,
-    Nearest,
-    Reach,
-    TieBreak,
-    Unique,
-)
+from planner.programs.program import Best, Nearest, Reach
 from planner.programs.stance_data import StanceData
 from planner.programs.trade import TensionTrade
 
@@ -53,37 +43,37 @@ SHARP_SLACK: Final = 1e-9
 
 
 def margin(data: StanceData) -> Outcome:
-    """Solve `Margin`."""
-    return Margin(data).solve()
+    """Solve `Best.margin`."""
+    return Best.margin(data).solve()
 
 
 def vertex(data: StanceData) -> Outcome:
-    """Solve `Margin` by the simplex method."""
-    return Margin(data).vertex()
+    """Solve `Best.margin` by the simplex method."""
+    return Best.margin(data).vertex()
 
 
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
-    """Solve `Unique`."""
-    return Unique(data, share).solve()
+    """Solve `Best.unique`."""
+    return Best.unique(data, share).solve()
 
 
 def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
-    """Solve `LessTension`."""
-    return LessTension(data, trade).solve()
+    """Solve `Best.less_tension`."""
+    return Best.less_tension(data, trade).solve()
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-    """Solve `Curved`."""
-    return Curved(data, root, near).solve()
+    """Solve `Best.curved`."""
+    return Best.curved(data, root, near).solve()
 
 
 def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve `TieBreak`."""
-    return TieBreak(data, cap).solve()
+    """Solve `Best.tie_break`."""
+    return Best.tie_break(data, cap).solve()
 
 
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
-    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
+    """Solve `Best.tie_break` at a utilisation that has all its digits, or where needed near it."""
     outcome = LATE
     for slack in (SHARP_SLACK, SLACK):
         outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
@@ -93,13 +83,13 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve `Effort`."""
-    return Effort(data, cap).solve()
+    """Solve `Best.effort`."""
+    return Best.effort(data, cap).solve()
 
 
 def load_factor(data: StanceData) -> Outcome:
-    """Solve `LoadFactor`."""
-    return LoadFactor(data).solve()
+    """Solve `Reach.load_factor`."""
+    return Reach.load_factor(data).solve()
 
 
 def reach(

@@ -20,17 +20,17 @@ class WholeBlocks:
 
     def __init__(self, stances: Sequence[StanceData]) -> None:
         full = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
-        there = _dense(program.Unique(StanceData(full, stances[0].wrench)).conic()) != 0.0
+        there = _dense(program.Best.unique(StanceData(full, stances[0].wrench)).conic()) != 0.0
         columns, rows = np.nonzero(there.T)
         starts = np.searchsorted(columns, np.arange(there.shape[1] + 1))
-        programs = [program.Unique(each).conic() for each in stances]
+        programs = [program.Best.unique(each).conic() for each in stances]
         self._new = [
             {"P": each.P.tolist(), "A": _dense(each)[rows, columns].tolist(), "b": each.b.tolist()}
             for each in programs
         ]
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        for name, value in program.Unique.settings[0].items():
+        for name, value in program.SHARP.items():
             setattr(settings, name, value)
         last = programs[-1]
         A = sp.csc_matrix((_dense(last)[rows, columns], rows, starts), there.shape)

@@ -162,16 +162,16 @@ def test_a_hand_without_a_spine_on_rock_is_not_pulled_for_next_to_nothing():
 
 
 def tensions_of(data) -> np.ndarray:
-    return np.array([y[:4] for y in program.Unique(data).solve().loads])
+    return np.array([y[:4] for y in program.Best.unique(data).solve().loads])
 
 
 @pytest.mark.parametrize("name", ["lighter", "sharp edges, pinched", "long lever"])
 def test_it_is_the_program_that_cvxpy_defines(name):
     question = CASES[name]
     data = program_data(question)
-    least = program.Margin(data).by_definition()[0].value
+    least = program.Best.margin(data).by_definition()[0].value
     trade = tension_trade(least, question.limits.utilisation)
-    defined, _ = program.LessTension(data, trade).by_definition()
+    defined, _ = program.Best.less_tension(data, trade).by_definition()
     mine = {h.limb: [f.tendon_tension for f in h.fingers] for h in plan(question).hands}
     for hand, loads in zip(question.stance.hands, defined.loads, strict=True):
         np.testing.assert_allclose(mine[hand.limb], loads[:4], atol=0.5)
