@@ -2,7 +2,7 @@
 
 Effort is Σ ‖E z + e₀‖² over relative tensions and joint torques. Both are curved in a floating
 wrist's twist, so the search is that of `planner.floating.wrist_iteration` with another goal: on the
-sets about a point `Best.effort` is solved, and steps near the end have the curvature of the
+sets about a point `programs.effort` is solved, and steps near the end have the curvature of the
 Lagrangian,
 
     Σ 2 (E z + e₀) ∂²E/∂z² + λ ∂²L/∂z² + μ ∂²H/∂z² + ν ∂²G/∂z²,

@@ -87,7 +87,7 @@ class ExactMeasure(NamedTuple):
     broken : float
         By how much hard rows are broken at most, scaled; not below zero.
     effort : float
-        What `Best.effort` makes least: the sum of squared relative tensions and joint torques,
+        What `programs.effort` makes least: the sum of squared relative tensions and joint torques,
         and of fixed hands a little of what makes their other loads unique.
     """
 

@@ -83,7 +83,10 @@ class PreparedStance:
     @property
     def at_rest(self) -> Sets:
         """The hands' sets, of floating ones at rest with idle palms, and the programs' data."""
-        return self.hands.sets(self.hands.at_rest(self.hands.idle))
+        hands = self.hands
+        if hands.floating:
+            return hands.sets(hands.at_rest(hands.idle))
+        return Sets(hands.spaces, hands.data)
 
     def turned(self, wrench: Array) -> PreparedStance:
         """Return the same stance for another body wrench, shape (6,) [N, N·m], in B."""

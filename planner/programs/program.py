@@ -34,14 +34,12 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
 from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import REFINED, SHARP, VERTEX, Definition, StanceProgram
-from planner.programs.trade import TensionTrade
 
 __all__ = ["TIE", "UNLIMITED", "Best", "Nearest", "Reach", "tie_weight"]
 
@@ -90,57 +88,6 @@ class Best(StanceProgram):
         if cap is None and weights is not None:
             # beside u the second term is small
             self.settings, self.wanted = (SHARP, REFINED), 1
-
-    @classmethod
-    def margin(cls, data: StanceData) -> Best:
-        """Return the program of the least utilisation; ``value`` is that utilisation."""
-        return cls(data)
-
-    @classmethod
-    def unique(cls, data: StanceData, share: float = 1.0) -> Best:
-        """Return that of the least utilisation made unique in one solve, its ``value``.
-
-        A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
-        ``share``: how much of its weight the second term is given.
-        """
-        return cls(data, weights=tie_weight(len(data.hands)) * share * data.rows.tie)
-
-    @classmethod
-    def less_tension(cls, data: StanceData, trade: TensionTrade) -> Best:
-        """Return that of the plan that is meant, with u ≤ most; ``value`` is its utilisation."""
-        return cls(data, weights=trade.weight * data.rows.tie, most=trade.most)
-
-    @classmethod
-    def curved(cls, data: StanceData, root: Array, near: Sequence[Array]) -> Best:
-        """Return that of least utilisation where sets are curved, or near to loads.
-
-        Parameters
-        ----------
-        data : StanceData
-        root : ndarray, shape (M, M)
-            R, a root of the curvature in all hands' z.
-        near : sequence of ndarray
-            Each hand's y₀.
-        """
-        centre = root @ (np.concatenate(near) / data.rows.unit)
-        return cls(data, residuals=Residuals(root, centre, 0.5))
-
-    @classmethod
-    def tie_break(cls, data: StanceData, cap: float) -> Best:
-        """Return that of least tensions under a cap: which plan is meant of those."""
-        # weights relative to the largest: the minimiser does not change
-        return cls(data, cap=cap, weights=data.rows.tie / data.rows.tie.max())
-
-    @classmethod
-    def effort(cls, data: StanceData, cap: float) -> Best:
-        """Return that of the least sum of squared relative tensions and torques under a cap.
-
-        Small weights make loads unique that are neither: palms, lateral reactions, wrists.
-        """
-        E = scipy.linalg.block_diag(*(hand.E for hand in data.hands))
-        e0 = np.concatenate([hand.e0 for hand in data.hands])
-        rest = np.concatenate([hand.rest for hand in data.hands])
-        return cls(data, cap=cap, weights=rest, residuals=Residuals(E, -e0, 1.0))
 
     def define(self) -> Definition:
         import cvxpy as cp
@@ -192,7 +139,7 @@ class Best(StanceProgram):
 
 
 def tie_weight(hands: int) -> float:
-    """Return what `Best.unique` weighs the sum of squares with: `TIE` over the tendons' number."""
+    """Return what `unique` weighs the sum of squares with: `TIE` over the number of tendons."""
     return TIE / (len(FINGERS) * hands)
 
 

@@ -28,7 +28,7 @@ def is_least(value: float, bound: float) -> bool:
 
 
 def least_bound(data: StanceData, outcome: Outcome) -> float:
-    """Return a lower bound of the least utilisation from the multipliers of `Best.margin`.
+    """Return a lower bound of the least utilisation from the multipliers of `programs.margin`.
 
     With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
     u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
@@ -37,7 +37,7 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
 
 
 def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> float:
-    """Return a lower bound of the least utilisation from the multipliers of `Best.unique`.
+    """Return a lower bound of the least utilisation from the multipliers of `programs.unique`.
 
     Its second term f is convex, so with the plan z₁ and its slope every plan z has
 

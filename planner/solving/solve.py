@@ -136,8 +136,8 @@ def _first_verified(
         if not solution.loads:
             answer: Answer = Failed(solution, solution.no_answer(prepared))
             continue
-        recovered = recover(prepared, checks.result(), solution)
-        answer = verify(prepared, checks.result(), recovered)
+        ready = checks.result()
+        answer = verify(prepared, ready, recover(prepared, ready, solution))
         if not isinstance(answer, Failed):
             break
     return answer

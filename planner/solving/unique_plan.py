@@ -1,14 +1,14 @@
 """The plan that is meant: least utilisation, its proof, and what of it is given away for tension.
 
-An interior-point solver ends near the optimum of `Best.unique`, whose second term is so small
+An interior-point solver ends near the optimum of `programs.unique`, whose second term is so small
 that tensions may be off by newtons while the objective has all its digits. Which rows are active is
 nearly clear by then, and the active-set method (`planner.solving.active_set`) has the last digits.
 Where the rows that were active at another wrench still are, no solver is needed: one system, and
 the signs of its multipliers, prove the plan.
 
-From there to the plan that is meant (`Best.less_tension`), whose second term is larger, the same
-method goes on: mostly the same rows are active, and their multipliers at the larger weight prove
-that the plan stays as it is, for the price of one step. Where it is not, utilisation is given away
+From there to the plan that is meant (`programs.less_tension`), whose second term is larger, the
+same method goes on: mostly the same rows are active, and their multipliers at the larger weight
+prove that the plan stays as it is, for the price of one step. Where it is not, utilisation is given away
 for less tension, up to a most, at which u is fixed.
 """
 
@@ -124,7 +124,7 @@ def _far_beyond(outcome: Outcome) -> bool:
 
 
 class ActiveSetOptimum(NamedTuple):
-    """The optimum of `Best.unique`, exact.
+    """The optimum of `programs.unique`, exact.
 
     Attributes
     ----------
