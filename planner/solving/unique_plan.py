@@ -8,8 +8,8 @@ the signs of its multipliers, prove the plan.
 
 From there to the plan that is meant (`programs.less_tension`), whose second term is larger, the
 same method goes on: mostly the same rows are active, and their multipliers at the larger weight
-prove that the plan stays as it is, for the price of one step. Where it is not, utilisation is given away
-for less tension, up to a most, at which u is fixed.
+prove that the plan stays as it is, for the price of one step. Where it is not, utilisation is
+given away for less tension, up to a most, at which u is fixed.
 """
 
 from __future__ import annotations
