@@ -68,7 +68,7 @@ class Rivals:
         own = [scaled(each.sets) for each in stances]
         plain = [si(each.question, each.sets) for each in stances]
         used = [each.utilisation for each in stances]
-        settings = program.Unique.settings[0]
+        settings = program.SHARP
         self.unique = Clarabel([unique(data) for data in own], settings)
         self.whole = WholeBlocks([each.sets.data for each in stances])
         self.least = Clarabel([least(data) for data in own], stance_program.SETTINGS)

@@ -72,7 +72,7 @@ def test_margin_by_highs(benchmark, hold):
 def test_margin_by_a_solver_set_up_for_each_query(benchmark, hold):
     question = question_of(hold=hold)
     data = program_data(question)
-    found = benchmark(lambda: Solver(program.Margin(data).conic(), SETTINGS).solve())
+    found = benchmark(lambda: Solver(program.Best(data).conic(), SETTINGS).solve())
     assert found.value == pytest.approx(plan(question).utilisation, rel=1e-5)
 
 

@@ -9,8 +9,9 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from planner.programs import HandData, StanceData, program
+from planner.programs import HandData, StanceData, program, unique
 from planner.programs.conic import Columns, ConicProgram
+from tests.suite.helpers.named_programs import program_of
 
 __all__ = ["WholeBlocks"]
 
@@ -20,17 +21,17 @@ class WholeBlocks:
 
     def __init__(self, stances: Sequence[StanceData]) -> None:
         full = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
-        there = _dense(program.Unique(StanceData(full, stances[0].wrench)).conic()) != 0.0
+        there = _dense(program_of(unique, StanceData(full, stances[0].wrench)).conic()) != 0.0
         columns, rows = np.nonzero(there.T)
         starts = np.searchsorted(columns, np.arange(there.shape[1] + 1))
-        programs = [program.Unique(each).conic() for each in stances]
+        programs = [program_of(unique, each).conic() for each in stances]
         self._new = [
             {"P": each.P.tolist(), "A": _dense(each)[rows, columns].tolist(), "b": each.b.tolist()}
             for each in programs
         ]
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        for name, value in program.Unique.settings[0].items():
+        for name, value in program.SHARP.items():
             setattr(settings, name, value)
         last = programs[-1]
         A = sp.csc_matrix((_dense(last)[rows, columns], rows, starts), there.shape)

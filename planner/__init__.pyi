@@ -1,10 +1,5 @@
 from . import deadline as deadline
-from .advice import (
-    HAND_PATH as HAND_PATH,
-    hand_path as hand_path,
-    plan as plan,
-    with_advice as with_advice,
-)
+from .advice import HAND_PATH as HAND_PATH, hand_path as hand_path
 from .capability import (
     COMPONENTS as COMPONENTS,
     OTHERS as OTHERS,
@@ -90,6 +85,8 @@ from .route import (
 )
 from .solving import (
     KnownStance as KnownStance,
+    plan as plan,
+    with_advice as with_advice,
 )
 from .streaming import (
     WrenchStream as WrenchStream,

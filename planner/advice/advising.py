@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from msgspec.structs import replace as changed_struct
 
-from planner import deadline, solving
 from planner.advice.body import BodySearch, can_move
 from planner.advice.changes import Change
 from planner.advice.combinations import CombinationSearch
 from planner.advice.hands import TURNS, WAYS, closings, grasps, lettings, placed
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
-from planner.advice.trials import PLANS, Trials, Tried
-from planner.deadline import DeadlineError, late_sentence
+from planner.advice.trials import PLANS, Attempt, Trial, Trials, Tried
+from planner.deadline import DeadlineError
 from planner.programs import SLACK
 from planner.question import Question
-from planner.result import Advice, Plan
-from planner.solving import Trial
+from planner.result import Advice
 
-__all__ = ["advise", "plan", "with_advice"]
+__all__ = ["advise"]
 
 MOST: Final = 10
 """Advice that is told."""
@@ -47,46 +42,16 @@ NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""
 
 
-def plan(question: Question) -> Plan:
-    """Answer a question as `planner.solving.plan` does, with advice if that is wanted.
-
-    Raises
-    ------
-    InvalidInputError
-        If the question cannot be understood; its ``field`` is relative to the question.
-    DeadlineError
-        If its deadline comes before anything is found that passes the checks.
-    """
-    start = time.perf_counter()
-    with deadline.within(getattr(question, "deadline", None), started=start):
-        answer = solving.plan(question)
-        return with_advice(question, answer) if "advice" in question.want else answer
-
-
-def with_advice(question: Question, answer: Plan) -> Plan:
-    """Return a question's plan with advice; what time was left out is told as ever."""
-    start = time.perf_counter()
-    found, whole = advise(question)
-    seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
-    if not whole and seconds is not None:
-        unfinished = (*unfinished, "advice")
-        warnings = (*warnings, late_sentence(seconds, ["advice"]))
-    total = answer.time.total + time.perf_counter() - start
-    return replace(
-        answer,
-        advice=found,
-        unfinished=unfinished,
-        warnings=warnings,
-        time=changed_struct(answer.time, total=total),
-    )
-
-
-def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], bool]:
+def advise(
+    question: Question, attempt: Attempt, plans: int = PLANS
+) -> tuple[tuple[Advice, ...], bool]:
     """Return what would make a question's stance hold, or hold more.
 
     Parameters
     ----------
     question : Question
+    attempt : callable
+        Plans a stance that is only tried.
     plans : int, optional
         That may be made for it, in all.
 
@@ -98,9 +63,10 @@ def advise(question: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], 
         Whether there was time to try all.
     """
     # what costs least effort is planned again for what is told
-    again = question.objective != "max_margin"
+    plain = question.bare()
+    again = question.objective != plain.objective
     try:
-        trials = Trials(question, plans - MOST - 1 if again else plans)
+        trials = Trials(plain, attempt, plans - MOST - 1 if again else plans)
     except DeadlineError:
         return (), False
     whole, told = True, []
@@ -146,7 +112,7 @@ def _try_all(trials: Trials) -> None:
 
 def _order(trials: Trials) -> list[int]:
     """Return the hands' indices, those first whose limits weigh most."""
-    duals, limbs = trials.base.found.outcome.limit_duals, trials.base.prepared.limbs
+    duals, limbs = trials.base.outcome.limit_duals, trials.base.prepared.limbs
     weights = [-round(float(np.sum(each)), 6) for each in duals] or [0.0] * len(limbs)
     return sorted(range(len(limbs)), key=lambda i: (weights[i], limbs[i]))
 

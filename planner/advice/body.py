@@ -26,12 +26,11 @@ import scipy
 from hand_models.base import Array, Pose, turns_about
 from planner import programs
 from planner.advice.changes import Change, pose_message
-from planner.advice.trials import WORSE, Trials, direction
+from planner.advice.trials import WORSE, Trial, Trials, direction
 from planner.prepare import PreparedStance
 from planner.programs import WRENCH_UNIT
 from planner.result import Distance
 from planner.scene import body_clearance, scene_of
-from planner.solving import Trial
 
 __all__ = ["SHIFT_UNIT", "BodySearch", "can_move", "slope"]
 
@@ -198,13 +197,13 @@ class BodySearch:
         self._keep(shift, self.trials.turned(self.prepared, wrench))
 
     def _keep(self, shift: Array, trial: Trial) -> None:
-        outcome = trial.found.outcome
+        outcome = trial.outcome
         if outcome.solved and math.isfinite(trial.utilisation):
             self._known.append((shift, trial.utilisation))
             grows = slope(trial)
             self._cuts.append(_Cut(grows, outcome.value - float(grows @ shift)))
             return
-        data = trial.found.sets.data
+        data = trial.data
         nearest = programs.nearest(data)
         if nearest.solved:
             # w of the hands has n · (w − nearest) ≤ 0

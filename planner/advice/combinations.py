@@ -28,11 +28,10 @@ from planner.advice.body import SHIFT_UNIT, BodySearch, can_move
 from planner.advice.changes import Change, changed, combined
 from planner.advice.hands import lettings, variants
 from planner.advice.new_holds import APART, every_hold
-from planner.advice.trials import TRIED, Trials, direction
+from planner.advice.trials import TRIED, Trial, Trials, direction
 from planner.prepare import settle_each
 from planner.programs import Support
 from planner.question import HandOnHold
-from planner.solving import Trial
 
 __all__ = ["Choice", "CombinationSearch", "Known"]
 

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from planner import deadline, programs
 from planner.advice.changes import Change, changed
+from planner.explanation import LimitUse, scene_findings
 from planner.prepare import PreparedStance, prepare_stance, settle_each
-from planner.programs import SLACK, WRENCH_UNIT
-from planner.question import Objective, Question
+from planner.programs import SLACK, WRENCH_UNIT, Outcome, StanceData
+from planner.question import Objective, OwnObjective, Question
+from planner.result import LoadFactor
 from planner.scene import body_clearance, scene_of
-from planner.solving import Trial, scene_findings, try_stance
 
-__all__ = ["PLANS", "TRIED", "WITHOUT", "WORSE", "Trials", "Tried", "direction"]
+__all__ = [
+    "PLANS",
+    "TRIED",
+    "WITHOUT",
+    "WORSE",
+    "Attempt",
+    "Trial",
+    "Trials",
+    "Tried",
+    "direction",
+]
 
 PLANS: Final = 100
 """That are made for the advice about a question."""
@@ -32,6 +43,41 @@ WORSE: Final = 1e-3
 
 TRIED: Final = "all changes were tried"
 """What a deadline came before."""
+
+
+class Trial(NamedTuple):
+    """What came of a stance that was tried.
+
+    Attributes
+    ----------
+    prepared : PreparedStance
+    data : StanceData
+        Of its hands, about its plan.
+    outcome : Outcome
+        Of the program of least utilisation.
+    utilisation : float
+        The largest of the verified plan; infinite without one.
+    load_factor : callable
+        Finds how many times the body wrench could be held.
+    """
+
+    prepared: PreparedStance
+    data: StanceData
+    outcome: Outcome
+    utilisation: float
+    load_factor: Callable[[], LoadFactor]
+
+
+class Attempt(Protocol):
+    """Plans a stance that is only tried; see `planner.solving.try_stance`."""
+
+    def __call__(
+        self,
+        prepared: PreparedStance,
+        idle: Sequence[LimitUse] | None = None,
+        near: Any | None = None,
+    ) -> Trial:
+        """Return what came of a stance."""
 
 
 class Tried(NamedTuple):
@@ -53,13 +99,15 @@ class Trials:
     Parameters
     ----------
     question : Question
+        As it is tried: `Question.bare`.
+    attempt : callable
+        Plans a stance.
     plans : int, optional
         How many may be made.
 
     Attributes
     ----------
     question : Question
-        As it is tried: for the least utilisation, without extras.
     base : Trial
         The question as it is.
     left : int
@@ -73,12 +121,10 @@ class Trials:
         By all that plans, if the time is over.
     """
 
-    def __init__(self, question: Question, plans: int = PLANS) -> None:
+    def __init__(self, question: Question, attempt: Attempt, plans: int = PLANS) -> None:
         self.left = plans
         self.found: list[Tried] = []
-        self.question = replace(
-            question, want=frozenset(), draws=None, deadline=None, objective="max_margin"
-        )
+        self.question, self._attempt = question, attempt
         self.base = self._try(prepare_stance(self.question))
         self._odd = _odd(self.base.prepared)
 
@@ -139,7 +185,7 @@ class Trials:
         """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
         return self._try(prepared.turned(wrench))
 
-    def again(self, question: Question, objective: Objective) -> Trial:
+    def again(self, question: Question, objective: Objective | OwnObjective) -> Trial:
         """Plan what was tried for another objective."""
         return self._try(prepare_stance(replace(question, objective=objective)))
 
@@ -159,14 +205,14 @@ class Trials:
     def _try(self, prepared: PreparedStance) -> Trial:
         deadline.check(TRIED)
         self.left -= 1
-        trial = try_stance(prepared)
+        trial = self._attempt(prepared)
         deadline.check(TRIED)
         return trial
 
 
 def direction(trial: Trial) -> Array | None:
     """Return the body wrenches' direction in which a stance lacks most, shape (6,), if known."""
-    outcome, data = trial.found.outcome, trial.found.sets.data
+    outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:
         return np.asarray(-outcome.balance_dual[:6] / WRENCH_UNIT)
     nearest = programs.nearest(data)

@@ -79,9 +79,7 @@ class BodyPrograms:
     """
 
     def __init__(self, question: Question) -> None:
-        self.question = replace(
-            question, want=frozenset(), draws=None, objective="max_margin", deadline=None
-        )
+        self.question = question.bare()
         self.plan = plan(self.question)
         where = None if self.plan.joints is None else posture_at(question, self.plan.joints)
         _, self._hands = assemble(self.question, where, self.plan.body_wrench)

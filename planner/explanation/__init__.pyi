@@ -33,5 +33,6 @@ from .sentences import (
 from .stance_warnings import (
     joint_sentences as joint_sentences,
     off_sentences as off_sentences,
+    scene_findings as scene_findings,
     warnings as warnings,
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import accumulate, chain
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -164,16 +163,11 @@ Named = tuple[tuple[LimitName, ...], Indices]
 @lru_cache(maxsize=KEPT_NAMES)
 def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> Named:
     """Return the limits of hands of limbs by the rows of their sets."""
-    hands = [_named_alone(rows, limb) for rows, limb in zip(sets, limbs, strict=True)]
-    offsets = accumulate((len(names) for names, _ in hands), initial=0)
-    return (
-        tuple(chain.from_iterable(names for names, _ in hands)),
-        np.concatenate([of_row + at for (_, of_row), at in zip(hands, offsets, strict=False)]),
-    )
-
-
-@lru_cache(maxsize=KEPT_NAMES)
-def _named_alone(rows: tuple[Row, ...], limb: str) -> Named:
-    names = [limit_name(limb, row) for row in rows if row.kind == "limit"]
+    names = [
+        limit_name(limb, row)
+        for rows, limb in zip(sets, limbs, strict=True)
+        for row in rows
+        if row.kind == "limit"
+    ]
     index = {name: i for i, name in enumerate(dict.fromkeys(names))}
     return tuple(index), np.array([index[name] for name in names], dtype=np.intp)

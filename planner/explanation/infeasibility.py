@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -63,6 +62,14 @@ class HardRowSystem:
     names : tuple of LimitName, length n
     given : tuple of LimitName, length nb − 6
         Whose given wrench each further row of the balance is.
+    goal : ndarray, shape (nb,)
+        What G z is to be.
+    constraints : tuple of LimitName
+        Every name once.
+    owners : ndarray of int, shape (n + nb − 6,)
+        Which constraint each hard row is, and then each further row of the balance.
+    program : FarkasProgram
+        What finds multipliers that prove.
     """
 
     G: Array
@@ -73,30 +80,25 @@ class HardRowSystem:
     names: tuple[LimitName, ...]
     given: tuple[LimitName, ...]
 
-    @property
-    def goal(self) -> Array:
-        """What G z is to be, shape (nb,)."""
-        return np.asarray(self.wrench - self.g)
+    goal: Array = field(init=False)
+    constraints: tuple[LimitName, ...] = field(init=False)
+    owners: Indices = field(init=False)
+    program: FarkasProgram = field(init=False)
+    _places: dict[LimitName, int] = field(init=False)
 
-    @cached_property
-    def constraints(self) -> tuple[LimitName, ...]:
-        """Every name once."""
-        return tuple(self._places)
-
-    @cached_property
-    def owners(self) -> Indices:
-        """Which constraint each hard row is, and then each further row of the balance."""
-        places = self._places
-        return np.array([places[name] for name in (*self.names, *self.given)], dtype=np.intp)
-
-    @cached_property
-    def _places(self) -> dict[LimitName, int]:
-        return {name: i for i, name in enumerate(dict.fromkeys((*self.names, *self.given)))}
-
-    @cached_property
-    def program(self) -> FarkasProgram:
-        """What finds multipliers that prove."""
-        return FarkasProgram(self.G, self.goal, self.H, self.h)
+    def __post_init__(self) -> None:
+        names = (*self.names, *self.given)
+        places = {name: i for i, name in enumerate(dict.fromkeys(names))}
+        goal = np.asarray(self.wrench - self.g)
+        made = {
+            "goal": goal,
+            "constraints": tuple(places),
+            "owners": np.array([places[name] for name in names], dtype=np.intp),
+            "program": FarkasProgram(self.G, goal, self.H, self.h),
+            "_places": places,
+        }
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
 
     def rows_of(
         self, constraints: Iterable[LimitName], *, balance: bool = True

@@ -8,10 +8,12 @@ from typing import Final
 import numpy as np
 
 from hand_models.hand import FINGERS, SettledHand
-from planner.prepare import HandBatch, Posture
+from planner.prepare import HandBatch, Posture, PreparedStance
 from planner.question import Question, Stance
+from planner.result import Finding
+from planner.scene import findings, link_findings, scene_of
 
-__all__ = ["joint_sentences", "off_sentences", "warnings"]
+__all__ = ["joint_sentences", "off_sentences", "scene_findings", "warnings"]
 
 SWINGS: Final = 1e-3
 """Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
@@ -46,6 +48,19 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     for i in sorted(first.values()):
         found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
     return tuple(found)
+
+
+def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
+    """Return what is odd about a stance as a scene, and about its links where joints are known.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
+    """
+    scene, where = scene_of(prepared.question.stance, prepared.batch.hands), prepared.where
+    odd = findings(scene)
+    return odd if where is None else (*odd, *link_findings(scene, where.angles))
 
 
 def off_sentences(where: Posture | None) -> tuple[str, ...]:

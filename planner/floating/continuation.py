@@ -19,10 +19,10 @@ from planner import deadline
 from planner.deadline import Budget
 from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
-from planner.prepare import HandSets
+from planner.prepare import NO_WRENCH, HandSets
 from planner.programs import SLACK
 
-__all__ = ["NO_WRENCH", "PROGRAMS", "LargestFactor", "least_use", "most_load"]
+__all__ = ["PROGRAMS", "LargestFactor", "least_use", "most_load"]
 
 PROGRAMS: Final = 320
 """How many programs a question may cost, so that four floating hands cost some ten seconds at most.
@@ -36,9 +36,6 @@ ALONG: Final = 190
 
 LAST: Final = 50
 """How many a plan may cost to try its palms the other way."""
-
-NO_WRENCH: Final = 1e-9
-"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
 
 FACTORS: Final = 10
 """Most factors of the body wrench that are tried on one way."""

@@ -2,7 +2,7 @@
 
 Effort is Σ ‖E z + e₀‖² over relative tensions and joint torques. Both are curved in a floating
 wrist's twist, so the search is that of `planner.floating.wrist_iteration` with another goal: on the
-sets about a point `program.Effort` is solved, and steps near the end have the curvature of the
+sets about a point `programs.effort` is solved, and steps near the end have the curvature of the
 Lagrangian,
 
     Σ 2 (E z + e₀) ∂²E/∂z² + λ ∂²L/∂z² + μ ∂²H/∂z² + ν ∂²G/∂z²,
@@ -14,7 +14,7 @@ of the sets about it, or else unproven.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -30,7 +30,7 @@ from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import SLACK, TWIST_UNIT, Outcome, StanceData
 
-__all__ = ["LeastEffort", "least_effort", "with_room"]
+__all__ = ["LeastEffort", "best_within", "with_room"]
 
 NEAR: Final = 2e-4
 """Weight with which rounds stay near the point, for one unit of z: what an effort may be below
@@ -127,8 +127,14 @@ def with_room(cap: float, used: float) -> float:
     return max(cap, min(used + 0.5 * SLACK, cap + SLACK - OVER))
 
 
-def least_effort(hands: HandSets, plan: WristSolution, cap: float, budget: Budget) -> WristSolution:
-    """Return the plan of least effort that is found down from a plan within a cap.
+def best_within(
+    hands: HandSets,
+    plan: WristSolution,
+    cap: float,
+    goal: Callable[[float, Sequence[Array]], Goal],
+    budget: Budget,
+) -> WristSolution:
+    """Return the best plan for a goal that is found down from a plan within a cap.
 
     Wrists stay within `FARTHEST` of rest, or where the plan has them. If nothing is better, the
     plan itself is returned, without proof.
@@ -140,17 +146,19 @@ def least_effort(hands: HandSets, plan: WristSolution, cap: float, budget: Budge
         Within the cap.
     cap : float
         On the utilisation.
+    goal : callable
+        Returns the goal at a cap, with how far from rest each wrist may be.
     budget : Budget
     """
     away = [
         np.maximum(FARTHEST * TWIST_UNIT, np.abs(y)) if wrist is not None else y
         for wrist, y in zip(hands.wrists, plan.point.loads, strict=True)
     ]
-    goal = LeastEffort(cap, away)
+    least = goal(cap, away)
     budget = budget.part(PROGRAMS)
-    found = solve_wrists(hands, plan.point, budget, goal=goal)
-    if not found.exact or found.measure.effort > plan.measure.effort:
-        sets = hands.sets(plan.point, 1.0, goal.farthest)
-        return replace(plan, found="unproven", sets=sets, outcome=goal.solve(sets.data))
-    found = exchanged(hands, found, budget, goal)
+    found = solve_wrists(hands, plan.point, budget, goal=least)
+    if not found.exact or least.value(found.measure) > least.value(plan.measure):
+        sets = hands.sets(plan.point, 1.0, least.farthest)
+        return replace(plan, found="unproven", sets=sets, outcome=least.solve(sets.data))
+    found = exchanged(hands, found, budget, least)
     return replace(found, rounds=plan.rounds + found.rounds)

@@ -25,6 +25,7 @@ from .joint_posture import (
     torque_limits as torque_limits,
 )
 from .prepared_stance import (
+    NO_WRENCH as NO_WRENCH,
     PreparedStance as PreparedStance,
     assemble as assemble,
     checked_question as checked_question,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -246,18 +246,18 @@ class HandBatch:
             np.array(limits),
         )
 
-    @cached_property
+    @property
     def closing_tensions(self) -> tuple[float, ...]:
         """With which the hands were closed [N]."""
         return tuple([hand.closing_tension for hand in self.hands])
 
-    @cached_property
+    @property
     def friction(self) -> Array:
         """Of each tile's surface, shape (T,)."""
         each = np.array([hand.surface.friction for hand in self.hands])
         return each[self.places.hand]
 
-    @cached_property
+    @property
     def stops(self) -> NDArray[np.int8]:
         """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -88,7 +87,7 @@ class ExactMeasure(NamedTuple):
     broken : float
         By how much hard rows are broken at most, scaled; not below zero.
     effort : float
-        What `program.Effort` makes least: the sum of squared relative tensions and joint torques,
+        What `programs.effort` makes least: the sum of squared relative tensions and joint torques,
         and of fixed hands a little of what makes their other loads unique.
     """
 
@@ -151,6 +150,8 @@ class HandSets:
         What the stance adds to each hand's set; `spaces` have it already. Joints and their
         Jacobians are those at which the hand rests: a floating wrist that gives way by a
         millimetre or some ten milliradians hardly moves them.
+    data : StanceData
+        Of hands with a fixed wrist; of floating ones a place to fill.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -160,6 +161,7 @@ class HandSets:
     wrench: Array
     held: tuple[Array, ...]
     added: tuple[StanceConstraints, ...]
+    data: StanceData
 
     @property
     def floating(self) -> bool:
@@ -171,22 +173,26 @@ class HandSets:
         """Whether sets are of this stance alone; see `are_own`."""
         return are_own(self.wrists, self.added)
 
-    @cached_property
-    def _fixed(self) -> StanceData:
-        """Data of hands with a fixed wrist; of floating ones a place to fill."""
-        return StanceData(hands_data(self.scaled, self.transports, self.held), self.wrench)
-
-    def with_sets(self, spaces: Sequence[WrenchSpace]) -> HandSets:
-        """Return the same stance with other sets of its hands."""
-        return replace(self, spaces=tuple(spaces), scaled=scaled_rows(spaces))
+    def with_sets(
+        self,
+        spaces: Sequence[WrenchSpace],
+        scaled: tuple[ScaledRows, ...] | None = None,
+        wrists: tuple[FloatingWrist | None, ...] | None = None,
+    ) -> HandSets:
+        """Return the same stance with other sets of its hands; with their rows and wrists, too."""
+        rows = scaled_rows(spaces) if scaled is None else scaled
+        return replace(
+            self,
+            spaces=tuple(spaces),
+            scaled=rows,
+            wrists=self.wrists if wrists is None else wrists,
+            data=StanceData(hands_data(rows, self.transports, self.held), self.wrench),
+        )
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
-        aims = self.wrench[len(wrench) :]
-        other = replace(self, wrench=np.concatenate([wrench / programs.WRENCH_UNIT, aims]))
-        # the same rows, too
-        other.__dict__["_fixed"] = self._fixed.turned(other.wrench)
-        return other
+        needed = np.concatenate([wrench / programs.WRENCH_UNIT, self.wrench[len(wrench) :]])
+        return replace(self, wrench=needed, data=self.data.turned(needed))
 
     @property
     def idle(self) -> tuple[PalmMode | None, ...]:
@@ -215,9 +221,11 @@ class HandSets:
             With a range, how far from rest each wrist's twist may be [m, rad].
         """
         if not self.floating:
-            return Sets(self.spaces, self._fixed.turned(self.goal(point.factor)))
+            whole = point.factor == 1.0
+            data = self.data if whole else self.data.turned(self.goal(point.factor))
+            return Sets(self.spaces, data)
         reach = None if within is None else within * TWIST_UNIT
-        spaces, data = list(self.spaces), list(self._fixed.hands)
+        spaces, parts = list(self.spaces), list(self.data.hands)
         for i, (wrist, y, palm) in enumerate(
             zip(self.wrists, point.loads, point.palms, strict=True)
         ):
@@ -225,8 +233,8 @@ class HandSets:
                 space = wrist.linearised(y, palm, reach)
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
-                spaces[i], data[i] = self._floating_hand(i, space)
-        return Sets(tuple(spaces), StanceData(tuple(data), self.goal(point.factor)))
+                spaces[i], parts[i] = self._floating_hand(i, space)
+        return Sets(tuple(spaces), StanceData(tuple(parts), self.goal(point.factor)))
 
     def _floating_hand(self, i: int, space: WrenchSpace) -> tuple[WrenchSpace, HandData]:
         """Return the set of a floating hand with what the stance adds, and its data."""

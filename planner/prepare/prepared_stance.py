@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -20,13 +19,16 @@ from planner.prepare.hand_sets import HandSets, Sets, are_own, wrists_at
 from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
-from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
+from planner.programs import WRENCH_UNIT, ScaledRows, StanceData, hands_data, scaled_rows
 from planner.question import Question
 
-__all__ = ["PreparedStance", "assemble", "checked_question", "prepare_stance"]
+__all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
 
 FREE: Final = np.zeros((0, 6))
 """What is given of a hand's wrench where nothing is given of any."""
+
+NO_WRENCH: Final = 1e-9
+"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
 
 NO_AIMS: Final = np.zeros(0)
 """The values of that."""
@@ -73,10 +75,18 @@ class PreparedStance:
         pairs = zip(self.limbs, self.hands.wrists, strict=True)
         return [limb for limb, wrist in pairs if wrist is not None]
 
-    @cached_property
+    @property
+    def needs_hands(self) -> bool:
+        """Whether anything is asked of the hands."""
+        return bool(np.abs(self.hands.wrench[:6]).max() > NO_WRENCH)
+
+    @property
     def at_rest(self) -> Sets:
         """The hands' sets, of floating ones at rest with idle palms, and the programs' data."""
-        return self.hands.sets(self.hands.at_rest(self.hands.idle))
+        hands = self.hands
+        if hands.floating:
+            return hands.sets(hands.at_rest(hands.idle))
+        return Sets(hands.spaces, hands.data)
 
     def turned(self, wrench: Array) -> PreparedStance:
         """Return the same stance for another body wrench, shape (6,) [N, N·m], in B."""
@@ -95,7 +105,7 @@ class PreparedStance:
         stance, cap = self.question.stance, self.question.limits.tendon_tension
         wrists = wrists_at(stance, settled, cap)
         spaces, scaled = _sets_of(settled, wrists, self.hands.added, cap)
-        hands = replace(self.hands, spaces=spaces, scaled=scaled, wrists=wrists)
+        hands = self.hands.with_sets(spaces, scaled, wrists)
         return replace(self, batch=HandBatch.of(settled), hands=hands)
 
 
@@ -150,16 +160,10 @@ def assemble(
     own = are_own(wrists, added)
     batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)
     held, aims = _held(question)
-    hands = HandSets(
-        spaces=spaces,
-        scaled=scaled,
-        wrists=wrists,
-        transports=wrench_transports(stance.body, [hand.pose for hand in stance.hands]),
-        wrench=np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT,
-        held=held,
-        added=added,
-    )
-    return batch, hands
+    transports = wrench_transports(stance.body, [hand.pose for hand in stance.hands])
+    needed = np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT
+    data = StanceData(hands_data(scaled, transports, held), needed)
+    return batch, HandSets(spaces, scaled, wrists, transports, needed, held, added, data)
 
 
 def _sets_of(

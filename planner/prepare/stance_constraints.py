@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import compress
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,25 +142,26 @@ class StanceConstraints:
         Limit rows are ``D w + d0 ≤ u s`` of the hand's wrench w, hard rows ``C w ≤ 0`` or of its
         tensions.
         """
-        limits: tuple[Row, ...] = ()
-        hard: tuple[Row, ...] = ()
         D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
         H, h = [space.H], [space.h]
+        names = _Names()
         if self.joints is not None:
             joints, passive = self.joints.driven, self.joints.passive
-            limits += _joint_names(joints.names, tuple(joints.sliding.tolist()))
+            sliding = tuple(joints.sliding.tolist())
+            names = names._replace(driven=joints.names, sliding=sliding, passive=passive.names)
             D += [joints.jacobian.T, -joints.jacobian.T]
             d0 += [joints.gravity, -joints.gravity]
             s += [joints.limits, joints.limits]
-            hard += _passive_names(passive.names)
             C, c0 = passive.jacobian.T @ space.generators, passive.torques(space.origin)
             H += [C, -C]
             h += [-c0, c0]
         if self.cap is not None:
-            names, directions, most = self._cap()
+            ways, directions, most = self._cap()
             bounded, closed = np.isfinite(most) & (most > 0.0), most == 0.0
-            limits += _cap_names(names, "limit", tuple(bounded.tolist()))
-            hard += _cap_names(names, "hard", tuple(closed.tolist()))
+            names = names._replace(
+                capped=tuple(compress(ways, bounded.tolist())),
+                barred=tuple(compress(ways, closed.tolist())),
+            )
             forces = np.hstack([directions, np.zeros_like(directions)])
             D.append(forces[bounded])
             d0.append(np.zeros(len(most[bounded])))
@@ -169,12 +170,12 @@ class StanceConstraints:
             H.append(C @ space.generators)
             h.append(-(C @ space.origin))
         if self.present is not None and math.isfinite(self.change):
-            hard += CHANGE_ROWS
+            names = names._replace(changes=True)
             columns = np.repeat([space.columns.index(f"{finger}/tension") for finger in FINGERS], 2)
             signs = np.tile([1.0, -1.0], len(FINGERS))
             H.append(signs[:, None] * np.eye(len(space.columns))[columns])
             h.append(self.change + signs * np.repeat(self.present, 2))
-        if not limits + hard:
+        if not any(names):
             return space
         # wrench rows stay last among the limit rows
         apart, added = len(space.s) - len(space.D), np.concatenate(D)
@@ -183,7 +184,7 @@ class StanceConstraints:
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,
-            rows=_joined(space.rows, apart, limits, hard),
+            rows=_rows_with(space.rows, apart, names),
             L=np.concatenate([space.L[:apart], added @ space.generators, space.L[apart:]]),
             l0=np.concatenate([space.l0[:apart], l0, space.l0[apart:]]),
             s=np.concatenate([space.s[:apart], *s, space.s[apart:]]),
@@ -205,37 +206,44 @@ NOTHING: Final = StanceConstraints()
 """No rows."""
 
 
+class _Names(NamedTuple):
+    """Names of what a stance adds to a hand's set.
+
+    Attributes
+    ----------
+    driven, passive : tuple of str
+        Joints with a motor and without.
+    sliding : tuple of bool
+        Of those with one.
+    capped, barred : tuple of str
+        Directions in which the hand's force is capped, and in which there may be none.
+    changes : bool
+        Whether tensions stay near the present ones.
+    """
+
+    driven: tuple[str, ...] = ()
+    sliding: tuple[bool, ...] = ()
+    passive: tuple[str, ...] = ()
+    capped: tuple[str, ...] = ()
+    barred: tuple[str, ...] = ()
+    changes: bool = False
+
+
 @lru_cache(maxsize=KEPT)
-def _joined(
-    names: tuple[Row, ...], apart: int, limits: tuple[Row, ...], hard: tuple[Row, ...]
-) -> tuple[Row, ...]:
+def _rows_with(rows: tuple[Row, ...], apart: int, names: _Names) -> tuple[Row, ...]:
     """Return the names of a set's rows with further limit rows, after so many, and hard rows."""
-    return (*names[:apart], *limits, *names[apart:], *hard)
-
-
-@lru_cache(maxsize=KEPT)
-def _joint_names(joints: tuple[str, ...], sliding: tuple[bool, ...]) -> tuple[Row, ...]:
-    kinds = [JOINT_FORCE if slides else JOINT_TORQUE for slides in sliding]
-    return tuple(
+    kinds = [JOINT_FORCE if slides else JOINT_TORQUE for slides in names.sliding]
+    limits = [
         Row(None, None, kind, "limit", f"{kind}/{name}{sign}", name)
         for sign in "+-"
-        for name, kind in zip(joints, kinds, strict=True)
-    )
-
-
-@lru_cache(maxsize=KEPT)
-def _passive_names(joints: tuple[str, ...]) -> tuple[Row, ...]:
-    return tuple(
+        for name, kind in zip(names.driven, kinds, strict=True)
+    ]
+    limits += [Row(None, None, FORCE_CAP, "limit", f"{FORCE_CAP}/{way}") for way in names.capped]
+    hard = [
         Row(None, None, PASSIVE_JOINT, "hard", f"{PASSIVE_JOINT}/{name}{sign}", name)
         for sign in "+-"
-        for name in joints
-    )
-
-
-@lru_cache(maxsize=KEPT)
-def _cap_names(
-    names: tuple[str, ...], kind: Literal["limit", "hard"], there: tuple[bool, ...]
-) -> tuple[Row, ...]:
-    return tuple(
-        Row(None, None, FORCE_CAP, kind, f"{FORCE_CAP}/{name}") for name in compress(names, there)
-    )
+        for name in names.passive
+    ]
+    hard += [Row(None, None, FORCE_CAP, "hard", f"{FORCE_CAP}/{way}") for way in names.barred]
+    changes = CHANGE_ROWS if names.changes else ()
+    return (*rows[:apart], *limits, *rows[apart:], *hard, *changes)

@@ -6,21 +6,12 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import scipy
 
 from hand_models.base import Array
 from planner import deadline
 from planner.programs.conic import LATE, Outcome, Reached
-from planner.programs.program import (
-    Curved,
-    Effort,
-    LessTension,
-    LoadFactor,
-    Margin,
-    Nearest,
-    Reach,
-    TieBreak,
-    Unique,
-)
+from planner.programs.program import Best, Nearest, Reach, Residuals, tie_weight
 from planner.programs.stance_data import StanceData
 from planner.programs.trade import TensionTrade
 
@@ -53,37 +44,52 @@ SHARP_SLACK: Final = 1e-9
 
 
 def margin(data: StanceData) -> Outcome:
-    """Solve `Margin`."""
-    return Margin(data).solve()
+    """Solve for the least utilisation; ``value`` is that utilisation."""
+    return Best(data).solve()
 
 
 def vertex(data: StanceData) -> Outcome:
-    """Solve `Margin` by the simplex method."""
-    return Margin(data).vertex()
+    """Solve `margin` by the simplex method."""
+    return Best(data).vertex()
 
 
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
-    """Solve `Unique`."""
-    return Unique(data, share).solve()
+    """Solve for the least utilisation, made unique in one solve; ``value`` is that utilisation.
+
+    A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
+    ``share``: how much of its weight the second term is given.
+    """
+    return Best(data, weights=tie_weight(len(data.hands)) * share * data.rows.tie).solve()
 
 
 def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
-    """Solve `LessTension`."""
-    return LessTension(data, trade).solve()
+    """Solve for the plan that is meant, u at most ``trade.most``; ``value`` is its utilisation."""
+    return Best(data, weights=trade.weight * data.rows.tie, most=trade.most).solve()
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-    """Solve `Curved`."""
-    return Curved(data, root, near).solve()
+    """Solve for the least utilisation where sets are curved, or near to loads.
+
+    Parameters
+    ----------
+    data : StanceData
+    root : ndarray, shape (M, M)
+        R, a root of the curvature in all hands' z.
+    near : sequence of ndarray
+        Each hand's y₀.
+    """
+    centre = root @ (np.concatenate(near) / data.rows.unit)
+    return Best(data, residuals=Residuals(root, centre, 0.5)).solve()
 
 
 def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve `TieBreak`."""
-    return TieBreak(data, cap).solve()
+    """Solve for the least tensions under a cap: which plan is meant of those."""
+    # weights relative to the largest: the minimiser does not change
+    return Best(data, cap=cap, weights=data.rows.tie / data.rows.tie.max()).solve()
 
 
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
-    """Solve `TieBreak` at a utilisation that has all its digits, or where needed near it."""
+    """Solve `tie_break` at a utilisation that has all its digits, or where needed near it."""
     outcome = LATE
     for slack in (SHARP_SLACK, SLACK):
         outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
@@ -93,13 +99,19 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve `Effort`."""
-    return Effort(data, cap).solve()
+    """Solve for the least sum of squared relative tensions and torques under a cap.
+
+    Small weights make loads unique that are neither: palms, lateral reactions, wrists.
+    """
+    E = scipy.linalg.block_diag(*(hand.E for hand in data.hands))
+    e0 = np.concatenate([hand.e0 for hand in data.hands])
+    rest = np.concatenate([hand.rest for hand in data.hands])
+    return Best(data, cap=cap, weights=rest, residuals=Residuals(E, -e0, 1.0)).solve()
 
 
 def load_factor(data: StanceData) -> Outcome:
-    """Solve `LoadFactor`."""
-    return LoadFactor(data).solve()
+    """Solve for how many times the body wrench, not zero, could be held at utilisation 1."""
+    return Reach.load_factor(data).solve()
 
 
 def reach(

@@ -364,7 +364,7 @@ class StanceData:
     hands: tuple[HandData, ...]
     wrench: Array
 
-    @cached_property
+    @property
     def offset(self) -> Array:
         """What the loads' part of the balance is to give, W − Σ g, shape (nb,)."""
         return np.asarray(self.wrench - sum(hand.g for hand in self.hands))

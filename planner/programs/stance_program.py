@@ -12,7 +12,7 @@ import threading
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -110,7 +110,7 @@ class StanceProgram(ABC):
         M.
     """
 
-    settings: ClassVar[Sequence[Mapping[str, Any]]] = (SETTINGS, REFINED)
+    settings: Sequence[Mapping[str, Any]] = (SETTINGS, REFINED)
     wanted: int = 0
     """How many of the variables before the loads are wanted."""
 

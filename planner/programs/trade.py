@@ -13,13 +13,21 @@ one of least Σ (tension / maximum)². No plan within u* + r has a sum that is l
 
 from __future__ import annotations
 
-from functools import cache
 from importlib import resources
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 
 __all__ = ["TensionTrade", "tension_trade"]
+
+_PLANS = resources.files("planner.parameters").joinpath("plans.toml")
+_TABLE = ParameterTable.read(_PLANS.read_text("utf-8"), _PLANS.name)
+
+GIVEN_AWAY: Final = _TABLE.positive("tension", "given_away")
+"""Part of the least utilisation that a plan gives away at most."""
+
+WEIGHT: Final = _TABLE.positive("tension", "weight")
+"""w"""
 
 
 class TensionTrade(NamedTuple):
@@ -50,13 +58,5 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
     cap : float
         On the utilisation, that the question asks for.
     """
-    given_away, weight = _numbers()
-    whole = given_away * abs(least)
-    return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
-
-
-@cache
-def _numbers() -> tuple[float, float]:
-    text = resources.files("planner.parameters").joinpath("plans.toml").read_text("utf-8")
-    table = ParameterTable.read(text, "plans.toml")
-    return table.positive("tension", "given_away"), table.positive("tension", "weight")
+    whole = GIVEN_AWAY * abs(least)
+    return TensionTrade(WEIGHT, least + max(min(whole, cap - least), 0.0), whole)

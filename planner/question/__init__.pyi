@@ -10,6 +10,7 @@ from .question import (
     ForceCap as ForceCap,
     Limits as Limits,
     Objective as Objective,
+    OwnObjective as OwnObjective,
     Question as Question,
     Want as Want,
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Literal, get_args
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Final, Literal, Protocol, get_args
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
 from hand_models.hand import FINGERS
@@ -14,7 +14,16 @@ from planner.question.draws import drawn_hands
 from planner.question.load import Load, Weights
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["MOST_DRAWS", "BodyRange", "ForceCap", "Limits", "Objective", "Question", "Want"]
+__all__ = [
+    "MOST_DRAWS",
+    "BodyRange",
+    "ForceCap",
+    "Limits",
+    "Objective",
+    "OwnObjective",
+    "Question",
+    "Want",
+]
 
 Frame = Literal["hand", "body", "world"]
 
@@ -130,6 +139,13 @@ Objective = Literal["max_margin", "min_effort"]
 OBJECTIVES: Final = get_args(Objective)
 """What a plan may be the best in."""
 
+
+class OwnObjective(Protocol):
+    """An objective that is not named but given: a `planner.solving.Objective`."""
+
+    name: ClassVar[str]
+
+
 Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
 
 WANTS: Final = get_args(Want)
@@ -175,11 +191,10 @@ class Question:
         given.
     limits : Limits
     want : frozenset of str
-        Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance', and 'advice',
-        which is given by `planner.advice.plan`.
-    objective : {'max_margin', 'min_effort'}
+        Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance' and 'advice'.
+    objective : {'max_margin', 'min_effort'} or planner.solving.Objective
         Least utilisation; or least sum of squared relative tensions and joint torques, at a
-        utilisation within the limits.
+        utilisation within the limits; or an objective of the caller's own.
     present : mapping of str to ndarray, shape (4,)
         Tensions of tendons now, by limb [N].
     deadline : float, optional
@@ -198,7 +213,7 @@ class Question:
     load: Load = field(default_factory=Load)
     limits: Limits = field(default_factory=Limits)
     want: frozenset[Want] = frozenset()
-    objective: Objective = "max_margin"
+    objective: Objective | OwnObjective = "max_margin"
     present: Mapping[str, Array] = field(default_factory=dict)
     deadline: float | None = None
     draws: tuple[Draw, ...] | None = None
@@ -210,7 +225,8 @@ class Question:
             wrench = finite_vector(self.body_wrench, 6, "body_wrench")
             checked_body_wrench(wrench, "body_wrench")
             object.__setattr__(self, "body_wrench", wrench)
-        known_choice(self.objective, OBJECTIVES, "objective")
+        if isinstance(self.objective, str) or not hasattr(self.objective, "name"):
+            known_choice(str(self.objective), OBJECTIVES, "objective")
         unknown = sorted(set(self.want) - set(WANTS))
         if isinstance(self.want, str) or unknown:
             raise InvalidInputError(
@@ -286,6 +302,11 @@ class Question:
                         f"{count} joints need {count} figures, got {len(most)}",
                         field=f"limits.joint_torque.{limb}",
                     )
+
+    def bare(self) -> Question:
+        """Return the same question for the least utilisation, without extras and deadline."""
+        least: Objective = "max_margin"
+        return replace(self, want=frozenset(), draws=None, deadline=None, objective=least)
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench that is planned for, shape (6,) [N, N·m].

@@ -8,6 +8,7 @@ from .plain_parts import (
     Finding as Finding,
     Finger as Finger,
     LimitName as LimitName,
+    LoadFactor as LoadFactor,
     LoadFactorStatus as LoadFactorStatus,
     Price as Price,
     RobustLoadFactor as RobustLoadFactor,

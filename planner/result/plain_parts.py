@@ -5,7 +5,7 @@ A name that does not exist is None, and null on its way; what was not asked for 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 from msgspec.structs import astuple
@@ -16,6 +16,7 @@ __all__ = [
     "Finding",
     "Finger",
     "LimitName",
+    "LoadFactor",
     "LoadFactorStatus",
     "Price",
     "RobustLoadFactor",
@@ -81,6 +82,35 @@ class Price(LimitName, frozen=True, kw_only=True):
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
 """What is known of a load factor: it is there, or that it is no less; no multiple of the body
 wrench is too much, or none can be held; it was not asked for, or a deadline came before."""
+
+
+class LoadFactor(NamedTuple):
+    """What was found of a load factor.
+
+    Attributes
+    ----------
+    factor : float or None
+    least : bool
+        Whether it is only known to be no less.
+    unbounded : bool
+        Whether any multiple of the body wrench can be held.
+    unfinished : bool
+        Whether the deadline came before.
+    """
+
+    factor: float | None = None
+    least: bool = False
+    unbounded: bool = False
+    unfinished: bool = False
+
+    @property
+    def status(self) -> LoadFactorStatus:
+        """What is known of it, where it was asked for."""
+        if self.unbounded:
+            return "unbounded"
+        if self.factor is not None:
+            return "at_least" if self.least else "found"
+        return "not_finished" if self.unfinished else "none"
 
 
 class Solver(Struct, frozen=True):

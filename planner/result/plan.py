@@ -99,7 +99,7 @@ class Certificate:
     spaces: Mapping[str, WrenchSpace]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
     """The answer. A value that does not exist for a status is None.
 
@@ -162,31 +162,31 @@ class Plan:
     clearance : Clearance or None
         The least distances, if they were asked for.
     advice : tuple of Advice or None
-        What would make it hold, or hold more, if that was asked for (`planner.advice.plan`): what
+        What would make it hold, or hold more, if that was asked for: what
         holds first, the smallest change first of that; of the rest that of most gain for its size.
     """
 
     status: Status
     body_wrench: Array
-    utilisation: float | None
-    effort: float | None
-    load_factor: float | None
-    load_factor_unbounded: bool
-    limiting: LimitName | None
-    hands: tuple[HandPlan, ...] | None
-    prices: tuple[Price, ...] | None
-    effort_prices: tuple[Price, ...] | None
-    certificate: Certificate | None
-    residual: Array | None
-    joints: Mapping[str, Array] | None
-    joint_torque: Mapping[str, Array] | None
-    joint_torque_limit: Mapping[str, Array] | None
-    path: TensionPath | None
-    verified: bool
     reason: str
-    warnings: tuple[str, ...]
     solver: Solver
     time: Time
+    utilisation: float | None = None
+    effort: float | None = None
+    load_factor: float | None = None
+    load_factor_unbounded: bool = False
+    limiting: LimitName | None = None
+    hands: tuple[HandPlan, ...] | None = None
+    prices: tuple[Price, ...] | None = None
+    effort_prices: tuple[Price, ...] | None = None
+    certificate: Certificate | None = None
+    residual: Array | None = None
+    joints: Mapping[str, Array] | None = None
+    joint_torque: Mapping[str, Array] | None = None
+    joint_torque_limit: Mapping[str, Array] | None = None
+    path: TensionPath | None = None
+    verified: bool = True
+    warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None

@@ -1,5 +1,15 @@
-from .dual_bounds import least_bound as least_bound
-from .prepared_checks import scene_findings as scene_findings
-from .solve import KnownStance as KnownStance, plan as plan
-from .trial import Trial as Trial, try_stance as try_stance
-from .unique_plan import is_least as is_least, least_utilisation as least_utilisation
+from .dual_bounds import is_least as is_least, least_bound as least_bound
+from .objectives import (
+    OBJECTIVES as OBJECTIVES,
+    CappedObjective as CappedObjective,
+    MaxMargin as MaxMargin,
+    Objective as Objective,
+    objective_of as objective_of,
+)
+from .solve import (
+    KnownStance as KnownStance,
+    plan as plan,
+    try_stance as try_stance,
+    with_advice as with_advice,
+)
+from .unique_plan import least_utilisation as least_utilisation

@@ -10,7 +10,10 @@ import numpy as np
 from hand_models.base import Array
 from planner.programs import TIE, Outcome, StanceData, tie_weight
 
-__all__ = ["least_bound", "least_effort_bound", "unique_bound"]
+__all__ = ["OPTIMAL", "convex_bound", "is_least", "least_bound", "unique_bound"]
+
+OPTIMAL: Final = 1e-5
+"""How far, relatively, the utilisation may be above its proven lower bound."""
 
 ROUNDED: Final = 1e-9
 """What rounding may add to a bound, relative."""
@@ -19,8 +22,13 @@ STATIONARY: Final = 1e-5
 """How far multipliers may be from stationary, and below zero, to count as a bound."""
 
 
+def is_least(value: float, bound: float) -> bool:
+    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
+    return value - bound <= OPTIMAL * max(1.0, value)
+
+
 def least_bound(data: StanceData, outcome: Outcome) -> float:
-    """Return a lower bound of the least utilisation from the multipliers of `Margin`.
+    """Return a lower bound of the least utilisation from the multipliers of `programs.margin`.
 
     With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
     u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
@@ -29,7 +37,7 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
 
 
 def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> float:
-    """Return a lower bound of the least utilisation from the multipliers of `Unique`.
+    """Return a lower bound of the least utilisation from the multipliers of `programs.unique`.
 
     Its second term f is convex, so with the plan z₁ and its slope every plan z has
 
@@ -47,19 +55,27 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
 
 
-def least_effort_bound(data: StanceData, outcome: Outcome, cap: float) -> float:
-    """Return a lower bound of the least effort from the multipliers of `Effort`.
+def convex_bound(
+    data: StanceData, outcome: Outcome, value: float, slopes: Array, cap: float
+) -> float:
+    """Return a lower bound of a convex function f from the multipliers of its program.
 
-    The effort f is convex, so every plan has f(z) ≥ f(z₁) + ∇f(z₁)·(z − z₁) about the plan z₁, and
-    the multipliers bound that linear function from below, as in `least_bound`.
+    Every plan has f(z) ≥ f(z₁) + ∇f(z₁)·(z − z₁) about the plan z₁ of the outcome, and the
+    multipliers bound that linear function from below, as in `least_bound`.
+
+    Parameters
+    ----------
+    data : StanceData
+    outcome : Outcome
+    value : float
+        f(z₁)
+    slopes : ndarray, shape (M,)
+        ∇f(z₁)
+    cap : float
+        On the utilisation.
     """
-    slopes, value = [], 0.0
-    for hand, y in zip(data.hands, outcome.loads, strict=True):
-        z = y / hand.unit
-        effort, small = hand.E @ z + hand.e0, hand.rest * z
-        slopes.append(2.0 * (hand.E.T @ effort + small))
-        value += float(effort @ effort + small @ z - slopes[-1] @ z)
-    return _dual_bound(data, outcome, np.concatenate(slopes), cap, 0.0) + value
+    z = np.concatenate(outcome.loads) / data.rows.unit
+    return _dual_bound(data, outcome, slopes, cap, 0.0) + value - float(slopes @ z)
 
 
 def _missing(outcome: Outcome) -> float:
@@ -74,8 +90,9 @@ def _dual_bound(
 
     ``leak``: how far multipliers are from stationary besides.
     """
-    assert outcome.balance_dual is not None
     nu, rows = outcome.balance_dual, data.rows
+    if nu is None:
+        return -math.inf
     signed = np.concatenate([*outcome.limit_duals, *outcome.hard_duals])
     scale = max(1.0, abs(outcome.value))
     if signed.min(initial=0.0) < -STATIONARY * scale:

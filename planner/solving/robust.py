@@ -37,10 +37,9 @@ from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline
 from planner.deadline import DeadlineError
-from planner.explanation import LimitUse
 from planner.prepare import PreparedStance
 from planner.result import RobustLoadFactor
-from planner.solving.load_factor import most_of_fixed, overloaded_by_itself
+from planner.solving.fixed_wrists import most_of_fixed
 
 __all__ = ["find_robust_load_factor"]
 
@@ -62,20 +61,20 @@ Places = Sequence[WrenchSpace | None]
 
 
 def find_robust_load_factor(
-    prepared: PreparedStance, idle: Sequence[LimitUse]
+    prepared: PreparedStance, *, overloaded: bool
 ) -> RobustLoadFactor | None:
     """Return it where the hands are not quite where they were put; None if time does not allow.
 
     Parameters
     ----------
     prepared : PreparedStance
-    idle : sequence of LimitUse
-        How much of their joints' torque limbs without a hand use.
+    overloaded : bool
+        Whether a limb without a hand cannot bear itself.
     """
     try:
         places = [_places(prepared, i) for i in range(len(prepared.limbs))]
         taken = np.array([_taken(limb) for limb in prepared.limbs])
-        factors = _factors(prepared, places, taken, overloaded_by_itself(idle))
+        factors = _factors(prepared, places, taken, overloaded)
         deadline.check(LATE)
     except DeadlineError:
         return None

@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from hand_models.base import Array, finite_vector
-from planner import deadline
-from planner.deadline import Budget, Overlap
+from planner import deadline, programs
+from planner.advice import Trial, advise
+from planner.deadline import Budget, Overlap, late_sentence
+from planner.explanation import LimitUse
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
+from planner.programs import LOAD_UNIT, UNLIMITED
 from planner.question import Question, checked_body_wrench
-from planner.result import Plan, Time
+from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan
-from planner.solving.load_factor import FoundFactor, find_load_factor
-from planner.solving.prepared_checks import PreparedChecks, prepare_checks
-from planner.solving.solution import solve_question
-from planner.solving.unique_plan import LeastUtilisation
-from planner.solving.why_not import beyond_all_loads, look_again
+from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
+from planner.solving.floating_wrists import floating_solution, wrench_is_given
+from planner.solving.objectives import CappedObjective, objective_of
+from planner.solving.solution import Answer, Failed, Infeasible, Solution, load_factor_of
+from planner.solving.verified import Checks, prepare_checks, recover, verify
+from planner.solving.why_not import proof_of_none, unexplained
 
-__all__ = ["KnownStance", "plan", "plan_on"]
+__all__ = ["KnownStance", "plan", "plan_on", "try_stance", "with_advice"]
+
+SQUEEZED: Final = 1e3
+"""Loads over the body's force beyond which hands do little but squeeze each other."""
+
+BALANCED: Final = 1e-7
+"""Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
 
 def plan(question: Question) -> Plan:
-    """Answer a question: the best plan, verified, or why there is none.
+    """Answer a question: the best plan, verified, or why there is none, and advice if wanted.
 
     Parameters
     ----------
@@ -42,15 +57,23 @@ def plan(question: Question) -> Plan:
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
-        return plan_on(prepare_stance(question), start)[0]
+        answer = plan_on(prepare_stance(question), start).plan
+        return with_advice(question, answer) if "advice" in question.want else answer
+
+
+class Planned(NamedTuple):
+    """A plan, and the solution that it was made of."""
+
+    plan: Plan
+    solution: Solution
 
 
 def plan_on(
     prepared: PreparedStance,
     start: float,
-    known: PreparedChecks | None = None,
-    before: LeastUtilisation | None = None,
-) -> tuple[Plan, LeastUtilisation | None]:
+    known: Checks | None = None,
+    near: Solution | None = None,
+) -> Planned:
     """Answer a question of a prepared stance.
 
     Parameters
@@ -58,38 +81,139 @@ def plan_on(
     prepared : PreparedStance
     start : float
         When it began, on the clock of `time.perf_counter`.
-    known : PreparedChecks, optional
-        What reads and checks its plans; by default it is made beside the solver.
-    before : LeastUtilisation, optional
-        What came of the same hands at another wrench.
-
-    Returns
-    -------
-    plan : Plan
-    least : LeastUtilisation or None
-        What it was found from, of fixed wrists.
+    known : Checks, optional
+        What recovers and checks its plans; by default it is made beside the solver.
+    near : Solution, optional
+        Of the same hands at another wrench, where solving begins.
 
     Raises
     ------
     DeadlineError
         If the deadline comes before anything is found that passes the checks.
     """
-    question, modelled = prepared.question, time.perf_counter()
+    question, modelled, budget = prepared.question, time.perf_counter(), Budget(PROGRAMS)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
-    checks, budget = Overlap(partial(prepare_checks, prepared), known), Budget(PROGRAMS)
-    found, proof = solve_question(prepared, checks, budget, before=before), None
-    if not found.passes or beyond_all_loads(prepared, found):
-        if found.outcome.balance_dual is None:
-            deadline.check("a plan was found")
-        found, proof = look_again(prepared, checks, found, budget)
-        if proof is None and not found.passes:
-            deadline.check("a plan was found, or proven away")
-    ready, factor = checks.result(), FoundFactor()
+    with Overlap(partial(prepare_checks, prepared), known) as checks:
+        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+    if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
+        answer = _second_look(prepared, checks, answer, budget)
+    if isinstance(answer, Failed):
+        deadline.check("a plan was found, or proven away")
+    ready, factor = checks.result(), LoadFactor()
     if "load_factor" in question.want:
-        factor = find_load_factor(prepared, found, ready.idle, budget)
-    solved = time.perf_counter()
-    times = Time(modelled - start, solved - modelled, 0.0)
-    return explained_plan(prepared, ready, found, proof, factor, times, start), found.least
+        factor = load_factor_of(prepared, answer, budget, overloaded=ready.overloaded)
+    times = Time(modelled - start, time.perf_counter() - modelled, 0.0)
+    found = explained_plan(prepared, ready, answer, factor, try_stance)
+    times = Time(times.model, times.solve, time.perf_counter() - start)
+    return Planned(replace(found, time=times), answer.solution)
+
+
+def _solutions(
+    prepared: PreparedStance, budget: Budget, near: Solution | None = None
+) -> Iterator[Solution]:
+    """Yield the plan that a question asks for, in one way after the other."""
+    if prepared.hands.floating:
+        return _best_in(prepared, [floating_solution(prepared, budget, near)], budget)
+    return _best_in(prepared, fixed_solutions(prepared, near), budget)
+
+
+def _best_in(
+    prepared: PreparedStance, found: Iterable[Solution], budget: Budget
+) -> Iterator[Solution]:
+    """Yield plans of least utilisation, or what a question's objective makes of each."""
+    objective = objective_of(prepared.question)
+    for least in found:
+        if isinstance(objective, CappedObjective):
+            least = least.best_in(objective, prepared, budget)
+        yield least
+
+
+def _first_verified(
+    prepared: PreparedStance, checks: Overlap[Checks], found: Iterable[Solution]
+) -> Answer:
+    """Recover and verify one solution after the other, until one passes."""
+    for solution in found:
+        if not solution.loads:
+            answer: Answer = Failed(solution, solution.no_answer(prepared))
+            continue
+        ready = checks.result()
+        answer = verify(prepared, ready, recover(prepared, ready, solution))
+        if not isinstance(answer, Failed):
+            break
+    return answer
+
+
+def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
+    """Whether a plan of fixed wrists has loads beyond `UNLIMITED`, and far beyond what is needed.
+
+    Rows that all but contradict the balance let it be had so, a hair before they do.
+    """
+    if prepared.hands.floating or found.utilisation <= 1.0:
+        return False
+    most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
+    needed = float(np.linalg.norm(prepared.wrench[:3]))
+    return bool(most > max(UNLIMITED * LOAD_UNIT, SQUEEZED * needed))
+
+
+def _second_look(
+    prepared: PreparedStance,
+    checks: Overlap[Checks],
+    found: Answer,
+    budget: Budget,
+    *,
+    prove: bool = True,
+) -> Answer:
+    """Return the proof that there is no balance, if that is wanted, or a plan at its border.
+
+    ``found``: what does not pass its checks, or has loads without bounds.
+    """
+    solution = found.solution
+    if prove and solution.least.balance_dual is None:
+        deadline.check("a plan was found")
+    data = solution.sets.data
+    nearest = programs.nearest(data)
+    far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
+    if nearest.solved and nearest.value <= far:
+        if prepared.hands.floating or not isinstance(found, Failed):
+            return found
+        # rounding put the wrench a hair outside: plan for the nearest that can be had
+        inside = _best_in(prepared, nearest_solutions(prepared, solution, nearest), budget)
+        found = _first_verified(prepared, checks, inside)
+        if not (isinstance(found, Failed) and found.solution.loads):
+            return found
+        # of next to no wrench a hair is more than rounding
+    if wrench_is_given(prepared) or not prove:
+        return found
+    proof = proof_of_none(prepared, solution, nearest)
+    if proof is None:
+        return found
+    return Infeasible(solution.late(*unexplained(prepared, proof)), proof)
+
+
+def try_stance(
+    prepared: PreparedStance,
+    idle: Sequence[LimitUse] | None = None,
+    near: Solution | None = None,
+) -> Trial:
+    """Return the verified plan of a stance, of which no store keeps anything.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    idle : sequence of LimitUse, optional
+        How much of their joints' torque limbs without a hand use, where that is known.
+    near : Solution, optional
+        A plan of much the same stance, where solving begins.
+    """
+    budget = Budget(PROGRAMS)
+    with Overlap(partial(Checks.of, prepared, idle)) as checks:
+        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+    if isinstance(answer, Failed):
+        answer = _second_look(prepared, checks, answer, budget, prove=False)
+    overloaded = checks.result().overloaded
+    factor = partial(load_factor_of, prepared, answer, budget, overloaded=overloaded)
+    solution, whole = answer.solution, answer.whole
+    return Trial(prepared, solution.sets.data, solution.least, whole, factor)
 
 
 class KnownStance:
@@ -112,8 +236,8 @@ class KnownStance:
 
     def __init__(self, question: Question) -> None:
         self.prepared = prepared = prepare_stance(question)
-        self._checks: PreparedChecks | None = None
-        self._before: LeastUtilisation | None = None
+        self._checks: Checks | None = None
+        self._near: Solution | None = None
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None and not prepared.floating:
             self._checks = prepare_checks(prepared)
@@ -135,7 +259,25 @@ class KnownStance:
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         with deadline.within(self.prepared.question.deadline, started=start):
             prepared = self.prepared.turned(wrench)
-            answer, least = plan_on(prepared, start, self._checks, self._before)
-        if least is not None and least.outcome.solved:
-            self._before = least
+            answer, solution = plan_on(prepared, start, self._checks, self._near)
+        if isinstance(solution, FixedSolution) and solution.start is not None:
+            self._near = solution
         return answer
+
+
+def with_advice(question: Question, answer: Plan) -> Plan:
+    """Return a question's plan with advice; what time was left out is reported as ever."""
+    start = time.perf_counter()
+    found, whole = advise(question, try_stance)
+    seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
+    if not whole and seconds is not None:
+        unfinished = (*unfinished, "advice")
+        warnings = (*warnings, late_sentence(seconds, ["advice"]))
+    total = answer.time.total + time.perf_counter() - start
+    return replace(
+        answer,
+        advice=found,
+        unfinished=unfinished,
+        warnings=warnings,
+        time=Time(answer.time.model, answer.time.solve, total),
+    )

@@ -16,20 +16,20 @@ from collections.abc import Sequence
 from hand_models.base import InvalidInputError
 from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
 from planner import deadline
+from planner.advice import Attempt
 from planner.deadline import DeadlineError
 from planner.explanation import LimitUse
-from planner.floating import WristSolution
 from planner.prepare import PreparedStance
 from planner.programs import SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
 from planner.result import DrawnPlan, Spread
-from planner.solving.trial import try_stance
+from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
 
 
 def find_spread(
-    prepared: PreparedStance, idle: Sequence[LimitUse], usual: WristSolution | None
+    prepared: PreparedStance, idle: Sequence[LimitUse], usual: Solution, attempt: Attempt
 ) -> Spread | None:
     """Return a stance's plans over its question's draws; None if time does not allow all of them.
 
@@ -38,10 +38,11 @@ def find_spread(
     prepared : PreparedStance
     idle : sequence of LimitUse
         How much of their joints' torque limbs without a hand use: the same in every draw.
-    usual : WristSolution or None
-        Where floating wrists go with the question's own hands: each draw's search begins there.
+    usual : Solution
+        With the question's own hands: each draw's search for floating wrists begins there.
+    attempt : callable
+        Plans a draw's stance.
     """
-    near = usual if usual is not None and usual.exact else None
     question, plans = prepared.question, []
     drawn = question.stance.robot.hand, question.draws
     refused: Counter[str] = Counter()
@@ -53,7 +54,7 @@ def find_spread(
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
             whole = len(there) == len(outcomes)
-            plans.append(_planned(prepared, there, idle, near) if whole else DrawnPlan())
+            plans.append(_planned(prepared, there, idle, usual, attempt) if whole else DrawnPlan())
         deadline.check("all draws were planned")
     except DeadlineError:
         return None
@@ -83,7 +84,8 @@ def _planned(
     prepared: PreparedStance,
     settled: Sequence[SettledHand],
     idle: Sequence[LimitUse],
-    near: WristSolution | None,
+    usual: Solution,
+    attempt: Attempt,
 ) -> DrawnPlan:
     """Return what the verified plan says of the same stance with a draw's hands."""
     try:
@@ -92,10 +94,9 @@ def _planned(
         # a preload that a floating hand does not hold
         return DrawnPlan()
     pairs = zip(settled, prepared.batch.hands, strict=True)
-    if any(drawn.palm.engaged != usual.palm.engaged for drawn, usual in pairs):
-        # with its palms, a hand has other ways to carry
-        near = None
-    trial = try_stance(there, idle, near)
+    # with its palms, a hand has other ways to carry
+    alike = all(drawn.palm.engaged == own.palm.engaged for drawn, own in pairs)
+    trial = attempt(there, idle, usual if prepared.hands.floating and alike else None)
     used, factor = trial.utilisation, trial.load_factor().factor
     if math.isinf(used):
         return DrawnPlan(load_factor=factor)

@@ -1,15 +1,15 @@
 """The plan that is meant: least utilisation, its proof, and what of it is given away for tension.
 
-An interior-point solver ends near the optimum of `program.Unique`, whose second term is so small
+An interior-point solver ends near the optimum of `programs.unique`, whose second term is so small
 that tensions may be off by newtons while the objective has all its digits. Which rows are active is
 nearly clear by then, and the active-set method (`planner.solving.active_set`) has the last digits.
 Where the rows that were active at another wrench still are, no solver is needed: one system, and
 the signs of its multipliers, prove the plan.
 
-From there to the plan that is meant (`program.LessTension`), whose second term is larger, the same
-method goes on: mostly the same rows are active, and their multipliers at the larger weight prove
-that the plan stays as it is, for the price of one step. Where it is not, utilisation is given away
-for less tension, up to a most, at which u is fixed.
+From there to the plan that is meant (`programs.less_tension`), whose second term is larger, the
+same method goes on: mostly the same rows are active, and their multipliers at the larger weight
+prove that the plan stays as it is, for the price of one step. Where it is not, utilisation is
+given away for less tension, up to a most, at which u is fixed.
 """
 
 from __future__ import annotations
@@ -33,12 +33,10 @@ from planner.programs import (
 )
 from planner.solving import dual_bounds
 from planner.solving.active_set import ApartError, Optimum, Point, Rows, optimum
+from planner.solving.dual_bounds import OPTIMAL, is_least
 from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
-__all__ = ["LeastUtilisation", "active_set_optimum", "is_least", "least_utilisation"]
-
-OPTIMAL: Final = 1e-5
-"""How far, relatively, the utilisation may be above its proven lower bound."""
+__all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
 
 SURE: Final = (1e-6, 1.0)
 """How many times a row's multiplier may be less than its room for the row to be active at first."""
@@ -51,11 +49,6 @@ LARGE: Final = 64
 
 FREE: Final = 1e-6
 """How much more than one the multipliers of limits add up to where u is not free."""
-
-
-def is_least(value: float, bound: float) -> bool:
-    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
-    return value - bound <= OPTIMAL * max(1.0, value)
 
 
 class LeastUtilisation(NamedTuple):
@@ -131,7 +124,7 @@ def _far_beyond(outcome: Outcome) -> bool:
 
 
 class ActiveSetOptimum(NamedTuple):
-    """The optimum of `program.Unique`, exact.
+    """The optimum of `programs.unique`, exact.
 
     Attributes
     ----------

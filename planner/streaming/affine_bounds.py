@@ -51,7 +51,7 @@ class AffineBound(NamedTuple):
 def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     """Return what the multipliers of a program that minimises the utilisation prove.
 
-    Of `program.Margin`, or of `program.Unique`, whose second term the repair takes out.
+    Of `programs.margin`, or of `Best.unique`, whose second term the repair takes out.
 
     Parameters
     ----------

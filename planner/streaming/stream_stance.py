@@ -19,7 +19,7 @@ from planner import programs, solving
 from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome, tension_trade
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
-from planner.solving import KnownStance, is_least, least_utilisation
+from planner.solving import KnownStance, MaxMargin, is_least, least_utilisation, objective_of
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import Check, LoadsCheck
 
@@ -181,9 +181,10 @@ def _refuse(question: Question) -> None:
                 f"{hand.wrist} is not for streams, whose plans are mixed; valid is fixed",
                 field=f"stance.hands[{i}].wrist",
             )
-    if question.objective != "max_margin":
+    objective = objective_of(question)
+    if not isinstance(objective, MaxMargin):
         raise UnsupportedError(
-            f"{question.objective} is not for streams; valid is max_margin", field="objective"
+            f"{objective.name} is not for streams; valid is {MaxMargin.name}", field="objective"
         )
     if question.limits.tension_change is not None:
         raise UnsupportedError(

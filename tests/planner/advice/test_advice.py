@@ -13,15 +13,17 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.rock import Plane
-from planner.advice import advise, changed, plan
+from planner import advice
+from planner.advice import changed
 from planner.advice.body import BodySearch, slope
 from planner.advice.trials import PLANS, WITHOUT, Trials
 from planner.deadline import DeadlineError
+from planner.explanation import scene_findings
 from planner.prepare import prepare_stance
 from planner.question import BodyRange, Load, Question
-from planner.result import Advice
+from planner.result import Advice, Plan
 from planner.scene import clearance, scene_of
-from planner.solving import plan as planned, scene_findings, try_stance
+from planner.solving import plan, try_stance
 from service import answering
 from service.answering import advised, question
 from service.commands.stances import read_request
@@ -30,6 +32,16 @@ from tests.suite.helpers.random_questions import requested
 from tests.suite.helpers.stances import SANDPAPER, ask, moved, on_wall, random_question
 
 SEED = 32  # four hands under their own weight, no limits of their own
+
+
+def advise(asked: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], bool]:
+    """What is advised of a question."""
+    return advice.advise(asked, try_stance, plans)
+
+
+def planned(asked: Question) -> Plan:
+    """The plan of a question without advice."""
+    return plan(replace(asked, want=asked.want - {"advice"}))
 
 
 def heavier(name: str, mass: float, *want: str) -> PlanRequest:
@@ -144,7 +156,7 @@ def test_the_least_utilisation_is_convex_in_the_shift_and_above_every_slope():
 
 def test_no_place_of_a_grid_is_better_than_the_best_shift():
     asked = random_question(SEED)
-    trials = Trials(asked)
+    trials = Trials(asked.bare(), try_stance)
     search = BodySearch(trials, trials.base.prepared, trials.base)
     search.run()
     best = min(each.utilisation for each in trials.of(search.changes()))

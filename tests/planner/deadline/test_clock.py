@@ -30,7 +30,6 @@ from planner.result import Plan
 from planner.robots import pose_search
 from planner.solving import (
     dual_bounds,
-    explained,
     plan,
     solve,
     unique_plan,
@@ -75,8 +74,7 @@ class Clock:
 def clock(monkeypatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr("planner.deadline.clock.time", clock)
-    for module in (solve, explained):
-        monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(solve, "time", clock)
     return clock
 
 
@@ -350,8 +348,7 @@ def held(question: Question, ticks: int, monkeypatch) -> tuple[Plan | None, int]
     clock = Clock(tick=1.0)
     with monkeypatch.context() as patch:
         patch.setattr("planner.deadline.clock.time", clock)
-        for module in (solve, explained):
-            patch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+        patch.setattr(solve, "time", SimpleNamespace(perf_counter=lambda: clock.now))
         begun = clock.now
         try:
             return plan(replace(question, deadline=float(ticks))), round(clock.now - begun)

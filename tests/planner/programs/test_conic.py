@@ -22,6 +22,7 @@ from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
 from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
+from tests.suite.helpers.named_programs import program_of
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.stances import ask, on_wall, program_data
 
@@ -48,15 +49,20 @@ SIXTEEN = (7, tuple(HANDS[i % 5] for i in range(16)))
 Draw = Callable[..., np.ndarray]
 
 KINDS: dict[str, Callable[[StanceData, Draw], StanceProgram]] = {
-    "Unique": lambda data, draw: program.Unique(data),
-    "LessTension": lambda data, draw: program.LessTension(data, TensionTrade(0.3, 1.3)),
-    "Margin": lambda data, draw: program.Margin(data),
-    "Curved": lambda data, draw: program.Curved(
-        data, draw(*2 * data.rows.unit.shape), [draw(len(hand.unit)) for hand in data.hands]
+    "Unique": lambda data, draw: program_of(solvers.unique, data),
+    "LessTension": lambda data, draw: program_of(
+        solvers.less_tension, data, TensionTrade(0.3, 1.3)
     ),
-    "TieBreak": lambda data, draw: program.TieBreak(data, 1.3),
-    "Effort": lambda data, draw: program.Effort(data, 1.3),
-    "LoadFactor": lambda data, draw: program.LoadFactor(data),
+    "Margin": lambda data, draw: program_of(solvers.margin, data),
+    "Curved": lambda data, draw: program_of(
+        solvers.curved,
+        data,
+        draw(*2 * data.rows.unit.shape),
+        [draw(len(hand.unit)) for hand in data.hands],
+    ),
+    "TieBreak": lambda data, draw: program_of(solvers.tie_break, data, 1.3),
+    "Effort": lambda data, draw: program_of(solvers.effort, data, 1.3),
+    "LoadFactor": lambda data, draw: program_of(solvers.load_factor, data),
     "Reach": lambda data, draw: program.Reach(
         data,
         draw(3),
@@ -106,7 +112,13 @@ def dense(asked: ConicProgram) -> np.ndarray:
 def test_every_program_is_compared():
     kinds = {kind for kind in vars(program).values() if isinstance(kind, type)}
     programs = {kind for kind in kinds if issubclass(kind, StanceProgram)} - {StanceProgram}
-    assert {kind.__name__ for kind in programs} == {name.partition(",")[0] for name in KINDS}
+    of_each = [
+        KINDS[name](
+            random_data(SHAPES[0], drawn(np.random.default_rng(0))), drawn(np.random.default_rng(1))
+        )
+        for name in KINDS
+    ]
+    assert {type(asked) for asked in of_each} == programs
 
 
 @pytest.mark.parametrize(
@@ -137,13 +149,13 @@ def real_programs(data: StanceData) -> dict[str, StanceProgram]:
     root = 0.1 * np.eye(len(data.rows.unit))
     up = np.eye(6)[:, 2:3]
     return {
-        "Unique": program.Unique(data),
-        "LessTension": program.LessTension(data, TensionTrade(0.3, 1.1)),
-        "Margin": program.Margin(data),
-        "Curved": program.Curved(data, root, loads),
-        "TieBreak": program.TieBreak(data, 1.1),
-        "Effort": program.Effort(data, 1.1),
-        "LoadFactor": program.LoadFactor(data),
+        "Unique": program_of(solvers.unique, data),
+        "LessTension": program_of(solvers.less_tension, data, TensionTrade(0.3, 1.1)),
+        "Margin": program_of(solvers.margin, data),
+        "Curved": program_of(solvers.curved, data, root, loads),
+        "TieBreak": program_of(solvers.tie_break, data, 1.1),
+        "Effort": program_of(solvers.effort, data, 1.1),
+        "LoadFactor": program_of(solvers.load_factor, data),
         "Reach": program.Reach(data, np.ones(1), up),
         "Nearest": program.Nearest(data.turned(1e4 * data.wrench)),
     }

@@ -12,13 +12,15 @@ import scipy.sparse as sp
 from hand_models.base import Pose
 from hand_models.hand import Grasp
 from hand_models.rock import Cylinder, Edge
-from planner.programs import program, tension_trade
+from planner import programs
+from planner.programs import tension_trade
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.result import Plan
 from planner.solving import KnownStance, plan
 from planner.streaming import WrenchStream
 from tests.suite.helpers import peer
 from tests.suite.helpers.least import GIVEN_AWAY, WEIGHT, is_meant, most_meant
+from tests.suite.helpers.named_programs import program_of
 from tests.suite.helpers.stances import (
     PALM_TO_WALL,
     ROCK,
@@ -170,16 +172,16 @@ def test_a_hand_without_a_spine_on_rock_is_not_pulled_for_next_to_nothing():
 
 
 def tensions_of(data) -> np.ndarray:
-    return np.array([y[:4] for y in program.Unique(data).solve().loads])
+    return np.array([y[:4] for y in programs.unique(data).loads])
 
 
 @pytest.mark.parametrize("name", ["lighter", "sharp edges, pinched", "long lever"])
 def test_it_is_the_program_that_cvxpy_defines(name):
     question = CASES[name]
     data = program_data(question)
-    least = program.Margin(data).by_definition()[0].value
+    least = program_of(programs.margin, data).by_definition()[0].value
     trade = tension_trade(least, question.limits.utilisation)
-    defined, _ = program.LessTension(data, trade).by_definition()
+    defined, _ = program_of(programs.less_tension, data, trade).by_definition()
     mine = {h.limb: [f.tendon_tension for f in h.fingers] for h in plan(question).hands}
     for hand, loads in zip(question.stance.hands, defined.loads, strict=True):
         np.testing.assert_allclose(mine[hand.limb], loads[:4], atol=0.5)

@@ -9,9 +9,9 @@ import pytest
 from hand_models.rock import Cylinder, Plane
 from planner.advice import advising
 from planner.question import Load
+from planner.result import LoadFactor
 from planner.route import RouteResult
 from planner.solving import plan
-from planner.solving.load_factor import FoundFactor
 from service.answering.answers import brief_plan_reply, plan_reply
 from tests.suite.helpers.stances import ask, on_wall
 
@@ -46,12 +46,12 @@ def test_plans_say_why_there_is_no_load_factor(question, status):
 @pytest.mark.parametrize(
     ("found", "status"),
     [
-        (FoundFactor(1.2), "found"),
-        (FoundFactor(0.0), "found"),
-        (FoundFactor(1.2, least=True), "at_least"),
-        (FoundFactor(), "none"),
-        (FoundFactor(unbounded=True), "unbounded"),
-        (FoundFactor(unfinished=("load_factor",)), "not_finished"),
+        (LoadFactor(1.2), "found"),
+        (LoadFactor(0.0), "found"),
+        (LoadFactor(1.2, least=True), "at_least"),
+        (LoadFactor(), "none"),
+        (LoadFactor(unbounded=True), "unbounded"),
+        (LoadFactor(unfinished=True), "not_finished"),
     ],
 )
 def test_what_was_found_has_a_status(found, status):
@@ -63,7 +63,7 @@ def test_advice_says_that_time_was_too_short_for_its_load_factor(monkeypatch):
         utilisation = 0.9
 
         def load_factor(self):
-            return FoundFactor(unfinished=("load_factor",))
+            return LoadFactor(unfinished=True)
 
     class Trials:
         def holds(self, utilisation):

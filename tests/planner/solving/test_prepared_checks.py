@@ -9,7 +9,7 @@ from hand_models.rock import Cylinder, Plane
 from planner.prepare import prepare_stance
 from planner.result import PlanArrays
 from planner.solving import plan
-from planner.solving.prepared_checks import prepare_checks
+from planner.solving.verified import prepare_checks
 from tests.suite.helpers.stances import ask, on_wall
 
 HOLDS = [*(Cylinder(0.28 + 0.011 * k) for k in range(5)), Plane()]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+import planner
 from hand_models.base import InvalidInputError, SolverError, UnsupportedError, wrench_transport
 from hand_models.tile import Surface
 from planner import solving
@@ -178,7 +179,7 @@ def test_whatever_the_planner_does_the_caller_gets_an_error(
     def fail(_: object) -> None:
         raise error
 
-    monkeypatch.setattr(solving, "plan", fail)
+    monkeypatch.setattr(planner, "plan", fail)
     got, _, message = refusal(wall_request())
     assert got == kind
     assert ("Traceback" in caplog.text) == (kind == "internal")
@@ -190,7 +191,7 @@ def test_a_lack_of_memory_is_for_the_process_to_tell(monkeypatch: pytest.MonkeyP
     def fail(_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(solving, "plan", fail)
+    monkeypatch.setattr(planner, "plan", fail)
     with pytest.raises(MemoryError):
         refusal(wall_request())
 

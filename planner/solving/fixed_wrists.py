@@ -1,0 +1,217 @@
+"""Plans of hands with fixed wrists: of least utilisation, but for what less tension is worth.
+
+One solve has the least utilisation, and mostly its active rows, which give its last digits and the
+plan. Where that does not pass its checks, other ways to the same plan follow, each slower and with
+more digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from hand_models.base import Array
+from planner import deadline, programs
+from planner.deadline import Budget, Unfinished, late
+from planner.prepare import HandSets, PreparedStance, Sets
+from planner.programs import SLACK, Outcome, StanceData, tension_trade
+from planner.result import LoadFactor
+from planner.solving import dual_bounds
+from planner.solving.objectives import MAX_MARGIN, CappedObjective
+from planner.solving.solution import Solution, unproven_sentences
+from planner.solving.spare_hands import SpareHand, less_tense
+from planner.solving.unique_plan import LeastUtilisation, least_utilisation
+
+__all__ = ["FixedSolution", "fixed_solutions", "most_of_fixed", "nearest_solutions"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FixedSolution(Solution):
+    """Loads of hands with fixed wrists.
+
+    Attributes
+    ----------
+    spare : tuple of SpareHand
+        Hands that add nothing to them.
+    start : LeastUtilisation or None
+        What they were found from, for the same hands at another wrench to begin at.
+    """
+
+    spare: tuple[SpareHand, ...] = ()
+    start: LeastUtilisation | None = None
+
+    @classmethod
+    def of_least(
+        cls,
+        prepared: PreparedStance,
+        sets: Sets,
+        least: Outcome,
+        loads: tuple[Array, ...] = (),
+        bound: float | None = None,
+    ) -> Self:
+        """Return loads of the least utilisation, or near it.
+
+        Parameters
+        ----------
+        prepared : PreparedStance
+        sets : Sets
+        least : Outcome
+            Of the program of least utilisation.
+        loads : tuple of ndarray, optional
+        bound : float, optional
+            The least utilisation is not below; by default as the multipliers prove it.
+        """
+        cap, unproven = prepared.question.limits.utilisation, tuple[str, ...]()
+        if least.solved:
+            bound = dual_bounds.least_bound(sets.data, least) if bound is None else bound
+            unproven = unproven_sentences("utilisation", least.value, bound)
+        return cls(
+            sets=sets,
+            loads=loads,
+            least=least,
+            objective=MAX_MARGIN,
+            best=least,
+            cap=cap,
+            most=tension_trade(least.value, cap).most,
+            unproven=unproven,
+        )
+
+    def best_in(
+        self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
+    ) -> FixedSolution:
+        used = self.least.value
+        if not self.loads or used > self.cap + SLACK:
+            return self
+        # where the least utilisation is the cap itself, rounding must not empty the set
+        cap, data = max(self.cap, used + 0.5 * SLACK), self.sets.data
+        best = objective.solve(data, cap)
+        if not best.solved:
+            if deadline.expired():
+                return self.late(objective.late)
+            return replace(self, wrong=(f"least {objective.words}: {best.status}",))
+        bound = objective.bound(data, best, cap)
+        further = unproven_sentences(objective.words, best.value, bound)
+        return replace(
+            self,
+            loads=best.loads,
+            objective=objective,
+            best=best,
+            cap=cap,
+            most=np.inf,
+            unproven=self.unproven + further,
+        )
+
+    def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        factor = most_of_fixed(prepared.hands, self.sets.data)
+        return LoadFactor(factor, unfinished=factor is None and deadline.expired())
+
+    def no_answer(self, prepared: PreparedStance) -> str:
+        return f"the solver gave no usable answer ({self.least.status})"
+
+
+def fixed_solutions(
+    prepared: PreparedStance, near: Solution | None = None
+) -> Iterator[FixedSolution]:
+    """Yield the plan of least utilisation that is meant, in one way after the other.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    near : Solution, optional
+        Of the same hands at another wrench, where the first way begins.
+    """
+    sets, cap = prepared.at_rest, prepared.question.limits.utilisation
+    before = near.start if isinstance(near, FixedSolution) else None
+    found = least_utilisation(sets.data, cap, prepared.batch.closing_tensions, before)
+    late: tuple[Unfinished, ...] = ()
+    if found.proven:
+        loads = () if found.meant is None else found.meant.loads
+        first = FixedSolution.of_least(prepared, sets, found.outcome, loads, found.bound)
+        first = replace(first, spare=found.spare, start=found)
+        for solution in [first] if loads else _less_tense(prepared, first):
+            late = solution.unfinished
+            yield solution
+    solved = True
+    for solution in _solutions_in_two(prepared, sets):
+        solved = bool(solution.loads)
+        if solved or not (found.outcome.solved and deadline.expired()):
+            yield replace(solution, unfinished=late + solution.unfinished)
+    if found.outcome.solved and not solved and deadline.expired():
+        loads = found.outcome.loads
+        last = FixedSolution.of_least(prepared, sets, found.outcome, loads)
+        last = replace(last, most=np.inf, unproven=(), unfinished=late, start=found)
+        yield last.late("least_utilisation")
+
+
+def _solutions_in_two(prepared: PreparedStance, sets: Sets) -> Iterator[FixedSolution]:
+    """Yield the plan that is meant from the very least utilisation, by a solver for each.
+
+    Where hands are asked for thousands of times what they can do, a small error of the largest load
+    may be more than the others' checks let pass: then the plan is a vertex. Without any, what comes
+    has no loads.
+    """
+    least = FixedSolution.of_least(prepared, sets, programs.margin(sets.data))
+    if not least.least.solved:
+        yield least
+        return
+    yield from _less_tense(prepared, least)
+    if not deadline.expired():
+        yield from _at_vertex(prepared, sets)
+
+
+def _at_vertex(prepared: PreparedStance, sets: Sets) -> Iterator[FixedSolution]:
+    """Yield a plan of least utilisation where as many rows meet as there are loads, if any."""
+    outcome = programs.vertex(sets.data)
+    if outcome.solved:
+        yield FixedSolution.of_least(prepared, sets, outcome, outcome.loads)
+
+
+def _less_tense(prepared: PreparedStance, least: FixedSolution) -> Iterator[FixedSolution]:
+    """Yield the plan of less tension for a little utilisation, or else for none; then the least.
+
+    ``least``: without loads, but for its outcome.
+    """
+    data, outcome = least.sets.data, least.least
+    trade = tension_trade(outcome.value, least.cap)
+    tidy, spare = less_tense(data, outcome, trade, prepared.batch.closing_tensions)
+    if not (tidy.solved or deadline.expired()):
+        tidy = programs.least_tensions(data, outcome.value)
+    if tidy.solved:
+        yield replace(least, loads=tidy.loads, spare=spare)
+    else:
+        least = least.late(*late("tie_break"))
+    yield replace(least, loads=outcome.loads, spare=())
+
+
+def nearest_solutions(
+    prepared: PreparedStance, found: Solution, nearest: Outcome
+) -> Iterator[FixedSolution]:
+    """Yield plans for the nearest body wrench that can be had, which rounding has put outside.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    found : Solution
+        For the wrench that is asked for.
+    nearest : Outcome
+        Of `programs.nearest`.
+    """
+    data = found.sets.data
+    sets = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
+    for solution in _solutions_in_two(prepared, sets):
+        yield solution.late(*found.unfinished)
+        if not solution.loads and not deadline.expired():
+            for vertex in _at_vertex(prepared, sets):
+                yield vertex.late(*found.unfinished)
+
+
+def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
+    """Return the load factor of hands with fixed wrists; None if none passes its checks."""
+    result = programs.load_factor(data)
+    if not result.solved:
+        return None
+    held = programs.holds(data.turned(hands.goal(result.value)), result.loads, 1.0)
+    return max(result.value, 0.0) if held else None

@@ -1,0 +1,171 @@
+"""Plans of hands of which some float: where their wrists go, and what all hands carry there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner import deadline, programs
+from planner.deadline import Budget, late
+from planner.explanation import idle_preloads
+from planner.floating import (
+    LargestFactor,
+    WristSolution,
+    best_within,
+    least_use,
+    most_load,
+    with_room,
+)
+from planner.prepare import PreparedStance
+from planner.programs import SLACK, StanceData, tension_trade
+from planner.result import LoadFactor, WristPlan
+from planner.solving import dual_bounds
+from planner.solving.objectives import MAX_MARGIN, CappedObjective
+from planner.solving.solution import Solution, unproven_sentences
+
+__all__ = ["FloatingSolution", "floating_solution", "wrench_is_given"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FloatingSolution(Solution):
+    """Loads of hands of which some float, their poses included.
+
+    Attributes
+    ----------
+    search : WristSolution
+        Where the search that led to the loads ended.
+    usual : WristSolution
+        Where the search for the least utilisation ended.
+    factor : LargestFactor or None
+        The largest load factor that the search met.
+    """
+
+    search: WristSolution
+    usual: WristSolution
+    factor: LargestFactor | None
+
+    @property
+    def proven(self) -> bool:
+        """Whether its search did not end without proof."""
+        return self.search.found != "unproven"
+
+    def best_in(
+        self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
+    ) -> FloatingSolution:
+        used = self.search.measure.utilisation
+        if not self.loads or used > self.cap + SLACK:
+            return self
+        cap = with_room(self.cap, used)
+        search = best_within(prepared.hands, self.search, cap, objective.goal, budget)
+        found = replace(self, cap=cap).late(*late(objective.late))
+        if not search.outcome.solved:
+            return found if deadline.expired() else found._at(search)
+        found = found._at(search)
+        if not found.proven:
+            return replace(found, objective=objective, best=search.outcome)
+        value = objective.value(search.sets.data, search.point.loads)
+        bound = objective.bound(search.sets.data, search.outcome, cap)
+        further = unproven_sentences(objective.words, value, bound)
+        return replace(
+            found,
+            objective=objective,
+            best=search.outcome,
+            most=np.inf,
+            unproven=_unproven_use(self.usual, self.usual.outcome.value) + further,
+        )
+
+    def _at(self, search: WristSolution) -> FloatingSolution:
+        """Return the same with the loads of a search, of which nothing is proven without proof."""
+        palms = zip(search.point.loads, search.point.palms, strict=True)
+        poses = tuple(
+            [
+                None if palm is None else WristPlan(y, palm, search.rounds, search.error)
+                for y, palm in palms
+            ]
+        )
+        found = replace(
+            self, sets=search.sets, loads=search.point.loads, poses=poses, search=search
+        )
+        return found if found.proven else replace(found, unproven=(), most=np.inf)
+
+    def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        most = most_load(prepared.hands, self.usual, self.factor, budget)
+        if most is None:
+            return LoadFactor(unfinished=deadline.expired())
+        return LoadFactor(most.factor, least=not most.sure)
+
+    def no_answer(self, prepared: PreparedStance) -> str:
+        reason = "no pose of the floating wrists was found that balances the body"
+        if wrench_is_given(prepared):
+            reason += " with the wrenches that they are given; that is no proof of none"
+        idle = idle_preloads(prepared.limbs, prepared.batch.hands, prepared.hands.wrists)
+        return f"{reason}; {idle[0]}" if idle else reason
+
+
+def floating_solution(
+    prepared: PreparedStance, budget: Budget, near: Solution | None = None
+) -> FloatingSolution:
+    """Find where floating wrists go, and return the plan of least utilisation there.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    budget : Budget
+    near : Solution, optional
+        Of much the same stance, where the search begins.
+    """
+    begin = near.usual if isinstance(near, FloatingSolution) and near.usual.exact else None
+    search, factor = least_use(prepared.hands, budget, begin)
+    cap = prepared.question.limits.utilisation
+    found = FloatingSolution(
+        sets=search.sets,
+        loads=(),
+        least=search.outcome,
+        objective=MAX_MARGIN,
+        best=search.outcome,
+        cap=cap,
+        unfinished=late("wrists"),
+        search=search,
+        usual=search,
+        factor=factor,
+    )
+    if not search.exact:
+        return replace(found, sets=prepared.hands.sets(search.point))
+    used = search.measure.utilisation
+    found = replace(found, most=tension_trade(used, cap).most, unproven=_unproven_use(search, used))
+    return found._at(_less_tense_beside(prepared, search))
+
+
+def _unproven_use(search: WristSolution, used: float) -> tuple[str, ...]:
+    """Return why a search's multipliers do not prove its utilisation the least of its sets."""
+    bound = dual_bounds.least_bound(search.sets.data, search.outcome)
+    return unproven_sentences("utilisation", used, bound)
+
+
+def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> WristSolution:
+    """Return a search's plan with less tension in its fixed hands, floating wrists as they are."""
+    wrists, data = prepared.hands.wrists, search.sets.data
+    if None not in wrists or deadline.expired():
+        return search
+    loads = search.point.loads
+    held = [
+        hand if wrist is None else hand.held(y)
+        for hand, wrist, y in zip(data.hands, wrists, loads, strict=True)
+    ]
+    cap = prepared.question.limits.utilisation
+    trade = tension_trade(search.measure.utilisation, cap)
+    found = programs.less_tension(StanceData(tuple(held), data.wrench), trade)
+    if not found.solved:
+        return search
+    pairs = zip(wrists, loads, found.loads, strict=True)
+    loads = tuple([new if wrist is None else old for wrist, old, new in pairs])
+    return replace(search, point=replace(search.point, loads=loads))
+
+
+def wrench_is_given(prepared: PreparedStance) -> bool:
+    """Whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
+    return any(
+        hand.wrist == "floating" and hand.wrench is not None
+        for hand in prepared.question.stance.hands
+    )

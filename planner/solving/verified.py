@@ -1,0 +1,154 @@
+"""Loads recovered and checked, by what is made for that before there are loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from planner import programs
+from planner.explanation import (
+    LimitUse,
+    joint_name,
+    joint_sentences,
+    off_sentences,
+    scene_findings,
+    warnings,
+)
+from planner.prepare import HandBatch, PreparedStance
+from planner.programs import SLACK
+from planner.result import (
+    Finding,
+    HandPlan,
+    LoadRecovery,
+    PlanArrays,
+    recover_floating_hand,
+)
+from planner.scene import unit_findings
+from planner.solving.dual_bounds import is_least
+from planner.solving.objectives import CappedObjective
+from planner.solving.solution import ByHand, Failed, Solution, Verified
+from planner.verification import Check
+
+__all__ = ["Checks", "idle_joints", "prepare_checks", "recover", "verify"]
+
+
+class Checks(NamedTuple):
+    """What recovers and checks the loads of a stance, known before there are any.
+
+    Attributes
+    ----------
+    check : Check
+        What every plan must pass.
+    recovery : LoadRecovery or None
+        Reads loads of fixed wrists; None where a wrist floats.
+    idle : tuple of LimitUse
+        How much of their joints' torque limbs without a hand use.
+    findings : tuple of Finding
+        What is odd about the stance as a scene, and about the sizes of the question's numbers.
+    oddities : tuple of str
+        What is odd about it, these included, in words.
+    """
+
+    check: Check
+    recovery: LoadRecovery | None
+    idle: tuple[LimitUse, ...]
+    findings: tuple[Finding, ...] = ()
+    oddities: tuple[str, ...] = ()
+
+    @property
+    def overloaded(self) -> bool:
+        """Whether a limb without a hand cannot bear itself, whatever the body needs."""
+        return any(used.utilisation > 1.0 + SLACK for used in self.idle)
+
+    @classmethod
+    def of(cls, prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Checks:
+        """Return what recovers and checks loads, and nothing of what is odd.
+
+        ``idle``: how much limbs without a hand use, where that is known.
+        """
+        batch, hands = prepared.batch, prepared.hands
+        fixed = None if hands.floating else LoadRecovery(batch, hands.spaces, hands.scaled)
+        used = idle_joints(prepared) if idle is None else tuple(idle)
+        return cls(Check(prepared.question, batch, prepared.where), fixed, used)
+
+
+def prepare_checks(prepared: PreparedStance) -> Checks:
+    """Return what recovering and checking plans of a stance needs, and what is odd about it.
+
+    It changes nothing that threads share, so it may run beside a solver.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
+    """
+    odd = (*scene_findings(prepared), *unit_findings(prepared.question))
+    oddities = (
+        *(each.message for each in odd),
+        *warnings(prepared.question.stance, prepared.batch),
+        *off_sentences(prepared.where),
+        *joint_sentences(prepared.question, prepared.where),
+    )
+    return Checks.of(prepared)._replace(findings=odd, oddities=oddities)
+
+
+def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
+    """Return how much of their joints' torque limbs without a hand use."""
+    where = prepared.where
+    idle = {} if where is None else where.idle(prepared.question.stance)
+    return tuple(
+        LimitUse(joint_name(limb, *joint), abs(float(torque)), float(most))
+        for limb, loads in idle.items()
+        for joints in (loads.driven,)
+        for *joint, torque, most in zip(
+            joints.names, joints.sliding, joints.gravity, joints.limits, strict=True
+        )
+    )
+
+
+def recover(prepared: PreparedStance, checks: Checks, solution: Solution) -> Verified:
+    """Return what the loads of a solution do, for `verify` to check."""
+    spaces, data = solution.sets
+    if checks.recovery is not None:
+        arrays, used, effort = checks.recovery.read(solution.loads)
+        by_hand: ByHand = partial(arrays.hands, prepared.limbs, prepared.batch, spaces)
+    else:
+        hands = tuple([_hand(prepared, solution, i) for i in range(len(prepared.limbs))])
+        arrays, used = PlanArrays.of(hands), programs.used(data, solution.loads)
+        effort, by_hand = programs.used_effort(data, solution.loads), lambda: hands
+    utilisation = float(np.maximum.reduce(arrays.utilisations))
+    whole = max([utilisation, *(each.utilisation for each in checks.idle)])
+    return Verified(solution, arrays, used, effort, utilisation, whole, by_hand)
+
+
+def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
+    """Return what one hand does of a stance of which some float."""
+    limb, settled = prepared.limbs[index], prepared.batch.hands[index]
+    space, wrist = solution.sets.spaces[index], prepared.hands.wrists[index]
+    pose = solution.poses[index]
+    if wrist is None or pose is None:
+        alone, own = HandBatch.of((settled,)), (space,)
+        arrays, _, _ = LoadRecovery(alone, own).read((solution.loads[index],))
+        return arrays.hands((limb,), alone, own)[0]
+    return recover_floating_hand(limb, settled, wrist.hand, space, pose)
+
+
+def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Verified | Failed:
+    """Return loads, and what they do, if they pass the checks and are the best; else why not."""
+    solution, arrays = recovered.solution, recovered.arrays
+    wrong = list(solution.wrong)
+    wrong += checks.check.problems(arrays, recovered.whole, prepared.wrench, recovered.effort)
+    objective = solution.objective
+    if isinstance(objective, CappedObjective):
+        value = objective.value(solution.sets.data, solution.loads)
+        wrong += objective.problems(arrays, value)
+    wrong += solution.unproven
+    used, most = recovered.utilisation, solution.most
+    if not is_least(used, most):
+        wrong.append(f"utilisation {used:.6g} is above {most:.6g}, what less tension is worth")
+    if not wrong:
+        return recovered
+    return Failed(solution, f"the solver's plan does not pass the checks: {wrong[0]}")
